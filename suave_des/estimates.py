@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -96,18 +96,34 @@ def mean_of(values: Sequence[float], groups: Sequence[int] | None = None) -> Est
 
     Args:
         values: the sample; their order makes no difference, as they are summed exactly.
-        groups: the number of each value's group, group by group, if values of a group are alike; see GroupedMean.
+        groups: the number of each value's group, if values of a group are alike; groups are then what is independent.
     """
     n = len(values)
     if n == 0:
         return Estimate(method=STUDENT)
     mean = math.fsum(values) / n
+    half = t_quantile(n - 1) * _std(values, mean) / math.sqrt(n) if n > 1 else _NAN
     if groups is not None:
-        found = GroupedMean(zip(values, groups, strict=True))
-        mean, half = found.mean, found.half_width
-    else:
-        half = t_quantile(n - 1) * _std(values, mean) / math.sqrt(n) if n > 1 else _NAN
+        over = _half_width_over(groups, values, mean)
+        half = max(half, over) if over == over else over
     return Estimate(mean, mean - half, mean + half, STUDENT)
+
+
+def _half_width_over(groups: Sequence[int], values: Sequence[float], mean: float) -> float:
+    """Return half the width of the 95% interval of a mean over groups of values; nan for fewer than two.
+
+    The interval is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t, of
+    as many degrees of freedom as there are groups but one; of groups of one size, that of the groups' means. A few
+    groups may have equal means by chance, so `mean_of` never takes it to be narrower than that of independent values.
+    """
+    totals = dict.fromkeys(groups, 0.0)
+    for value, group in zip(values, groups, strict=True):
+        totals[group] += value - mean
+    count = len(totals)
+    if count < 2:
+        return _NAN
+    squares = math.fsum(total * total for total in totals.values()) * count / (count - 1)
+    return t_quantile(count - 1) * math.sqrt(squares) / len(values)
 
 
 def std_of(values: Sequence[float]) -> Estimate:
@@ -145,55 +161,3 @@ def t_quantile(freedom: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, (1.0 + CONFIDENCE) / 2.0))
-
-
-class GroupedMean:
-    """Mean of values that come group by group, and its 95% interval: groups are independent, values are not.
-
-    The interval is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t, of
-    as many degrees of freedom as there are groups but one; of groups of one size, that of the groups' means; of groups
-    of one value, that of a sample. It is never narrower than if all values were independent: a few groups may have
-    equal means by chance. Sums are Welford's (Technometrics 4, 1962).
-
-    Args:
-        values: the first ones, each with the number of its group.
-    """
-
-    __slots__ = ("_closed", "_first", "_last", "_open", "_squares", "groups", "mean", "n")
-
-    def __init__(self, values: Iterable[tuple[float, int]] = ()) -> None:
-        self.n = self.groups = self._last = 0
-        self.mean = self._squares = self._first = 0.0
-        self._open = self._closed = (0.0, 0.0, 0.0)
-        for value, group in values:
-            self.add(value, group)
-
-    def add(self, value: float, group: int) -> None:
-        """Count a value of a group."""
-        self.n += 1
-        off = value - self.mean
-        self.mean += off / self.n
-        self._squares += off * (value - self.mean)
-        if self.groups == 0:
-            self._first = value  # sums are of differences from it, which are rounded less
-        if self.groups == 0 or group != self._last:
-            self._closed, self._open = self._sums(), (0.0, 0.0, 0.0)
-            self.groups, self._last = self.groups + 1, group
-        total, size, _ = self._open
-        self._open = (total + value - self._first, size + 1.0, 0.0)
-
-    def _sums(self) -> tuple[float, float, float]:
-        """Return the sums over the groups of total², total * size and size²."""
-        (a, b, c), (total, size, _) = self._closed, self._open
-        return a + total * total, b + total * size, c + size * size
-
-    @property
-    def half_width(self) -> float:
-        """Half the width of the 95% interval of the mean; nan for fewer than two groups."""
-        if self.groups < 2:
-            return _NAN
-        off, (a, b, c) = self.mean - self._first, self._sums()
-        squares = max(0.0, a - 2.0 * off * b + off * off * c) * self.groups / (self.groups - 1)
-        of_groups = t_quantile(self.groups - 1) * math.sqrt(squares) / self.n
-        of_values = t_quantile(self.n - 1) * math.sqrt(self._squares / (self.n - 1) / self.n)
-        return max(of_groups, of_values)

@@ -312,7 +312,7 @@ def _work(
 ) -> tuple[KeyboardInterrupt | SuaveDesError | None, list[Remark]]:
     """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
     spec, variation = campaign.spec, campaign.variation
-    tracker = ProgressTracker(variation.sweep.points, spec.managers, spec.runs, variation.runs_sharing_draw)
+    tracker = ProgressTracker(variation.sweep.points, spec.managers, spec.runs)
     with store.reading():
         remarks = {(manager, text): int(count) for manager, text, count in store.about("remarks", default=[])}
     stopped: KeyboardInterrupt | SuaveDesError | None = None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
@@ -13,7 +12,6 @@ from importlib import import_module
 from itertools import chain, product, repeat
 from typing import TYPE_CHECKING, Any
 
-from suave_des.estimates import GroupedMean, known
 from suave_des.records.metrics import COLUMNS, METRICS, SEARCH_TIME, Row
 from suave_des.records.store import MissionFailure, Outcome
 
@@ -26,13 +24,11 @@ _SEARCH_TIME = COLUMNS.index(SEARCH_TIME)
 _METRIC = METRICS[SEARCH_TIME].brief
 _UPDATE_PERIOD_S = 0.25
 _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
-_RATE_PERIOD_S = 10.0
-"""Missions a second are those of this time."""
 _NOTEBOOK_WIDTH = 90
-_WAITS_S = 2.0
 _FIRST_TIME = "(the first run compiles the mission code: 20 to 60 s)"
 
 
+@dataclass(slots=True)
 class GroupProgress:
     """Progress of one manager at one point of a sweep: the missions that differ in the run only.
 
@@ -42,34 +38,28 @@ class GroupProgress:
         runs: missions that are to be done.
         done: missions that are done, failed ones among them.
         failed: missions that failed.
+        total_s: search time of all missions that are done and did not fail.
     """
 
-    def __init__(self, point: int, manager: str, runs: int) -> None:
-        self.point, self.manager, self.runs = point, manager, runs
-        self.done = self.failed = 0
-        self._next, self._waiting, self._values = 1, dict[int, Row | MissionFailure](), GroupedMean()
+    point: int
+    manager: str
+    runs: int
+    done: int = 0
+    failed: int = 0
+    total_s: float = 0.0
 
     @property
-    def mean(self) -> float | None:
-        """Mean search time of the first runs, up to the first that is missing; None if there are none."""
-        return self._values.mean if self._values.n else None
+    def mean_s(self) -> float | None:
+        """Mean search time so far; None if no mission is done."""
+        return self.total_s / (self.done - self.failed) if self.done > self.failed else None
 
-    @property
-    def half_width(self) -> float | None:
-        """Half the width of its 95% interval; None for fewer than two runs, or draws that runs share."""
-        return known(self._values.half_width)
-
-    def add(self, run: int, outcome: Row | MissionFailure, runs_sharing_draw: int) -> None:
-        """Count an outcome; they may come in any order."""
+    def add(self, outcome: Row | MissionFailure) -> None:
+        """Count an outcome."""
         self.done += 1
-        self.failed += isinstance(outcome, MissionFailure)
-        self._waiting[run] = outcome
-        while self._next in self._waiting:
-            first = self._waiting.pop(self._next)
-            value = None if isinstance(first, MissionFailure) else first[_SEARCH_TIME]
-            if isinstance(value, float | int):
-                self._values.add(value, (self._next - 1) // runs_sharing_draw)
-            self._next += 1
+        if isinstance(outcome, MissionFailure):
+            self.failed += 1
+        elif isinstance(value := outcome[_SEARCH_TIME], float | int):
+            self.total_s += value
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,46 +83,45 @@ OnProgress = Callable[[Progress], None]
 
 
 class ProgressTracker:
-    """Counts the outcomes of a campaign; of groups (a manager at a point) that are done, it keeps the last ones.
+    """Counts the outcomes of a campaign; of many groups (a manager at a point) that are done, it keeps the last ones.
 
     Args:
         points: number of points of the sweep.
         managers: names, in the campaign's order.
         runs: for each manager at each point.
-        runs_sharing_draw: consecutive runs that share a draw: the draws are independent, the runs are not.
     """
 
-    def __init__(self, points: int, managers: Sequence[str], runs: int, runs_sharing_draw: int = 1) -> None:
-        self._points, self._managers, self._runs, self._runs_sharing_draw = points, managers, runs, runs_sharing_draw
-        self._under_way: dict[tuple[int, int], GroupProgress] = {}
-        self._complete: deque[tuple[tuple[int, int], GroupProgress]] = deque(maxlen=GROUPS_SHOWN)
+    def __init__(self, points: int, managers: Sequence[str], runs: int) -> None:
+        self._managers, self._runs = managers, runs
+        self._groups: dict[tuple[int, int], GroupProgress] = {}
         self.done = self.failed = 0
         self.total = runs * points * len(managers)
+        if points * len(managers) <= GROUPS_SHOWN:
+            for place in product(range(points), range(len(managers))):
+                self._group(*place)
 
     def add(self, finished: Iterable[Outcome]) -> None:
         """Count outcomes; they may come in any order."""
         for key, outcome in finished:
-            place = (key.point, key.manager)
-            group = self._under_way.get(place) or self._under_way.setdefault(place, self._new(*place))
-            group.add(key.run, outcome, self._runs_sharing_draw)
+            group = self._group(key.point, key.manager)
+            group.add(outcome)
             self.done += 1
             self.failed += isinstance(outcome, MissionFailure)
-            if group.done == self._runs:
-                self._complete.append((place, self._under_way.pop(place)))
+            if group.done == self._runs and len(self._groups) > GROUPS_SHOWN:
+                del self._groups[next(place for place, each in self._groups.items() if each.done == self._runs)]
 
     def progress(self) -> Progress:
         """Return the campaign's progress."""
-        return Progress(self.done, self.failed, self.total, self._groups)
+        return Progress(self.done, self.failed, self.total, self._shown)
 
-    def _new(self, point: int, manager: int) -> GroupProgress:
-        return GroupProgress(point, self._managers[manager], self._runs)
+    def _group(self, point: int, manager: int) -> GroupProgress:
+        place = point, manager
+        if place not in self._groups:
+            self._groups[place] = GroupProgress(point, self._managers[manager], self._runs)
+        return self._groups[place]
 
-    def _groups(self) -> tuple[GroupProgress, ...]:
-        found = {**dict(self._complete), **self._under_way}
-        if self._points * len(self._managers) <= GROUPS_SHOWN:
-            for place in product(range(self._points), range(len(self._managers))):
-                found.setdefault(place, self._new(*place))
-        return tuple(found[place] for place in sorted(found)[-GROUPS_SHOWN:])
+    def _shown(self) -> tuple[GroupProgress, ...]:
+        return tuple(self._groups[place] for place in sorted(self._groups)[-GROUPS_SHOWN:])
 
 
 # How it is shown. Rich is imported here alone: worker processes and scripts need none of it.
@@ -210,27 +199,24 @@ class _View:
         self.label = label
         self.progress: Progress | None = None
         self._groups: tuple[GroupProgress, ...] = ()
-        self._due_s, self._began_s = 0.0, time.monotonic()
-        self._done: deque[tuple[float, int]] = deque()
-        """Times, and missions that were done then."""
+        self._due_s = self._began_s = self._first_s = self._last_s = time.monotonic()
+        self._before = 0
+        """Missions that were done at the first look, as those of a campaign that is resumed."""
 
     def take(self, progress: Progress) -> None:
         """Take the current progress; called for each mission or chunk."""
-        self.progress = progress
+        is_first, self.progress = self.progress is None, progress
+        if is_first:
+            self._first_s, self._before = time.monotonic(), progress.done
         if time.monotonic() >= self._due_s:
             self.look()
 
     def look(self) -> None:
         """Note what is drawn next, in the campaign's thread."""
-        if self.progress is None:
-            return
-        now = time.monotonic()
-        self._due_s = now + _UPDATE_PERIOD_S
-        self._groups = self.progress.groups()
-        while len(self._done) > 2 and self._done[1][0] < now - _RATE_PERIOD_S:
-            self._done.popleft()
-        if not self._done or self._done[-1][1] != self.progress.done:
-            self._done.append((now, self.progress.done))
+        if self.progress is not None:
+            self._last_s = time.monotonic()
+            self._due_s = self._last_s + _UPDATE_PERIOD_S
+            self._groups = self.progress.groups()
 
     def picture(self) -> RenderableType:
         """Return a bar for all missions, and a row for each manager."""
@@ -252,7 +238,7 @@ class _View:
         table.add_column("", no_wrap=True)
         for group in self._groups:
             cells = (f"{group.done:,}", f"{group.failed:,}" if group.failed else "")
-            mean = estimated(group.mean, group.half_width)
+            mean = "" if group.mean_s is None else f"{group.mean_s:.2f}"
             table.add_row(self._name(group), *cells, mean, "done" if group.done == group.runs else "")
         return Group(Text(self.label, "bold", no_wrap=True, overflow="ellipsis"), head, table)
 
@@ -263,9 +249,9 @@ class _View:
             return f"suave-des: {self.label}: {self._starting()}"
         last = self._groups[-1].point
         means = [
-            f"{self._name(group)} {estimated(group.mean, group.half_width)}"
+            f"{self._name(group)} {group.mean_s:.2f}"
             for group in self._groups
-            if group.mean is not None and (group.point == last or group.done < group.runs)
+            if group.mean_s is not None and (group.point == last or group.done < group.runs)
         ]
         parts = (f"{progress.done} of {progress.total} missions", _failed(progress), *self._rate(progress))
         told = f"; {_METRIC}: {', '.join(means)}" if means else ""
@@ -273,15 +259,11 @@ class _View:
 
     def _rate(self, progress: Progress) -> tuple[str, str]:
         """Return missions a second, and the time that is left; empty where they are not known."""
-        (first_s, before), (last_s, done) = self._done[0], self._done[-1]
-        if done == before or last_s == first_s:
+        done, took_s, left = progress.done - self._before, self._last_s - self._first_s, progress.total - progress.done
+        if not done or took_s <= 0.0:
             return "", ""
-        rate, left = (done - before) / (last_s - first_s), progress.total - progress.done
-        waiting_s = time.monotonic() - last_s
-        text = f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s"
-        if left and waiting_s > _WAITS_S:  # what was left at the rate before says nothing now
-            return text, f"no mission done for {duration(waiting_s)}: Java is starting, or missions are long"
-        return text, f"{duration(left / rate)} left" if left else ""
+        rate = done / took_s
+        return f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s", f"{duration(left / rate)} left" if left else ""
 
     def _starting(self) -> str:
         return f"starting, {duration(time.monotonic() - self._began_s)} {_FIRST_TIME}"
@@ -292,13 +274,6 @@ class _View:
 
 def _failed(progress: Progress) -> str:
     return f"{progress.failed:,} failed" if progress.failed else ""
-
-
-def estimated(mean: float | None, half_width: float | None) -> str:
-    """Return a mean and half its 95% interval as text; empty without a mean."""
-    if mean is None:
-        return ""
-    return f"{mean:.2f}" if half_width is None else f"{mean:.2f} ± {half_width:.2f}"
 
 
 def duration(seconds: float) -> str:

@@ -135,14 +135,13 @@ def _summary(result: CampaignResult, width: int) -> Table:
 
 
 def _summary_in(result: CampaignResult, heading_width: int, digits: int, has_std: bool) -> Table:
-    from suave_des.campaign.progress import estimated
     from suave_des.estimates import percent
     from suave_des.records.metrics import METRICS, PAPER_METRICS
 
     def figures(cells: Mapping[str, Any], metric: str) -> list[str]:
         mean, low, high, std = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std"))
-        means = estimated(mean, None if low is None or high is None else (high - low) / 2.0)
-        return [means, number(std)] if has_std else [means]
+        half = "" if low is None or high is None else f" ± {(high - low) / 2.0:.2f}"
+        return [f"{number(mean)}{half}", *([number(std)] if has_std else [])]
 
     parameters = result.variation.sweep.parameters
     headings = [*parameters, "manager", "missions", "found"]
