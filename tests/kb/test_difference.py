@@ -69,6 +69,13 @@ def test_missions_with_the_same_rules_do_not_differ():
     ] * 2
 
 
+def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other():
+    (search, _, *_) = compare_missions("seams2023", 1, {}, {"values": {"mission.time_limit_s": 20}}).metrics
+    assert search.other <= 21 < search.one and search.difference.value == search.other - search.one
+    ((run, *values),) = search.extremes
+    assert (run, values) == (1, [search.one, search.other])
+
+
 def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):
     shipped = shipped_folder("ontology") / "suave.owl"
     arguments = ("diff", shipped, bolder, "--max-failed", "0", "--quiet", "--missions")
@@ -111,9 +118,10 @@ def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_desig
     same = next(case for case in policy.cases if not case.decided.changes and SEARCH in case.asked)
     reasoning = same.decided.reasoning
     assert reasoning is not None
-    none_left = Outcome(Reasoning(reasoning.inference, Plan((Decision(SEARCH, None, ""),))))
     more = Fact("o_generate_search_path", "o_status", "OK")
-    other_status = Outcome(Reasoning(Inference(same.state, frozenset(), frozenset({more})), reasoning.plan))
+    other_facts = Inference(same.state, frozenset(), frozenset({more}))
+    none_left = Outcome(Reasoning(other_facts, Plan((Decision(SEARCH, None, ""),))))
+    other_status = Outcome(Reasoning(other_facts, reasoning.plan))
     for outcome, is_decided in ((Outcome(None, "two values"), True), (none_left, True), (other_status, False)):
         cases = tuple(replace(case, outcome=outcome) if case is same else case for case in policy.cases)
         found = compare_policies(policy, replace(policy, cases=cases))
