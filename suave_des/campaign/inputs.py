@@ -32,7 +32,8 @@ from suave_des.findings import Level, ordered
 from suave_des.learned import read_file
 from suave_des.registry import custom_functions, is_built_in, manager_class, takes_argument
 from suave_des.resources import shipped_folder
-from suave_des.scenario.loader import InputFiles, LoadedScenario, load_scenario, sha256_of, shown_name
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.yamlfile import InputFiles, sha256_of, shown_name
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology

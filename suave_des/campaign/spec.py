@@ -17,9 +17,10 @@ from suave_des.campaign.variation import plain
 from suave_des.errors import InputError, shown
 from suave_des.registry import is_built_in, manager_class
 from suave_des.resources import find
-from suave_des.scenario.loader import InputFiles, Replacements, find_named
+from suave_des.scenario.loader import Replacements
 from suave_des.scenario.quantities import Real, Strict, wrong
-from suave_des.scenario.yamlfile import Layer, problem_and_remedy, validated
+from suave_des.scenario.schema import problem_and_remedy, validated
+from suave_des.scenario.yamlfile import InputFiles, Layer, find_named
 
 RUNS_LIMIT = 1_000_000
 SEED_LIMIT = 2**63 - 1

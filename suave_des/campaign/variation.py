@@ -33,7 +33,7 @@ from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.models import MissionSettings
 from suave_des.scenario.quantities import Distribution, Real, Strict, wrong
-from suave_des.scenario.yamlfile import problem_and_remedy
+from suave_des.scenario.schema import problem_and_remedy
 
 ENSEMBLE_COLUMN = "ensemble_member"
 """Column of runs.csv: number of the member, from 1."""

@@ -47,7 +47,8 @@ from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
-from suave_des.scenario.yamlfile import YamlDocument, read_yaml, validated
+from suave_des.scenario.schema import validated
+from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 #: What XML 1.0 has no place for.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")

@@ -23,7 +23,8 @@ from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, Objectiv
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.yamlfile import read_yaml, validated
+from suave_des.scenario.schema import validated
+from suave_des.scenario.yamlfile import read_yaml
 from suave_des.scenario_knowledge import measured_attributes
 
 #: Begins the IRIs of individuals that exist in a test or a question only.

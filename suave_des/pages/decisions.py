@@ -24,7 +24,7 @@ from suave_des.records.mission_folder import MissionRecord
 from suave_des.resources import find
 from suave_des.results.mission import adaptations
 from suave_des.results.mission_figures import Rules
-from suave_des.scenario.loader import InputFiles
+from suave_des.scenario.yamlfile import InputFiles
 from suave_des.scenario_knowledge import open_base, read_base
 
 _TIME_DIGITS = 2

@@ -26,7 +26,8 @@ from suave_des.registry import manager_class
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
-from suave_des.scenario.yamlfile import read_yaml, validated
+from suave_des.scenario.schema import validated
+from suave_des.scenario.yamlfile import read_yaml
 
 PAPERS_RUNS = "seams2023_runs.csv"
 """The 60 missions published with the SUAVE paper, for scenarios that have none of their own."""

@@ -1,21 +1,19 @@
-"""Loads a scenario by its name, merged over its bases, with everything that its missions need; checks it once."""
+"""Loads a scenario by its name, with everything that its missions need; checks it once."""
 
 from __future__ import annotations
 
-import hashlib
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, TypedDict, Unpack
 
-from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.files import read_bytes
-from suave_des.resources import find, shipped_folder
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.resources import find
 from suave_des.scenario.models import REASONERS, Scenario
 from suave_des.scenario.modes import ModeTable, modes_of
 from suave_des.scenario.physical import SignalTable, TableSignal, read_table
-from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, read_yaml, validated
+from suave_des.scenario.schema import validated
+from suave_des.scenario.yamlfile import InputFiles, Layer, Location, find_named, scenario_layer
 
 _FILE_NAMES = "return a list of file names as text"
 
@@ -275,158 +273,6 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
     """
     holder, key = holder_of(loaded.scenario.model_dump(mode="json"), path)
     return holder[key]
-
-
-# A scenario's files, merged over those that they build on.
-
-_KIND_KEYS = ("kind", "distribution")
-"""Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""
-_REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
-"""Mappings of freely named entries, in which a null removes the base's entry."""
-_PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
-"""Parts of a scenario that may be the name of a file, or differ from one that they name as their base."""
-_ONTOLOGY_LIMIT_BYTES = 100_000_000
-_CHAIN_LIMIT = 20
-_DEFAULT_VEHICLE = "bluerov2"
-
-
-class InputFiles:
-    """Reads files and keeps the hash of each, for a manifest.
-
-    Attributes:
-        inputs: SHA-256 of each file read, as "shipped/KIND/NAME" if it is shipped, else its path as given.
-    """
-
-    def __init__(self) -> None:
-        self.inputs: dict[str, str] = {}
-
-    def yaml(self, path: Path, depth: int = 0) -> YamlDocument:
-        """Read a YAML file."""
-        document = read_yaml(path, depth)
-        self.note(path, document.sha256)
-        return document
-
-    def ontology(self, path: Path) -> None:
-        """Hash an ontology or a file of rules, which is parsed elsewhere."""
-        self.note(path, sha256_of(path, _ONTOLOGY_LIMIT_BYTES))
-
-    def note(self, path: Path, sha256: str) -> None:
-        """Store the hash of a file that was read."""
-        self.inputs[shown_name(path)] = sha256
-
-
-def sha256_of(path: Path, limit: int) -> str:
-    """SHA-256 of a file; raises as read_bytes does."""
-    return hashlib.sha256(read_bytes(path, limit)).hexdigest()
-
-
-def shown_name(path: Path) -> str:
-    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as given."""
-    for kind in ("ontology", "scenarios"):
-        if path.is_relative_to(folder := shipped_folder(kind)):
-            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
-    return path.as_posix()
-
-
-def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
-    """Find a file that a layer names: beside the file in which its name is given, or shipped.
-
-    Raises:
-        InputError: there is none, with the line that names it.
-    """
-    if isinstance(name, int | float) and not isinstance(name, bool):
-        name = f"{name:g}"  # revisions 2023 and 1.5 need no quotes
-    if not isinstance(name, str) or not name:
-        raise layer.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
-    try:
-        return find(name, kind, beside=layer.place(key_path).file.parent)
-    except InputError as error:
-        raise layer.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
-
-
-def scenario_layer(files: InputFiles, path: Path, over: Layer | None = None) -> Layer:
-    """Merge a scenario file over its bases, with its revision and its vehicle written out in full.
-
-    Args:
-        files: reader.
-        path: of the scenario.
-        over: what differs from it; None: nothing.
-
-    Returns:
-        The layer. Its name is its file's if it gives none: a base's would make its results look like the base's.
-
-    Raises:
-        InputError: a file that cannot be read, or is its own base; a revision that is not known.
-    """
-    own: Layer = files.yaml(path)
-    if "campaign" in own.data and "scenario" in own.data:
-        remedy = f"suave-des campaign {path} --out DIR runs it; its scenario is {own.data['scenario']}"
-        raise own.error("this is a campaign file, not a scenario", ("campaign",), remedy)
-    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
-    name = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
-    layer = _over_its_base(files, _with_named_parts(own), "scenarios", (path,))
-    layer = layer if over is None else merge(layer, _with_named_parts(over))
-    layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
-    for part, folder in _PARTS.items():
-        if "base" in (layer.data.get(part) or ()):
-            layer = layer.replaced(part, _over_its_base(files, layer.below(part), folder, (layer.place((part,)).file,)))
-    return Layer({**layer.data, "name": name}, layer.places)
-
-
-def _with_named_parts(layer: Layer) -> Layer:
-    """The layer, with the name of a part as the base of one that does not differ from it."""
-    data, places = dict(layer.data), dict(layer.places)
-    for part in _PARTS:
-        if isinstance(data.get(part), str | int | float):
-            data[part] = {"base": data[part]}
-            places[(part, "base")] = layer.place((part,))
-    return Layer(data, places)
-
-
-def _over_its_base(files: InputFiles, layer: Layer, kind: str, chain: tuple[Path, ...]) -> Layer:
-    """Merge a layer over the file that it names as its base, if any; `chain` is how that was reached."""
-    if "base" not in layer.data:
-        return layer
-    path = find_named(layer, ("base",), layer.data["base"], kind)
-    chain = (*chain, path)
-    if len({each.resolve() for each in chain}) < len(chain) or len(chain) > _CHAIN_LIMIT:
-        names = " -> ".join(each.name for each in chain)
-        raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
-    below: Layer = files.yaml(path, len(chain) - 1)
-    below = _over_its_base(files, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
-    return merge(below, layer.without("base"))
-
-
-def merge(base: Layer, over: Layer) -> Layer:
-    """Merge one layer over another: mappings are merged, all other values replaced."""
-    replaced: set[KeyPath] = set()
-    data = _merge(base.data, over.data, (), replaced)
-    kept = {
-        path: place
-        for path, place in base.places.items()
-        if not any(path[:length] in replaced for length in range(1, len(path) + 1))
-    }
-    return Layer(data, {**kept, **over.places})
-
-
-def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]) -> dict[str, Any]:
-    merged = dict(base)
-    for key, value in over.items():
-        below, known = (*path, key), base.get(key)
-        is_whole = not path and key in _PARTS and "base" in (value or ())
-        if isinstance(known, dict) and isinstance(value, dict) and _same_kind(known, value) and not is_whole:
-            merged[key] = _merge(known, value, below, replaced)
-            continue
-        replaced.add(below)
-        if value is None and key in base and path in _REMOVABLE_IN:
-            del merged[key]
-        else:
-            merged[key] = value
-    return merged
-
-
-def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
-    return all(over[key] == base.get(key, over[key]) for key in _KIND_KEYS if key in over)
 
 
 # Values by their key paths, such as signals.water_visibility.period_s.

@@ -22,7 +22,8 @@ from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SU
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown, similar
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.quantities import Real, Strict, wrong
-from suave_des.scenario.yamlfile import Layer, YamlDocument, input_error
+from suave_des.scenario.schema import input_error
+from suave_des.scenario.yamlfile import Layer, YamlDocument
 
 ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"

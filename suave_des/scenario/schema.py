@@ -1,18 +1,23 @@
-"""JSON Schema of scenario files, for editors and other tools, and the meaning of each key."""
+"""What the models of scenarios say: JSON Schema, the meaning of each key, and errors with file and line."""
 
 from __future__ import annotations
 
 import ast
 import inspect
+import re
 import sys
+import typing
+from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
+from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.yamlfile import models_within
+from suave_des.scenario.yamlfile import Layer
 
 _WITH_NAMED_ENTRIES = (("Scenario", "signals"), ("KnowledgeSettings", "values"))
 _WHOLE = ("ThrusterEvent", "ThrusterDescription")
@@ -92,3 +97,138 @@ def _classes(module: str) -> dict[str, ast.ClassDef]:
     """The definitions of a module's classes, whose source is parsed once for all of them."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+
+
+# Errors of validation, with file and line.
+
+_TAGGED = ("kind", "distribution", "type")
+"""Keys whose word tells the members of a union apart."""
+_NAME, _INDEX = "NAME", "[]"
+"""Stand for any name, and any number of an entry, in the key path of a model."""
+AnyModel = TypeVar("AnyModel", bound=BaseModel)
+
+
+def validated(layer: Layer, model: type[AnyModel]) -> AnyModel:
+    """Return the data of a layer as a model.
+
+    Raises:
+        InputError: they are not valid, see input_error.
+    """
+    try:
+        return model.model_validate(layer.data)
+    except ValidationError as error:
+        raise input_error(error, layer, model) from None
+
+
+def input_error(error: ValidationError, layer: Layer, model: Any) -> InputError:
+    """Return the first problem, of the user's own file before its base, as one error that counts the others.
+
+    Args:
+        error: what pydantic raised for layer.data.
+        layer: the data with their places.
+        model: the model, or other type, that was validated.
+    """
+
+    def order(found: tuple[KeyPath, ErrorDetails]) -> tuple[int, int, int]:
+        # A misspelt key is also a missing one, and a list with a wrong entry too short: report these last.
+        place = layer.place(found[0])
+        return {"missing": 1, "too_short": 2}.get(found[1]["type"], 0), place.depth, place.line
+
+    found = [(_key_path(each, layer), each) for each in error.errors(include_url=False)]
+    path, first = min(found, key=order)
+    problem, remedy = _texts(first, path, model)
+    more = f"and {len(found) - 1} more" if len(found) > 1 else None
+    return layer.error(problem, path, "; ".join(filter(None, (remedy, more))) or None)
+
+
+def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any) -> tuple[KeyPath, str, str | None]:
+    """Return the first problem of data that are in no file: its key path, what is wrong, and what would be right.
+
+    Args:
+        error: what pydantic raised for the data.
+        data: what was validated.
+        model: the model, or other type, that they were to be.
+    """
+    first = min(error.errors(include_url=False), key=lambda detail: detail["type"] == "missing")
+    path = (*_key_path(first, Layer(data, {})), *first.get("ctx", {}).get("keys", "").split()[:1])
+    return path, *_texts(first, path, model)
+
+
+def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
+    """Yield every model that a type holds, with its key path; members of a union have the same."""
+    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
+        yield path, wanted
+        for name, field in wanted.model_fields.items():
+            yield from models_within(field.annotation, (*path, name))
+        return
+    entry = {dict: (_NAME,), tuple: (_INDEX,)}.get(typing.get_origin(wanted), ())
+    for argument in typing.get_args(wanted):
+        yield from models_within(argument, (*path, *entry))
+
+
+def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
+    """The key path in the file: pydantic's location without what is no key, such as the tags of union members.
+
+    Of keys that do not fit together, and have a place each, it is the one in the user's own file.
+    """
+    path: list[str | int] = []
+    here: Any = layer.data
+    for key in detail["loc"]:
+        if isinstance(here, dict) and key in here:
+            here = here[key]
+        elif isinstance(here, list) and isinstance(key, int):
+            here = here[key] if key < len(here) else None
+        else:
+            is_inside_text = isinstance(here, str) and key != "number"  # of a thruster event, and not a tag
+            if not is_inside_text and not (detail["type"] == "missing" and key == detail["loc"][-1]):
+                continue
+        path.append(key)
+    context = detail.get("ctx", {})
+    given = context.get("keys", context.get("discriminator", "").strip("'")).split()
+    candidates: list[KeyPath] = [(*path, key) for key in given if layer.has((*path, key))]
+    return min(candidates, key=lambda candidate: layer.place(candidate).depth, default=tuple(path))
+
+
+def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:
+    """Return the problem and the remedy."""
+    value, context = detail["input"], detail.get("ctx", {})
+    match detail["type"]:
+        case "wrong":
+            return context["problem"], context["remedy"]
+        case "missing":
+            return "is missing", "add it"
+        case "extra_forbidden":
+            return f"unknown key {shown(path[-1])}", _right_key(model, path, detail["loc"])
+        case "literal_error" | "union_tag_invalid":
+            allowed = re.findall(r"'([^']*)'", str(context.get("expected", context.get("expected_tags"))))
+            word = context.get("tag", value)
+            return f"{shown(word)} is not allowed", did_you_mean(word, allowed, "allowed")
+        case "union_tag_not_found":
+            return f"{context['discriminator'].strip(chr(39))} is missing", "add it"
+        case "string_pattern_mismatch":
+            return f"{shown(value)} is not a valid name", "use letters, digits, _ . and -, beginning with a letter"
+    # Pydantic's own sentence, such as "Input should be a valid number", in the words of YAML.
+    sentence = re.sub(
+        r" or (instance of|object to) .*|, unable to .*| after validation|(?<=\ba) valid", "", detail["msg"]
+    )
+    for word, plain in (("a integer", "a whole number"), ("dictionary", "mapping"), ("tuple", "list")):
+        sentence = sentence.replace(word, plain)
+    return f"{shown(value)} {sentence.partition(' ')[2]}", None
+
+
+def _right_key(model: Any, path: KeyPath, loc: KeyPath) -> str:
+    """Where a key that is known elsewhere belongs; else the nearest that is known here."""
+    key, above = str(path[-1]), [_INDEX if isinstance(part, int) else part for part in path[:-1]]
+    known, homes = dict[str, None](), dict[str, None]()
+    for place, each in models_within(model):
+        if len(place) == len(above) and all(part in (one, _NAME) for part, one in zip(place, above, strict=True)):
+            tags = [
+                typing.get_args(each.model_fields[name].annotation) for name in _TAGGED if name in each.model_fields
+            ]
+            if all(words[0] in loc for words in tags):  # else it is another member of a union
+                known |= dict.fromkeys(each.model_fields)
+        # Distributions are allowed anywhere: the homes of their parameters would not help.
+        elif key in each.model_fields and "distribution" not in each.model_fields:
+            text = ".".join(place).replace(f".{_INDEX}", _INDEX)
+            homes[f"under {text}" if text else "at the top level"] = None
+    return f"it belongs {' or '.join(homes)}" if homes else did_you_mean(key, known)

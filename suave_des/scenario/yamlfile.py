@@ -1,4 +1,4 @@
-"""YAML files as plain data with the line of every key, and their validation by pydantic with errors that name it.
+"""YAML files as plain data with the line of every key, merged over the files that they build on.
 
 Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and
 `2023-02-04` are text. No constructor of PyYAML is involved, so no tag can build an object.
@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import re
-import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import yaml
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 from yaml.reader import ReaderError
 
-from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
+from suave_des.errors import InputError, KeyPath, place_text, shown
 from suave_des.files import decode, read_bytes
+from suave_des.resources import find, shipped_folder
 
 SIZE_LIMIT_BYTES = 1_000_000
 _VALUES_LIMIT = 100_000
@@ -253,134 +251,153 @@ class _Reading:
         return InputError(problem, file=self._path, place=place_text(_line(node), key_path), remedy=remedy)
 
 
-_TAGGED = ("kind", "distribution", "type")
-"""Keys whose word tells the members of a union apart."""
-_NAME, _INDEX = "NAME", "[]"
-"""Stand for any name, and any number of an entry, in the key path of a model."""
-AnyModel = TypeVar("AnyModel", bound=BaseModel)
+# A scenario's files, merged over those that they build on.
+
+_KIND_KEYS = ("kind", "distribution")
+"""Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""
+_REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
+"""Mappings of freely named entries, in which a null removes the base's entry."""
+_PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
+"""Parts of a scenario that may be the name of a file, or differ from one that they name as their base."""
+_ONTOLOGY_LIMIT_BYTES = 100_000_000
+_CHAIN_LIMIT = 20
+_DEFAULT_VEHICLE = "bluerov2"
 
 
-def validated(layer: Layer, model: type[AnyModel]) -> AnyModel:
-    """Return the data of a layer as a model.
+class InputFiles:
+    """Reads files and keeps the hash of each, for a manifest.
+
+    Attributes:
+        inputs: SHA-256 of each file read, as "shipped/KIND/NAME" if it is shipped, else its path as given.
+    """
+
+    def __init__(self) -> None:
+        self.inputs: dict[str, str] = {}
+
+    def yaml(self, path: Path, depth: int = 0) -> YamlDocument:
+        """Read a YAML file."""
+        document = read_yaml(path, depth)
+        self.note(path, document.sha256)
+        return document
+
+    def ontology(self, path: Path) -> None:
+        """Hash an ontology or a file of rules, which is parsed elsewhere."""
+        self.note(path, sha256_of(path, _ONTOLOGY_LIMIT_BYTES))
+
+    def note(self, path: Path, sha256: str) -> None:
+        """Store the hash of a file that was read."""
+        self.inputs[shown_name(path)] = sha256
+
+
+def sha256_of(path: Path, limit: int) -> str:
+    """SHA-256 of a file; raises as read_bytes does."""
+    return hashlib.sha256(read_bytes(path, limit)).hexdigest()
+
+
+def shown_name(path: Path) -> str:
+    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as given."""
+    for kind in ("ontology", "scenarios"):
+        if path.is_relative_to(folder := shipped_folder(kind)):
+            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
+    return path.as_posix()
+
+
+def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
+    """Find a file that a layer names: beside the file in which its name is given, or shipped.
 
     Raises:
-        InputError: they are not valid, see input_error.
+        InputError: there is none, with the line that names it.
     """
+    if isinstance(name, int | float) and not isinstance(name, bool):
+        name = f"{name:g}"  # revisions 2023 and 1.5 need no quotes
+    if not isinstance(name, str) or not name:
+        raise layer.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
     try:
-        return model.model_validate(layer.data)
-    except ValidationError as error:
-        raise input_error(error, layer, model) from None
+        return find(name, kind, beside=layer.place(key_path).file.parent)
+    except InputError as error:
+        raise layer.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
 
 
-def input_error(error: ValidationError, layer: Layer, model: Any) -> InputError:
-    """Return the first problem, of the user's own file before its base, as one error that counts the others.
-
-    Args:
-        error: what pydantic raised for layer.data.
-        layer: the data with their places.
-        model: the model, or other type, that was validated.
-    """
-
-    def order(found: tuple[KeyPath, ErrorDetails]) -> tuple[int, int, int]:
-        # A misspelt key is also a missing one, and a list with a wrong entry too short: report these last.
-        place = layer.place(found[0])
-        return {"missing": 1, "too_short": 2}.get(found[1]["type"], 0), place.depth, place.line
-
-    found = [(_key_path(each, layer), each) for each in error.errors(include_url=False)]
-    path, first = min(found, key=order)
-    problem, remedy = _texts(first, path, model)
-    more = f"and {len(found) - 1} more" if len(found) > 1 else None
-    return layer.error(problem, path, "; ".join(filter(None, (remedy, more))) or None)
-
-
-def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any) -> tuple[KeyPath, str, str | None]:
-    """Return the first problem of data that are in no file: its key path, what is wrong, and what would be right.
+def scenario_layer(files: InputFiles, path: Path, over: Layer | None = None) -> Layer:
+    """Merge a scenario file over its bases, with its revision and its vehicle written out in full.
 
     Args:
-        error: what pydantic raised for the data.
-        data: what was validated.
-        model: the model, or other type, that they were to be.
+        files: reader.
+        path: of the scenario.
+        over: what differs from it; None: nothing.
+
+    Returns:
+        The layer. Its name is its file's if it gives none: a base's would make its results look like the base's.
+
+    Raises:
+        InputError: a file that cannot be read, or is its own base; a revision that is not known.
     """
-    first = min(error.errors(include_url=False), key=lambda detail: detail["type"] == "missing")
-    path = (*_key_path(first, Layer(data, {})), *first.get("ctx", {}).get("keys", "").split()[:1])
-    return path, *_texts(first, path, model)
+    own: Layer = files.yaml(path)
+    if "campaign" in own.data and "scenario" in own.data:
+        remedy = f"suave-des campaign {path} --out DIR runs it; its scenario is {own.data['scenario']}"
+        raise own.error("this is a campaign file, not a scenario", ("campaign",), remedy)
+    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
+    name = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
+    layer = _over_its_base(files, _with_named_parts(own), "scenarios", (path,))
+    layer = layer if over is None else merge(layer, _with_named_parts(over))
+    layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
+    for part, folder in _PARTS.items():
+        if "base" in (layer.data.get(part) or ()):
+            layer = layer.replaced(part, _over_its_base(files, layer.below(part), folder, (layer.place((part,)).file,)))
+    return Layer({**layer.data, "name": name}, layer.places)
 
 
-def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
-    """Yield every model that a type holds, with its key path; members of a union have the same."""
-    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
-        yield path, wanted
-        for name, field in wanted.model_fields.items():
-            yield from models_within(field.annotation, (*path, name))
-        return
-    entry = {dict: (_NAME,), tuple: (_INDEX,)}.get(typing.get_origin(wanted), ())
-    for argument in typing.get_args(wanted):
-        yield from models_within(argument, (*path, *entry))
+def _with_named_parts(layer: Layer) -> Layer:
+    """The layer, with the name of a part as the base of one that does not differ from it."""
+    data, places = dict(layer.data), dict(layer.places)
+    for part in _PARTS:
+        if isinstance(data.get(part), str | int | float):
+            data[part] = {"base": data[part]}
+            places[(part, "base")] = layer.place((part,))
+    return Layer(data, places)
 
 
-def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
-    """The key path in the file: pydantic's location without what is no key, such as the tags of union members.
+def _over_its_base(files: InputFiles, layer: Layer, kind: str, chain: tuple[Path, ...]) -> Layer:
+    """Merge a layer over the file that it names as its base, if any; `chain` is how that was reached."""
+    if "base" not in layer.data:
+        return layer
+    path = find_named(layer, ("base",), layer.data["base"], kind)
+    chain = (*chain, path)
+    if len({each.resolve() for each in chain}) < len(chain) or len(chain) > _CHAIN_LIMIT:
+        names = " -> ".join(each.name for each in chain)
+        raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
+    below: Layer = files.yaml(path, len(chain) - 1)
+    below = _over_its_base(files, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
+    return merge(below, layer.without("base"))
 
-    Of keys that do not fit together, and have a place each, it is the one in the user's own file.
-    """
-    path: list[str | int] = []
-    here: Any = layer.data
-    for key in detail["loc"]:
-        if isinstance(here, dict) and key in here:
-            here = here[key]
-        elif isinstance(here, list) and isinstance(key, int):
-            here = here[key] if key < len(here) else None
+
+def merge(base: Layer, over: Layer) -> Layer:
+    """Merge one layer over another: mappings are merged, all other values replaced."""
+    replaced: set[KeyPath] = set()
+    data = _merge(base.data, over.data, (), replaced)
+    kept = {
+        path: place
+        for path, place in base.places.items()
+        if not any(path[:length] in replaced for length in range(1, len(path) + 1))
+    }
+    return Layer(data, {**kept, **over.places})
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in over.items():
+        below, known = (*path, key), base.get(key)
+        is_whole = not path and key in _PARTS and "base" in (value or ())
+        if isinstance(known, dict) and isinstance(value, dict) and _same_kind(known, value) and not is_whole:
+            merged[key] = _merge(known, value, below, replaced)
+            continue
+        replaced.add(below)
+        if value is None and key in base and path in _REMOVABLE_IN:
+            del merged[key]
         else:
-            is_inside_text = isinstance(here, str) and key != "number"  # of a thruster event, and not a tag
-            if not is_inside_text and not (detail["type"] == "missing" and key == detail["loc"][-1]):
-                continue
-        path.append(key)
-    context = detail.get("ctx", {})
-    given = context.get("keys", context.get("discriminator", "").strip("'")).split()
-    candidates: list[KeyPath] = [(*path, key) for key in given if layer.has((*path, key))]
-    return min(candidates, key=lambda candidate: layer.place(candidate).depth, default=tuple(path))
+            merged[key] = value
+    return merged
 
 
-def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:
-    """Return the problem and the remedy."""
-    value, context = detail["input"], detail.get("ctx", {})
-    match detail["type"]:
-        case "wrong":
-            return context["problem"], context["remedy"]
-        case "missing":
-            return "is missing", "add it"
-        case "extra_forbidden":
-            return f"unknown key {shown(path[-1])}", _right_key(model, path, detail["loc"])
-        case "literal_error" | "union_tag_invalid":
-            allowed = re.findall(r"'([^']*)'", str(context.get("expected", context.get("expected_tags"))))
-            word = context.get("tag", value)
-            return f"{shown(word)} is not allowed", did_you_mean(word, allowed, "allowed")
-        case "union_tag_not_found":
-            return f"{context['discriminator'].strip(chr(39))} is missing", "add it"
-        case "string_pattern_mismatch":
-            return f"{shown(value)} is not a valid name", "use letters, digits, _ . and -, beginning with a letter"
-    # Pydantic's own sentence, such as "Input should be a valid number", in the words of YAML.
-    sentence = re.sub(
-        r" or (instance of|object to) .*|, unable to .*| after validation|(?<=\ba) valid", "", detail["msg"]
-    )
-    for word, plain in (("a integer", "a whole number"), ("dictionary", "mapping"), ("tuple", "list")):
-        sentence = sentence.replace(word, plain)
-    return f"{shown(value)} {sentence.partition(' ')[2]}", None
-
-
-def _right_key(model: Any, path: KeyPath, loc: KeyPath) -> str:
-    """Where a key that is known elsewhere belongs; else the nearest that is known here."""
-    key, above = str(path[-1]), [_INDEX if isinstance(part, int) else part for part in path[:-1]]
-    known, homes = dict[str, None](), dict[str, None]()
-    for place, each in models_within(model):
-        if len(place) == len(above) and all(part in (one, _NAME) for part, one in zip(place, above, strict=True)):
-            tags = [
-                typing.get_args(each.model_fields[name].annotation) for name in _TAGGED if name in each.model_fields
-            ]
-            if all(words[0] in loc for words in tags):  # else it is another member of a union
-                known |= dict.fromkeys(each.model_fields)
-        # Distributions are allowed anywhere: the homes of their parameters would not help.
-        elif key in each.model_fields and "distribution" not in each.model_fields:
-            text = ".".join(place).replace(f".{_INDEX}", _INDEX)
-            homes[f"under {text}" if text else "at the top level"] = None
-    return f"it belongs {' or '.join(homes)}" if homes else did_you_mean(key, known)
+def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
+    return all(over[key] == base.get(key, over[key]) for key in _KIND_KEYS if key in over)

@@ -10,8 +10,8 @@ from jsonschema import Draft202012Validator
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.schema import field_docs, scenario_schema
-from suave_des.scenario.yamlfile import models_within, read_yaml
+from suave_des.scenario.schema import field_docs, models_within, scenario_schema
+from suave_des.scenario.yamlfile import read_yaml
 
 DOCS = Path(__file__).parents[2] / "docs"
 HEAD = "base: seams2023.yaml\n"

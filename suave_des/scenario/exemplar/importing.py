@@ -38,7 +38,8 @@ from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import modes_of
 from suave_des.scenario.quantities import LONGEST_S, Real, wrong
-from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, read_yaml, validated
+from suave_des.scenario.schema import validated
+from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, read_yaml
 
 PARAMETERS = "ros__parameters"
 EXTENDED = "suave_extended"
