@@ -169,11 +169,10 @@ class TestFile:
 
     def tests(self, knowledge: KnowledgeBase) -> Iterator[RuleTest]:
         """Look up all names of the tests in a knowledge base; one that it does not have is a test's problem."""
-        path = self.document.path
         for number, content in enumerate(self.content.tests):
-            test = RuleTest(content.name.strip(), path, self.document.line(("tests", number)))
+            test = RuleTest(content.name.strip(), self.document.path, self.document.place(("tests", number)).line)
             try:
-                yield replace(test, **_looked_up(content, knowledge, path.parent))
+                yield replace(test, **_looked_up(content, knowledge, self.document.path.parent))
             except InputError as error:
                 yield replace(test, problem=str(error))
 

@@ -71,7 +71,7 @@ class LoadedScenario:
         if (manager, name) in self.manager_files:
             return self.manager_files[manager, name]
         places = [Path(name), self.path.parent / name]
-        if self.layer.has(("managers", manager)):
+        if ("managers", manager) in self.layer.places:
             places.reverse()
         for place in places:
             if place.is_file():

@@ -113,7 +113,7 @@ class ModeTable:
                 (("managers", "bt", "search_modes", index), GENERATE_SEARCH_PATH, mode)
                 for index, mode in enumerate(scenario.managers.bt.search_modes)
                 # The default names the shipped modes, which another modes file need not have: it matters only to bt.
-                if layer.has(("managers", "bt", "search_modes", index))
+                if ("managers", "bt", "search_modes", index) in layer.places
             ),
         ]
         for key_path, function, mode in used:

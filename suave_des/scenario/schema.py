@@ -185,7 +185,7 @@ def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
         path.append(key)
     context = detail.get("ctx", {})
     given = context.get("keys", context.get("discriminator", "").strip("'")).split()
-    candidates: list[KeyPath] = [(*path, key) for key in given if layer.has((*path, key))]
+    candidates: list[KeyPath] = [(*path, key) for key in given if (*path, key) in layer.places]
     return min(candidates, key=lambda candidate: layer.place(candidate).depth, default=tuple(path))
 
 

@@ -43,7 +43,7 @@ class Layer:
 
     Attributes:
         data: the content.
-        places: file and line of each key path.
+        places: file and line of each key path that is in a file, and not a default.
         above: key path of the data within the file, for messages.
     """
 
@@ -56,14 +56,6 @@ class Layer:
         while key_path not in self.places:
             key_path = key_path[:-1]
         return self.places[key_path]
-
-    def line(self, key_path: KeyPath) -> int:
-        """Line of a key path, or of the nearest part that holds it."""
-        return self.place(key_path).line
-
-    def has(self, key_path: KeyPath) -> bool:
-        """Whether a key path is in a file, and not a default."""
-        return key_path in self.places
 
     def key_path(self, place: str) -> KeyPath:
         """Split a place such as "sweep.grid.start.x_m" into existing keys, which may contain dots."""

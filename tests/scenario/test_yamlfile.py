@@ -48,14 +48,14 @@ def test_scalars_follow_the_core_schema(write):
 
 def test_each_key_and_item_has_its_line(write):
     document = read_yaml(write("a.yaml", "# comment\na:\n  b: 1\n  c:\n    - x\n    - {d: 2}\n"))
-    assert document.line(("a",)) == 2
-    assert document.line(("a", "b")) == 3
-    assert document.line(("a", "c", 1)) == 6
-    assert document.line(("a", "c", 1, "d")) == 6
+    assert document.place(("a",)).line == 2
+    assert document.place(("a", "b")).line == 3
+    assert document.place(("a", "c", 1)).line == 6
+    assert document.place(("a", "c", 1, "d")).line == 6
 
 
 def test_a_path_that_is_not_there_has_the_line_of_what_would_hold_it(write):
-    assert read_yaml(write("a.yaml", "x: 1\na:\n  b: 1\n")).line(("a", "z", 3)) == 2
+    assert read_yaml(write("a.yaml", "x: 1\na:\n  b: 1\n")).place(("a", "z", 3)).line == 2
 
 
 def test_an_alias_gives_the_same_data_again(write):

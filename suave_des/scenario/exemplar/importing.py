@@ -186,12 +186,12 @@ class Parameter:
     @property
     def place(self) -> str:
         """File, line, node and parameter, for the user."""
-        return f"{self.document.path}: line {self.document.line(self.key_path)}, {self.keys}"
+        return f"{self.document.path}: line {self.document.place(self.key_path).line}, {self.keys}"
 
     @property
     def source(self) -> str:
         """File and line, for a comment."""
-        return f"{self.document.path.name}, line {self.document.line(self.key_path)}"
+        return f"{self.document.path.name}, line {self.document.place(self.key_path).line}"
 
 
 def _parameters(documents: Sequence[YamlDocument], notes: list[str]) -> tuple[list[Parameter], list[YamlDocument]]:
@@ -211,7 +211,7 @@ def _parameters(documents: Sequence[YamlDocument], notes: list[str]) -> tuple[li
             given = content[PARAMETERS] or {}
             found = [Parameter(document, entry, name, given[name], node_of(entry, given, name)) for name in given]
             parameters += [_events(each, notes) for each in found if each.node]
-            place = f"{document.path}: line {document.line((entry,))}, {entry.removeprefix('/')}"
+            place = f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
             if beside := [other for other in content if other != PARAMETERS]:
                 notes.append(f"{place}: not taken over: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone")
             if any(each.node for each in found) or (not found and node_of(entry, given, "")):
@@ -438,7 +438,7 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
     """The experiments, each by its own launch and mission; notes about what is not simulated."""
     parameter = runner.parameters["experiments"]
     for index, each in enumerate(runner.settings.experiments):
-        line, launch = parameter.document.line((*parameter.key_path, index)), each.experiment_launch
+        line, launch = parameter.document.place((*parameter.key_path, index)).line, each.experiment_launch
         place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
         arguments = dict(re.findall(r"(\w+):=(\S*)", launch))
         for node, names in ((EXPERIMENT, _json_object(parameter.value[index])), (LAUNCH, arguments)):
