@@ -78,6 +78,16 @@ class MissionError(SuaveDesError):
         return f"manager {self.manager}, run {self.run}, mission time {self.time_s:.2f} s: {self.cause}"
 
 
+class MissionTimeOut(BaseException):
+    """A mission took too long; not an Exception, so that a manager that catches those does not catch this.
+
+    Attributes:
+        time_s: mission time that was reached; None where that is not known.
+    """
+
+    time_s: float | None = None
+
+
 KeyPath = tuple[str | int, ...]
 
 

@@ -16,7 +16,7 @@ from itertools import chain
 from math import inf, isnan
 from pathlib import Path
 from sysconfig import get_path
-from traceback import extract_tb, walk_tb
+from traceback import FrameSummary, extract_tb, walk_tb
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 from weakref import WeakSet
@@ -412,12 +412,27 @@ def cause_of(error: BaseException, function: str = "") -> str:
     """
     name = function or _function_that_raised(error)
     text = re.sub(r" at 0x[0-9a-f]+", "", f"{f'function {name}: ' if name else ''}{type(error).__name__}: {error}")
+    frames = _users_frames(error)
+    return f"{text} ({_line(frames[-1])})" if frames else text
+
+
+def place_of(error: BaseException) -> str:
+    """Say which hook of a user's class an exception came from, and from which line: "adapt (mine.py, line 7)"."""
+    frames = _users_frames(error)
+    return f"{frames[0].name} ({_line(frames[-1])})" if frames else ""
+
+
+def _users_frames(error: BaseException) -> list[FrameSummary]:
+    """Return what ran outside the project when an exception was raised, outermost first; libraries if nothing else."""
+    while error.__cause__ is not None and repr(error.__cause__) == repr(error):
+        error = error.__cause__  # SimPy raises a copy of what a process has raised
     frames = [each for each in extract_tb(error.__traceback__) if not Path(each.filename).is_relative_to(_OWN)]
-    written = [each for each in frames if not _LIBRARY.match(each.filename)]
-    if not (frames := written or frames):
-        return text
-    file = Path(frames[-1].filename)
-    return f"{text} ({f'{file.name}, ' if file.is_file() else ''}line {frames[-1].lineno})"
+    return [each for each in frames if not _LIBRARY.match(each.filename)] or frames
+
+
+def _line(frame: FrameSummary) -> str:
+    file = Path(frame.filename)
+    return f"{f'{file.name}, ' if file.is_file() else ''}line {frame.lineno}"
 
 
 def _function_that_raised(error: BaseException | None) -> str:

@@ -18,7 +18,7 @@ from suave_des.campaign.inputs import (
     read_campaign,
     trained_on,
 )
-from suave_des.campaign.missions import Campaign, Executor, MissionRunner, Remark, WorkerError
+from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
 from suave_des.campaign.progress import OnProgress, Progress, ProgressTracker
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignSpec, read_campaign_file
@@ -314,7 +314,8 @@ def _work(
     spec, variation = campaign.spec, campaign.variation
     tracker = ProgressTracker(variation.sweep.points, spec.managers, spec.runs)
     with store.reading():
-        remarks = {(manager, text): int(count) for manager, text, count in store.about("remarks", default=[])}
+        kept = store.about("remarks", default=[])
+        remarks = {(manager, text): int(count) for manager, text, count in kept if text != GIVEN_UP}
     stopped: KeyboardInterrupt | SuaveDesError | None = None
     try:
         with store.reading():

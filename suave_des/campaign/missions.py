@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import signal
 import threading
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,13 +15,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, check_range
 from suave_des.campaign.variation import Variation, cell_of, short_mission
-from suave_des.errors import MissionError, SuaveDesError
+from suave_des.errors import MissionError, MissionTimeOut, SuaveDesError
 from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
 from suave_des.records.knowledge import mission_line
 from suave_des.records.metrics import Row, further_of, row_of
 from suave_des.records.store import MissionFailure, MissionKey
-from suave_des.registry import is_built_in, is_installed
+from suave_des.registry import is_built_in, is_installed, place_of
 from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ NOT_REPEATABLE = (
     " to the next, or has its own source of randomness, so results depend on the number of workers."
     " To learn, use `suave-des train`; for random numbers, system.stream"
 )
+GIVEN_UP = "its first 3 missions here took too long, and none was finished, so the others were left out"
+_IN_VAIN = 3
 _REPEATED_AFTER = {2, *(4**power for power in range(1, 11))}
 """Missions of a manager in a process after which its first is run again, as its class may keep state"""
 _REPEAT_S = 1.0
@@ -106,14 +109,17 @@ class Campaign:
         managers = [name for name in self.spec.managers if not is_installed(name)]
         return tuple(dict.fromkeys([*managers, *(node for node in nodes if ":" in node)]))
 
-    def failed(self, key: MissionKey, cause: str) -> tuple[MissionKey, MissionFailure]:
-        """Return the outcome of a mission whose process was ended."""
+    def failed(self, key: MissionKey, cause: str, time_s: float | None = None) -> tuple[MissionKey, MissionFailure]:
+        """Return the outcome of a mission that was ended, at a mission time, or whose process was."""
         manager = self.spec.managers[key.manager]
-        return key, MissionFailure(manager, key.run, None, cause, lasting=False, point=key.point)
+        return key, MissionFailure(manager, key.run, time_s, cause, lasting=False, point=key.point)
 
-    def timed_out(self, key: MissionKey) -> tuple[MissionKey, MissionFailure]:
-        """Return the outcome of a mission that took too long."""
-        return self.failed(key, f"not done after {self.spec.time_out_s:g} s (time-out)")
+    def timed_out(
+        self, key: MissionKey, time_s: float | None = None, place: str = ""
+    ) -> tuple[MissionKey, MissionFailure]:
+        """Return the outcome of a mission that took too long, at a place in its manager's code."""
+        cause = f"not done after {self.spec.time_out_s:g} s (time-out){place and f', in {place}'}"
+        return self.failed(key, cause, time_s)
 
 
 Executor = Callable[[Campaign, Iterable[MissionKey], int], Iterator[list[Finished]]]
@@ -135,6 +141,7 @@ class MissionRunner:
         self._point, self._simulators = -1, dict[int | None, "Simulator"]()
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
         self._number: dict[int, int] = {}
+        self._too_long, self._in_time = Counter[int](), set[int]()
 
     def run(self, manager: str, run: int, point: int = 0) -> tuple[LoadedScenario, MissionResult]:
         """Run a mission again, with its record; return its scenario and result.
@@ -160,13 +167,25 @@ class MissionRunner:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
         """
         for key in missions:
+            if self._is_given_up(key.manager):
+                continue
             manager = self.campaign.spec.managers[key.manager]
             outcome, remarks = self._outcome(key)
             yield key, outcome
+            if not (isinstance(outcome, MissionFailure) and not outcome.lasting):
+                self._in_time.add(key.manager)
+            else:
+                self._too_long[key.manager] += 1
+                if self._is_given_up(key.manager):
+                    yield key, Remark(manager, GIVEN_UP, 0)
             if not is_built_in(manager) and not isinstance(outcome, MissionFailure) and self._differs(key, outcome):
                 yield key, Remark(manager, NOT_REPEATABLE)
             for remark in remarks:
                 yield key, remark
+
+    def _is_given_up(self, manager: int) -> bool:
+        """Whether so many missions of a manager took too long, and none did not, that no others are begun."""
+        return manager not in self._in_time and self._too_long[manager] >= _IN_VAIN
 
     def _differs(self, key: MissionKey, outcome: Row | MissionFailure) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run again."""
@@ -186,8 +205,8 @@ class MissionRunner:
                 result = simulator.run(manager, key.run, spec.seed, record=spec.record_knowledge)
         except MissionError as error:
             return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point), []
-        except MissionTimeOut:
-            return self.campaign.timed_out(key)[1], []
+        except MissionTimeOut as error:
+            return self.campaign.timed_out(key, error.time_s, place_of(error))[1], []
         values, member = variation.sweep.values(key.point), variation.member(key.run)
         drawn = (result.drawn[path] for path in variation.drawn)
         members = () if member is None else (member,)
@@ -213,10 +232,6 @@ class MissionRunner:
 
 
 # Time limits, so that a manager that never returns costs its own mission only.
-
-
-class MissionTimeOut(BaseException):
-    """A mission took too long; not an Exception, so that a manager that catches those does not catch this."""
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
 from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
 from suave_des.draws import Draws
-from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
+from suave_des.errors import InputError, MissionError, MissionTimeOut, SuaveDesError, did_you_mean, shown
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.destinations import GenerateRechargePath, Surface
 from suave_des.managed.detection import PipelineDetector
@@ -458,6 +458,9 @@ class Mission:
         try:
             run(*arguments)
         except SuaveDesError:
+            raise
+        except MissionTimeOut as error:
+            error.time_s = self.now_s
             raise
         except RAISED as error:  # in a user-defined function, or in a process that the manager started by itself
             raise self._error_of(error) from error

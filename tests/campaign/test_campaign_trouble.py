@@ -14,7 +14,7 @@ import pytest
 
 from suave_des.campaign import workers
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.missions import MissionRunner, WorkerError
+from suave_des.campaign.missions import GIVEN_UP, MissionRunner, WorkerError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD
 
@@ -119,8 +119,38 @@ def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: 
     result = run_campaign("seams2023", [f"{AWKWARD}:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0)
     assert 0 < len(result.failures) < 12
     for failure in result.failures:
-        assert str(failure) == (f"manager {AWKWARD}:HangsInSome, run {failure.run}: not done after 2 s (time-out)")
+        told = (
+            f"{AWKWARD}:HangsInSome, run {failure.run}, mission time 50.00 s: not done after 2 s (time-out), in adapt"
+        )
+        assert re.fullmatch(f"manager {re.escape(told)} \\(awkward_managers.py, line \\d+\\)", str(failure))
     assert result.done == 24 - len(result.failures)
+
+
+LOOPS = """
+from suave_des.managing.simple import NoManager
+class Loops(NoManager):
+    def diagnostic(self, diagnostic):
+        while True:
+            pass
+"""
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_manager_whose_missions_all_take_too_long_is_given_up(
+    workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "loops.py").write_text(LOOPS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    managers = ["loops:Loops", "none"]
+    result = run_campaign("seams2023", managers, 200, 1, workers, tmp_path / "out", time_out_s=0.5)
+    assert result.done == 200 and 3 <= len(result.failures) <= 3 * workers
+    assert result.remarks == (f"manager loops:Loops: {GIVEN_UP}",)
+    for failure in result.failures:
+        assert re.fullmatch(r"not done after 0.5 s \(time-out\), in diagnostic \(loops.py, line [56]\)", failure.cause)
+        assert 0.0 < failure.time_s < 2.0
+    missions = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]
+    assert missions["left_out"] == 200 - len(result.failures)
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -141,12 +141,14 @@ def test_the_hook_that_watches_workers_would_tell(
 def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(small_cluster: Cluster) -> None:
     causes = {
         "DiesInSome": "the cluster's worker died while running it, 1 times (killed, out of memory, or stuck?)",
-        "HangsInSome": "not done after 3 s (time-out)",
+        "HangsInSome": "not done after 3 s (time-out), in adapt (awkward_managers.py",
         "RaisesInHalf": "ValueError: I do not know what to do (awkward_managers.py, line 32)",
     }
     managers = [f"{AWKWARD}:{name}" for name in causes]
     result = run_campaign("seams2023", managers, 8, 1, scheduler=small_cluster.address, time_out_s=3.0)
-    assert {failure.manager.partition(":")[2]: failure.cause for failure in result.failures} == causes
+    found = {failure.manager.partition(":")[2]: failure.cause for failure in result.failures}
+    found["HangsInSome"] = found["HangsInSome"].rpartition(", line ")[0]  # whichever line of its loop
+    assert found == causes
     assert len(result.rows) + len(result.failures) == 24
     idle = {row[2]: row[3:] for row in run_campaign("seams2023", ["none"], 8, 1).rows}
     assert all(row[3:] == idle[row[2]] for row in result.rows)

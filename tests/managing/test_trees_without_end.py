@@ -54,7 +54,7 @@ def test_a_tick_that_does_not_end_ends_its_mission_only(tmp_path: Path) -> None:
     said = " ".join(ended.stderr.split())
     for words in (
         "a tick of the tree does not end: 100,000 behaviours so far, the last one 'looks around'",
-        "manager trees:Stuck, run 1: not done after 2 s (time-out)",
+        "not done after 2 s (time-out), in update (trees.py, line ",
         "RecursionError",
         "3 of 4 missions failed; the others are kept",
     ):
