@@ -15,7 +15,7 @@ if _TYPE_CHECKING:
     from suave_des.scenario.loader import load_scenario, with_values
     from suave_des.simulation.mission import Mission
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = [
     "InputError",

@@ -58,19 +58,56 @@ def test_a_small_repetition_gives_the_committed_figures_of_the_first_runs(study,
     assert again.to_numpy() == pytest.approx(before.to_numpy(), abs=1e-3)
 
 
-def test_a_small_repetition_gives_the_committed_predictions_of_the_first_runs(study):
-    module = study("predictions_2025")
-    keys = ["experiment", "shift_s", "manager", "condition", "metric"]
-    again = module.simulate(module.studies.FIRST_RUNS, 1, [2])
-    again = again.groupby(keys[:3], sort=False, observed=True)["search_time_s"].mean()
-    before = committed("predictions_2025").set_index(keys)["first_mean"]
-    for (experiment, shift_s, manager), mean in again.items():
-        assert mean == pytest.approx(before[experiment, shift_s, manager, "2", "search_time_s"], abs=1e-3)
+def predictions() -> pandas.DataFrame:
+    return pandas.read_csv(FOLDER / "predictions" / "predictions.csv", dtype={"condition": str})
 
 
-@pytest.mark.parametrize("name", [*CASES, "predictions_2025"])
-def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, name):
-    module, rows = study(name), committed(name)
+@pytest.mark.parametrize("experiment", ["exp3", "extended_exp2"])
+def test_a_small_repetition_gives_the_committed_predictions_of_the_first_runs(study, experiment):
+    module = study("predict")
+    missions = module.simulate(experiment, module.studies.FIRST_RUNS, 1)
+    again = missions.groupby(["manager", "condition"], observed=True)["search_time_s"].mean()
+    before = predictions()
+    before = before[(before["experiment"] == experiment) & (before["metric"] == "search_time_s")]
+    before = before.set_index(["manager", "condition"])["first_mean"]
+    for (manager, condition), mean in again.items():
+        assert mean == pytest.approx(before[manager, str(condition)], abs=1e-3)
+
+
+def test_predictions_name_the_files_that_made_them(study):
+    module, rows = study("predict"), predictions()
+    made_of = rows.groupby("experiment", sort=False)["inputs"].unique()
+    assert {name: list(found) for name, found in made_of.items()} == {
+        name: [module.inputs(name)] for name in module.EXPERIMENTS
+    }
+
+
+def test_runs_that_are_as_predicted_score_in_full(study):
+    module, rows = study("predict"), predictions()
+    own = rows[rows["experiment"] == "exp3"]
+    chosen = own[(own["condition"] == "all") & ~own["manager"].str.contains(" - ")].set_index(["manager", "metric"])
+    real = [
+        {"manager": manager, **{metric: chosen.loc[(manager, metric), "mean"] + off for metric in module.METRICS[:2]}}
+        for manager in dict.fromkeys(chosen.index.get_level_values(0))
+        for off in (-0.1, 0.1) * 15
+    ]
+    said = module.score(own, pandas.DataFrame(real).assign(mean_reaction_time_s=float("nan")))
+    assert "8 of 8 predicted means lie in the real 95% intervals." in said
+    assert "8 of 8 real means lie in the predicted 90% intervals." in said
+    far = pandas.DataFrame([{**row, "search_time_s": row["search_time_s"] + 99} for row in real])
+    assert "4 of 8 predicted means" in module.score(own, far.assign(mean_reaction_time_s=float("nan")))
+
+
+def test_real_runs_are_scored_from_their_file(study):
+    module = study("predict")
+    said = module.scored("exp1", [ROOT / "scenarios" / "published" / "planta_exp1_runs.csv"])
+    assert re.search(r"\d+ of 11 predicted means lie in the real 95% intervals", said)
+    assert "Median search times of single conditions differ by: median " in said
+
+
+@pytest.mark.parametrize("name, script", [*((name, name) for name in CASES), ("predictions", "predict")])
+def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, name, script):
+    module, rows = study(script), committed(name)
     assert (FOLDER / name / "conclusion.md").read_text(encoding="utf-8").strip() == module.conclude(rows).strip()
     assert (FOLDER / name / f"{name}.png").stat().st_size < 500_000
     assert module.studies.figure_of(module.draw, rows, 3.0).axes
@@ -96,17 +133,25 @@ def test_an_ideal_vehicle_at_3_m_finds_the_pipeline_when_the_water_clears_and_an
 
 
 def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chance(study):
-    module = study("predictions_2025")
+    module = study("predict")
     values = {1: [10.0, 12.0], 2: [20.0, 22.0], 3: [30.0, 32.0]}
     rows = [
-        {"ensemble_member": member, "condition": 1, "run": run, "search_time_s": value, "pipeline_found": True}
+        {"manager": manager, "ensemble_member": member, "condition": 1, "run": run, "search_time_s": factor * value}
+        for manager, factor in (("a", 1.0), ("b", 2.0))
         for member, both in values.items()
         for run, value in enumerate(both, 1)
     ]
-    found = module.predict(pandas.DataFrame(rows), "search_time_s")
-    assert found["mean"] == 21.0
-    assert (found["high95"] - 21.0) ** 2 == pytest.approx(4.302653**2 * 100.0, rel=1e-5)
-    assert (found["high95_of_runs"] - 21.0) ** 2 == pytest.approx(4.302653**2 * (100.0 + 2.0 / 5.0), rel=1e-5)
+    missions = pandas.DataFrame(rows).assign(distance_inspected_m=float("nan"), mean_reaction_time_s=float("nan"))
+    found = {row["manager"]: row for row in module.predict(missions) if row["condition"] == "all"}
+    quantile = 2.919986  # of Student's t, 90%, 2 degrees of freedom
+    for name, mean, between, chance in (
+        ("a", 21.0, 100.0, 2.0),
+        ("b", 42.0, 400.0, 8.0),
+        ("a - b", -21.0, 100.0, 10.0),
+    ):
+        assert (found[name]["mean"], found[name]["std"]) == pytest.approx((mean, chance**0.5))
+        variance = between - chance / 2.0 + chance / 5.0  # means of two simulated runs, and of five real ones
+        assert (found[name]["high90"] - mean) ** 2 == pytest.approx(quantile**2 * variance, rel=1e-5)
 
 
 def public_modules() -> set[str]:
