@@ -69,8 +69,7 @@ class PyTreesManager(ManagingSubsystem):
                 raise RuntimeError(f"{problem}, the last one {behaviour.name!r}")
         if not self.system.recorded:
             return
-        parts = (each for each in self.root.iterate() if not each.children and each.status != Status.INVALID)
-        ticked = "; ".join(f"{each.name} {each.status.name.lower()}" for each in parts)
+        ticked = _ticked(self.root)
         if ticked != self._logged:
             self._logged = ticked
             self.system.log("tick", ticked)
@@ -79,6 +78,12 @@ class PyTreesManager(ManagingSubsystem):
         """Draw the tree as text."""
         text: str = py_trees.display.unicode_tree(self.root)
         return text.rstrip("\n")
+
+
+def _ticked(behaviour: Behaviour) -> str:
+    """Name a behaviour, its status, and in brackets those below it that were ticked."""
+    below = "; ".join(_ticked(each) for each in behaviour.children if each.status != Status.INVALID)
+    return f"{behaviour.name} {behaviour.status.name.lower()}{f' ({below})' if below else ''}"
 
 
 class _Leaf(Behaviour):

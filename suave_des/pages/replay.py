@@ -15,7 +15,7 @@ from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.decisions import Cycles, explain_cycles
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
-from suave_des.results.mission import details, mode_spans
+from suave_des.results.mission import adaptations, details, mode_spans
 from suave_des.scenario.models import Scenario
 from suave_des.world.pipeline import sample_points
 
@@ -34,6 +34,7 @@ class MissionOnPage:
         track: columns of trajectory.csv.
         modes: by function: times at which modes took effect, with their names.
         thrusters: times at which thrusters were reported, with their number from 1 and whether they work.
+        adaptations: times at which the mode of a function in use changed.
         events: time, source, event and detail.
         inspected: times at which points of the way along the pipeline were reached, with the point's number and the
             distance until then.
@@ -47,6 +48,7 @@ class MissionOnPage:
     track: Mapping[str, Sequence[Any]]
     modes: Mapping[str, Sequence[tuple[float, str]]]
     thrusters: Sequence[tuple[float, int, bool]]
+    adaptations: Sequence[float]
     events: Sequence[tuple[float, str, str, str]]
     inspected: Sequence[tuple[float, int, float]]
     way: Sequence[tuple[float, float]]
@@ -101,6 +103,7 @@ def mission_on_page(mission: Recorded) -> MissionOnPage:
         track={str(name): _rounded(values.tolist()) for name, values in record.trajectory.items()},
         modes=modes,
         thrusters=thrusters,
+        adaptations=sorted({each.t_s for each in adaptations(record)}),
         events=[(round(t_s, 2), *words) for t_s, *words in events],
         inspected=_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
         way=[] if way is None else [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y, _ in way.points_m.tolist()],

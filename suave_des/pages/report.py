@@ -23,6 +23,7 @@ from suave_des.records.store import read_manifest
 from suave_des.results.compare import compare
 from suave_des.results.comparison import capital
 from suave_des.results.missions import Missions, grouped, read_missions
+from suave_des.results.style import looks
 from suave_des.tables import Table
 
 LIMIT_BYTES: Final = 5_000_000
@@ -63,6 +64,7 @@ class ChartColumns:
 
     Attributes:
         groups: names of the groups of missions, as the tables have them.
+        looks: number of the look of each group, the same as in figures.
         titles: of the metrics, by column.
         columns: group number, run, seed, and each metric and swept parameter; None where there is no value.
         swept: names of the swept parameters.
@@ -72,6 +74,7 @@ class ChartColumns:
     """
 
     groups: Sequence[str]
+    looks: Sequence[int]
     titles: Mapping[str, str]
     columns: Mapping[str, Sequence[Any]]
     swept: Sequence[str]
@@ -222,7 +225,7 @@ def chart_columns(missions: Missions) -> ChartColumns:
         columns[name] = _plain(frame[name])
     is_paired = has_runs and bool((frame["seed"] != "").all()) and len(groups) > 1
     names = [each.name for each in groups]
-    return ChartColumns(names, titles, columns, missions.swept, every, len(missions.frame), is_paired)
+    return ChartColumns(names, looks(names), titles, columns, missions.swept, every, len(missions.frame), is_paired)
 
 
 def _plain(column: pandas.Series) -> list[Any]:

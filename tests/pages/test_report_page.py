@@ -5,6 +5,7 @@ import pytest
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.pages.report import LIMIT_BYTES, report_page
+from suave_des.results.style import line, looks
 from tests.helpers.browser import DESKTOP, PHONE, chromium, opened
 
 pytest.importorskip("plotly")
@@ -74,11 +75,16 @@ def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
     assert page.text_content("#count") == "16 missions"
 
 
-def test_it_says_for_which_runs_it_has_ways_and_how_to_have_others(opened_report):
+def test_it_says_for_which_runs_it_has_ways(opened_report):
     for caption in ("where-title", "runs-title"):
-        told = opened_report.page.text_content(f"#{caption}")
-        assert "3 runs of each manager" in told
-        assert "--paths N" in told
+        assert "3 runs of each manager" in opened_report.page.text_content(f"#{caption}")
+
+
+def test_a_manager_has_the_colour_that_it_has_in_figures(opened_report):
+    for number, name in enumerate(("none", "bt"), start=1):
+        chip = f"#managers button:nth-child({number}) i"
+        shown = opened_report.page.evaluate(f"getComputedStyle(document.querySelector('{chip}')).backgroundColor")
+        assert shown == "rgb({}, {}, {})".format(*bytes.fromhex(line(*looks([name]))["color"][1:]))
 
 
 def test_managers_metrics_and_runs_can_be_chosen_and_all_of_them_again(opened_report):

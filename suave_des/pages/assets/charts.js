@@ -14,9 +14,11 @@ async function startPlotly() {
 const DASHES = ['solid', 'dash', 'dot', 'dashdot', 'longdash'];
 const SYMBOLS = ['circle', 'square', 'diamond', 'triangle-up', 'cross', 'x'];
 const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'] };
-const groupColour = (number) => colour(`--m${number % 6}`);
-const groupDash = (number) => DASHES[Math.floor(number / 6) % DASHES.length];
-const groupSymbol = (number) => SYMBOLS[Math.floor(number / 6) % SYMBOLS.length];
+/** The look of a manager is the one that it has in figures. */
+const { looks } = DATA.results.drawn;
+const groupColour = (number) => colour(`--m${looks[number] % 6}`);
+const groupDash = (number) => DASHES[looks[number] % DASHES.length];
+const groupSymbol = (number) => SYMBOLS[looks[number] % SYMBOLS.length];
 
 /** Names may contain what Plotly would take for markup. */
 const plain = (text) => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;').replace(/\$/g, '&#36;');
@@ -28,7 +30,8 @@ function layoutOf(x, y, more = {}) {
   });
   const { xaxis, yaxis, ...rest } = more;
   return {
-    paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', margin: { l: 56, r: 16, t: 14, b: 46 },
+    paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)', margin: { l: 56, r: 16, t: 30, b: 46 },
+    modebar: { bgcolor: 'rgba(0,0,0,0)', color: colour('--faint'), activecolor: colour('--accent') },
     font: { family: colour('--font'), color: colour('--ink'), size: 12 }, showlegend: false, hovermode: 'closest',
     hoverlabel: { bgcolor: colour('--card'), bordercolor: colour('--line'), font: { color: colour('--ink') }, namelength: -1 },
     xaxis: { ...axis(x), ...xaxis }, yaxis: { ...axis(y), ...yaxis }, ...rest,

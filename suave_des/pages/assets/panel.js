@@ -153,10 +153,30 @@ function makePanel(play) {
     const own = play.mission.events.filter(([, source]) => source === play.manager);
     const until = lastAt(own, moment.t, (each) => each[0]);
     once('analyze', `own${until}`, () => (own.length
-      ? own.slice(Math.max(0, until - 3), until + 1).map(([t, , name, detail]) => element('p', {}, `${t.toFixed(1)} s  ${name.replaceAll('_', ' ')}: ${detail}`))
+      ? own.slice(Math.max(0, until - (own[until]?.[2] === 'tick' ? 0 : 3)), until + 1).map(showOwn)
       : [element('p', { class: 'quiet' }, `${play.manager} keeps no knowledge that is recorded: it decides in its own code`)]));
     once('plan', 'own', () => [element('p', { class: 'quiet' }, 'see what it requests, below')]);
     once('knowledge', 'own', () => [element('p', { class: 'quiet' }, 'no knowledge base')]);
+  }
+
+  function showOwn([t, , name, detail]) {
+    const words = `${t.toFixed(1)} s  ${name.replaceAll('_', ' ')}`;
+    return name === 'tick' ? element('div', {}, element('p', { class: 'tick-time' }, words), ticked(detail)) : element('p', {}, `${words}: ${detail}`);
+  }
+
+  /** A tick as a tree: its parts are separated by semicolons, and have those below them in brackets. */
+  function ticked(text) {
+    const parts = [''];
+    let depth = 0;
+    for (const letter of text) {
+      depth += letter === '(' ? 1 : letter === ')' ? -1 : 0;
+      if (letter === ';' && depth === 0) parts.push('');
+      else parts[parts.length - 1] += letter;
+    }
+    return element('ul', { class: 'ticked' }, ...parts.map((part) => {
+      const [, head, below] = /^(.*?) \((.*)\)$/.exec(part.trim()) ?? [null, part.trim(), null];
+      return element('li', { class: / failure$/.test(head) ? 'failure' : '' }, head, below === null ? null : ticked(below));
+    }));
   }
 
   function showExecute(moment) {

@@ -61,9 +61,9 @@ function prepare(mission) {
     }
   }
   play.marks = [
-    ...play.requests.map((each) => ({ t: each.t, kind: 'adaptation', text: `${each.function} → ${each.mode}` })),
-    ...mission.thrusters.filter(([, , works]) => !works).map(([t, number]) => ({ t, kind: 'failure', text: `thruster ${number} failed` })),
-    ...(mission.seen ? [{ t: mission.seen[0], kind: 'seen', text: 'pipeline seen' }] : []),
+    ...mission.adaptations.map((t) => ({ t, kind: 'adaptation' })),
+    ...mission.thrusters.filter(([, , works]) => !works).map(([t]) => ({ t, kind: 'failure' })),
+    ...(mission.seen ? [{ t: mission.seen[0], kind: 'seen' }] : []),
   ];
   play.view = { ...PRESETS['3d'], target: null };
   return play;
@@ -158,9 +158,9 @@ function drawPane({ play, box, parts, panel }, t) {
   parts.mode.replaceChildren(element('i'), moment.mode || 'no mode yet');
   parts.mode.firstChild.style.color = seaColour(moment.mode);
   [...parts.lamps.children].forEach((lamp, n) => lamp.classList.toggle('dead', moment.thrusters[n] === false));
-  const { metrics, seen } = play.mission;
+  const { metrics } = play.mission;
   parts.state.textContent = moment.isOver ? 'mission is over'
-    : moment.isSeen ? `pipeline found after ${seen[0].toFixed(1)} s` : metrics.pipeline_found ? 'searching' : 'searching, until the time limit';
+    : moment.isSeen ? `pipeline found after ${foundAfter(metrics)}` : metrics.pipeline_found ? 'searching' : 'searching, until the time limit';
   Object.assign(box.dataset, { x: pose.x.toFixed(3), y: pose.y.toFixed(3), z: pose.z.toFixed(3) });
   panel.update(moment);
 }
@@ -175,6 +175,10 @@ byId('panes').dataset.count = String(panes.length);
 byId('panes').append(...panes.map((pane) => pane.box));
 describe();
 
+function foundAfter(metrics) {
+  return `${Number(metrics.search_time_s).toFixed(1)} s`;
+}
+
 function describe() {
   const { scenario } = DATA;
   const metrics = plays.map((play) => play.mission.metrics);
@@ -183,7 +187,7 @@ function describe() {
   byId('title').textContent = plays.map((play) => play.manager).join(' and ');
   const sameDraws = plays.length > 1 && shared.length === 2 ? ', the same random numbers' : '';
   const results = metrics.map((each) => `${plays.length > 1 ? `${each.manager}: ` : ''}${each.pipeline_found
-    ? `found after ${Number(each.search_time_s).toFixed(0)} s` : 'not found'}, ${Number(each.distance_inspected_m).toFixed(1)} m inspected`);
+    ? `found after ${foundAfter(each)}` : 'not found'}, ${Number(each.distance_inspected_m).toFixed(1)} m inspected`);
   byId('subtitle').textContent = [`${scenario.name}, ${shared.join(', ')}${sameDraws}`, ...results].join('  ·  ');
 }
 
@@ -232,8 +236,7 @@ function advance(now) {
   else requestAnimationFrame(advance);
 }
 
-/** Times that one wants to look at: adaptations, failures, the first sight. */
-const STOPS = [...new Set(plays.flatMap((play) => play.marks.map((mark) => mark.t)))].sort((a, b) => a - b);
+const STOPS = [...new Set(plays.flatMap((play) => play.mission.adaptations))].sort((a, b) => a - b);
 function nextStop(t, direction) {
   return direction > 0 ? (STOPS.find((each) => each > t + 0.05) ?? span) : (STOPS.findLast((each) => each < t - 0.05) ?? 0);
 }
@@ -245,12 +248,18 @@ const setView = choice(byId('views'), VIEWS.map(([value, label], n) => [value, l
 const chooseSpeed = choice(byId('speeds'), SPEEDS.map((each) => [each, `${each}×`, `${each} times as fast as the mission`]),
   state.speed, (speed) => { state.speed = speed; });
 
+function enlarge() {
+  const isLarge = document.documentElement.classList.toggle('large');
+  byId('large').setAttribute('aria-pressed', String(isLarge));
+  requestDraw();
+}
+
 const changeSpeed = (by) => chooseSpeed(SPEEDS[clamp(SPEEDS.indexOf(state.speed) + by, 0, SPEEDS.length - 1)]);
 const KEYS = {
   ' ': () => setPlaying(!state.isPlaying), k: () => setPlaying(!state.isPlaying),
   ArrowLeft: (event) => goTo(state.t - (event.shiftKey ? 10 : 1)), ArrowRight: (event) => goTo(state.t + (event.shiftKey ? 10 : 1)),
   Home: () => goTo(0), End: () => goTo(span), n: () => goTo(nextStop(state.t, 1)), p: () => goTo(nextStop(state.t, -1)),
-  '+': () => changeSpeed(1), '=': () => changeSpeed(1), '-': () => changeSpeed(-1), l: toggleTheme,
+  '+': () => changeSpeed(1), '=': () => changeSpeed(1), '-': () => changeSpeed(-1), l: toggleTheme, b: enlarge,
   1: () => setView('3d'), 2: () => setView('above'), 3: () => setView('side'), '?': () => byId('help').showModal(),
 };
 addEventListener('keydown', (event) => {
@@ -264,11 +273,12 @@ byId('play').addEventListener('click', () => setPlaying(!state.isPlaying));
 byId('play').addEventListener('keyup', (event) => { if (event.key === ' ') event.preventDefault(); });
 byId('before').addEventListener('click', () => goTo(nextStop(state.t, -1)));
 byId('after').addEventListener('click', () => goTo(nextStop(state.t, 1)));
+byId('large').addEventListener('click', enlarge);
 byId('help-button').addEventListener('click', () => byId('help').showModal());
 byId('scrub').max = String(span);
 byId('scrub').addEventListener('input', (event) => goTo(Number(event.target.value)));
 addEventListener('resize', requestDraw);
-themeListeners.push(() => { modeColour = null; requestDraw(); });
+themeListeners.push(() => { modeColour = null; showLegend(byId('legend'), plays); requestDraw(); });
 startTheme(byId('theme'));
 
 const asked = new URLSearchParams(location.hash.slice(1));
@@ -276,4 +286,5 @@ if (asked.has('view') && asked.get('view') in PRESETS) setView(asked.get('view')
 if (SPEEDS.includes(Number(asked.get('speed')))) chooseSpeed(Number(asked.get('speed')));
 goTo(Number(asked.get('t')) || 0);
 draw();
+if (asked.get('large')) enlarge();
 if (asked.get('play')) setPlaying(true);

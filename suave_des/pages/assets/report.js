@@ -146,19 +146,19 @@ function drawPaired() {
 function pipelineTrace() {
   return {
     type: 'scatter', mode: 'lines', x: ways.pipeline.map((each) => each[0]), y: ways.pipeline.map((each) => each[1]),
-    line: { color: colour('--faint'), width: 7 }, name: 'pipeline', hoverinfo: 'name',
+    line: { color: colour('--mode-idle'), width: 7 }, name: 'pipeline', hoverinfo: 'name',
   };
 }
 
 const runsWithWay = [...new Set(ways.paths.map((way) => way.run))];
-const otherWays = 'more with suave-des report --paths N';
+const otherWays = 'suave-des report --paths N adds those of N runs';
 
 function sayWhichWays() {
   const n = runsWithWay.length;
   byId('runs-title').textContent = n
-    ? `Each mission; click one to view it. Paths and timelines are here for ${n} run${n > 1 ? 's' : ''} of each manager (${otherWays})`
+    ? `Each mission; click one to view it, with path and timeline of ${n} run${n > 1 ? 's' : ''} of each manager`
     : `Each mission; click one to view it. ${ways.note}`;
-  byId('where-title').textContent = `Paths of ${n} run${n > 1 ? 's' : ''} of each manager, from above (${otherWays})`;
+  byId('where-title').textContent = `Paths of ${n} run${n > 1 ? 's' : ''} of each manager, from above`;
 }
 
 function drawWhere() {
@@ -331,7 +331,7 @@ const listed = (title, entries) => (Object.keys(entries).length ? element('detai
 
 function makeTools() {
   const chip = (number) => element('button', {
-    type: 'button', 'aria-pressed': 'true', style: `--own:var(--m${number % 6})`, onclick: (event) => {
+    type: 'button', 'aria-pressed': 'true', style: `--own:var(--m${looks[number] % 6})`, onclick: (event) => {
       const button = event.currentTarget;
       if (state.hidden.has(number)) state.hidden.delete(number);
       else if (shownGroups().length > 1) state.hidden.add(number);

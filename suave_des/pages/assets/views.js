@@ -60,7 +60,7 @@ function drawMap({ drawing: d, width, height }, play, moment) {
   }
   d.fill();
   d.font = '10px system-ui, sans-serif';
-  d.fillStyle = 'rgba(234,250,255,0.75)';
+  d.fillStyle = '#eafaff';
   d.fillText('from above', 8, height - 8);
   const five = 5 * scale;
   d.fillRect(width - 10 - five, height - 9, five, 1.5);
@@ -129,7 +129,7 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   d.fillStyle = '#9ee8ff';
   d.fillRect(x + 9, y - 1, 4, 4);
   d.font = '10px system-ui, sans-serif';
-  d.fillStyle = 'rgba(234,250,255,0.85)';
+  d.fillStyle = '#fff';
   d.fillText('from the side', 8, 14);
   for (let metres = 1; metres <= play.top; metres++) {
     d.fillRect(width - 6, up(metres), 6, 1);
@@ -137,11 +137,54 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   }
   if (visibility !== null && width > 420) {
     d.textAlign = 'right';
-    const words = sees ? 'above the dashed line the sea bed is out of sight' : 'too high: the sea bed is out of sight';
-    d.fillStyle = sees ? 'rgba(240,246,220,0.85)' : '#ffc4b0';
+    const far = 'too high to see the sea bed';
+    const words = sees ? 'above the dashed line the sea bed is out of sight' : moment.distance > 0 ? `${far}; inspected counts way-points passed` : far;
+    d.fillStyle = sees ? '#fff' : '#ffe3d8';
     d.fillText(words, width - 40, 14);
     d.textAlign = 'left';
   }
+}
+
+/** Marks of the timeline: corners around their middle, 4 pixels away; none for a disc. They differ without colour, too. */
+const MARKS = {
+  adaptation: { colour: '--ink', corners: [[0, 0.75], [-1, -1], [1, -1]], words: 'adaptation' },
+  failure: { colour: '--bad', corners: [[0, -1.25], [1.25, 0], [0, 1.25], [-1.25, 0]], words: 'thruster fails' },
+  seen: { colour: '--good', corners: null, words: 'pipeline found' },
+};
+
+function drawMark(d, kind, x, y) {
+  const { corners } = MARKS[kind];
+  d.beginPath();
+  if (corners) for (const [across, down] of corners) d.lineTo(x + 4 * across, y + 4 * down);
+  else d.arc(x, y, 4, 0, 7);
+  d.fill();
+}
+
+/** What the lines and marks of the timeline mean, of those that are in it. */
+function showLegend(box, plays) {
+  const drawn = (...shapes) => {
+    const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+    svg.setAttribute('viewBox', '0 0 16 11');
+    for (const [kind, attributes] of shapes) {
+      const shape = document.createElementNS('http://www.w3.org/2000/svg', kind);
+      for (const [name, value] of Object.entries(attributes)) shape.setAttribute(name, value);
+      svg.append(shape);
+    }
+    return svg;
+  };
+  const entry = (words, ...shapes) => element('span', {}, drawn(...shapes), words);
+  const line = (mode) => ['path', { d: 'M0 6H16', stroke: modeColours()(mode), 'stroke-width': 3 }];
+  const kinds = Object.keys(MARKS).filter((kind) => plays.some((play) => play.marks.some((mark) => mark.kind === kind)));
+  const modes = [...new Set(plays.flatMap((play) => play.track.mode))].filter((mode) => mode);
+  box.replaceChildren(
+    ...kinds.map((kind) => {
+      const { colour: name, corners, words } = MARKS[kind];
+      const points = corners?.map(([across, down]) => `${8 + 4 * across},${5.5 + 4 * down}`).join(' ');
+      return entry(words, corners ? ['polygon', { points, fill: colour(name) }] : ['circle', { cx: 8, cy: 5.5, r: 4, fill: colour(name) }]);
+    }),
+    entry('visibility', ['rect', { y: 2, width: 16, height: 8, fill: colour('--line') }]),
+    element('span', {}, 'altitude in'), ...modes.map((mode) => entry(mode, line(mode))),
+  );
 }
 
 /** Altitude and visibility of every mission over the whole time, with what happened. */
@@ -175,18 +218,9 @@ function drawTimeline(surface, plays, t, span, modeColour) {
     d.globalAlpha = 1;
     for (const mark of play.marks) {
       const x = across(mark.t);
-      d.fillStyle = mark.kind === 'failure' ? colour('--bad') : mark.kind === 'seen' ? colour('--good') : colour('--ink');
-      d.beginPath();
-      if (mark.kind === 'adaptation') {
-        d.moveTo(x, top - 2);
-        d.lineTo(x - 4, top - 9);
-        d.lineTo(x + 4, top - 9);
-        d.fill();
-      } else {
-        d.arc(x, top - 5, 4, 0, 7);
-        d.fill();
-        d.fillRect(x - 0.5, top - 4, 1, bottom - top + 4);
-      }
+      d.fillStyle = colour(MARKS[mark.kind].colour);
+      drawMark(d, mark.kind, x, top - 5);
+      if (mark.kind !== 'adaptation') d.fillRect(x - 0.5, top - 4, 1, bottom - top + 4);
     }
     if (plays.length > 1) {
       d.fillStyle = colour('--soft');
