@@ -16,7 +16,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.textpath import TextPath
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
@@ -239,16 +239,18 @@ def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> Non
 
 
 def draw_reactions(groups: Sequence[Group]) -> style.Picture:
-    """Draw the number of adaptations per mission, and the reaction times, with a curve for each group."""
+    """Draw the number of adaptations per mission as bars, and the reaction times as a curve for each group."""
     labels = list(map(_label, groups))
     figure = _figure(labels)
     left, right = figure.subplots(1, 2)
-    for number, group in _looks(groups):
+    width = 0.85 / len(groups)
+    for place, (number, group) in enumerate(_looks(groups)):
         look = style.line(number)
         if "adaptations" in group.frame and len(counts := group.known_values("adaptations")):
-            missions = np.bincount((counts - counts.min()).astype(int))  # 0 where no mission has a number
-            numbers = counts.min() + np.arange(len(missions))
-            left.plot(numbers, missions / len(counts), marker=style.marker(number), ms=3.5, label=_label(group), **look)
+            numbers, missions = np.unique(counts, return_counts=True)
+            across = numbers + width * (place - (len(groups) - 1) / 2)
+            filled = {"color": look["color"], "hatch": style.hatch(number), "edgecolor": "white", "lw": 0.4}
+            left.bar(across, missions / len(counts), width, **filled)
         times_s = np.sort(group.known_values("mean_reaction_time_s"))
         if len(times_s):
             shares = np.arange(1, len(times_s) + 1) / len(times_s)
@@ -266,7 +268,9 @@ def draw_reactions(groups: Sequence[Group]) -> style.Picture:
     known = np.concatenate([group.known_values("mean_reaction_time_s") for group in groups])
     if len(known) and known.min() > 0.0 and known.max() > _FAR_APART * known.min():
         right.set_xscale("log")  # else the curves of quick managers would all be at the left edge
+        right.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         right.xaxis.set_major_formatter("{x:g}")
+        right.xaxis.set_minor_formatter(NullFormatter())
     else:
         right.set_xlim(left=0.0)
     right.yaxis.set_major_formatter(PercentFormatter(1.0))

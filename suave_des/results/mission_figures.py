@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
@@ -162,7 +162,9 @@ def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5, integer=True))
     points_per_m = 72.0 * axes.get_position().width * style.WIDTH_IN / frame.width
-    taken: list[tuple[float, float]] = []
+    # In points: the lower left corners of letters, and of boxes around the markers that are drawn already.
+    markers = np.concatenate([each.get_xydata() for each in axes.lines if each.get_marker() in ("o", "v")])
+    taken = [(x - _LETTER_POINTS / 3, y - _LETTER_POINTS / 3) for x, y in markers * points_per_m]
 
     def is_free(x: float, y: float) -> bool:
         return all(abs(x - other[0]) > _LETTER_POINTS or abs(y - other[1]) > _LETTER_POINTS for other in taken)
@@ -357,10 +359,11 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     found_s = record.metrics["search_time_s"]
     if record.metrics["pipeline_found"]:
         axes.axvline(found_s, color=style.BLACK, lw=0.9)
-        look: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "rotation": 90, "va": "bottom"}
-        axes.annotate("pipeline found", (found_s, 0.0), (3, 3), **look)
-    axes.set_ylabel("m")
-    axes.set_ylim(bottom=0.0)
+        is_late = found_s > 0.8 * record.end_s
+        look: dict[str, Any] = {"textcoords": "offset points", "ha": "right" if is_late else "left", "fontsize": 7}
+        axes.annotate("pipeline found", (found_s, 0.0), (-3 if is_late else 3, 3), **look)
+    axes.set_ylabel("altitude; visibility (m)")
+    axes.set_ylim(0.0, axes.get_ylim()[1] * 1.12)  # with room for the letters above the curves
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=2.4)
     last_s, row = -1e9, 0
     for letter, each in zip(ascii_uppercase, listed, strict=False):
@@ -414,11 +417,13 @@ def _lines(record: MissionRecord) -> Iterator[_Line]:
 
 
 def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
-    """Draw a bar for each span, with its text where it is no wider than the bar."""
+    """Draw a bar for each span; its text is in it or behind it, or in a legend where there is no room for any."""
     end_s = max((span.end_s for line in lines for span, _, _ in line.bars), default=1.0)
     letter_s = _LETTER_IN / _LINES_IN * end_s
+    named, unnamed = set[tuple[int, str]](), dict[tuple[int, str], str]()
     for row, line in enumerate(lines):
-        for span, colour, text in line.bars:
+        ends_s = [*(span.begin_s for span, _, _ in line.bars[1:]), end_s]
+        for (span, colour, text), next_s in zip(line.bars, ends_s, strict=True):
             width_s = span.end_s - span.begin_s
             axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
             label = style.text(text)
@@ -427,6 +432,20 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
                 ink = style.BLACK if luminance > 0.5 else "white"
                 look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "color": ink}
                 axes.text(span.begin_s + 1.0, row, label, zorder=3, clip_on=True, **look)
+            elif next_s - span.end_s > len(label) * letter_s:
+                axes.text(span.end_s + 1.0, row, label, zorder=3, va="center", fontsize=_BAR_POINTS)
+            else:
+                unnamed[row, label] = colour
+                continue
+            named.add((row, label))
+    legend = [
+        Patch(color=colour, label=f"{style.text(lines[row].name)}: {label}")
+        for (row, label), colour in unnamed.items()
+        if (row, label) not in named
+    ]
+    if legend:
+        place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+        axes.legend(handles=legend, ncols=4, handlelength=1.2, **place)
     axes.set_yticks(range(len(lines)), [style.text(line.name) for line in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
