@@ -24,19 +24,11 @@ PAGE = Path(__file__).parent / "reference" / "scenario.md"
 EXEMPLAR_PAGE = PAGE.with_name("exemplar-files.md")
 SIGNALS = (SinusoidSignal, ConstantSignal, StepSignal, TableSignal)
 DISTRIBUTIONS = (Normal, Uniform, Exponential, Choice)
-UNITS = (  # ending of a key: its unit; the first that fits
-    ("_m_per_s", "m/s"),
-    ("_per_s", "1/s"),
-    ("_rad", "rad"),
-    ("_deg", "degrees"),
-    ("_kg_per_m3", "kg/m^3"),
-    ("_kg_m2", "kg m^2"),
-    ("_kg", "kg"),
-    ("_m3", "m^3"),
-    ("_n", "N"),
-    ("_s", "s"),
-    ("_m", "m"),
-)
+SHARED = [
+    name for name in SIGNALS[0].model_fields if all(name in each.model_fields for each in SIGNALS) and name != "kind"
+]
+"""Keys of every kind of signal."""
+OWN = {each: [name for name in each.model_fields if name not in SHARED] for each in SIGNALS}
 BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 
 
@@ -46,7 +38,10 @@ def page() -> str:
     tables = {
         "scenario": table(Scenario),
         "parts": parts(Scenario, "", {Revision, VehicleDescription, ManagerSettings, *SIGNALS, *DISTRIBUTIONS}),
-        "signals": "\n".join(f"### kind: {kind(each, 'kind')}\n\n{lead(each)}\n\n{table(each)}" for each in SIGNALS),
+        "all signals": table(SIGNALS[0], SHARED),
+        "signals": "\n".join(
+            f"### kind: {kind(each, 'kind')}\n\n{lead(each)}\n\n{table(each, OWN[each])}" for each in SIGNALS
+        ),
         "distributions": "\n".join(
             f"### distribution: {kind(each, 'distribution')}\n\n{lead(each)}\n\n{table(each)}" for each in DISTRIBUTIONS
         ),
@@ -113,19 +108,14 @@ def kind(model: type[BaseModel], key: str) -> str:
     return str(typing.get_args(model.model_fields[key].annotation)[0])
 
 
-def table(model: type[BaseModel]) -> str:
-    """A Markdown table of a model's keys."""
+def table(model: type[BaseModel], names: Iterable[str] = ()) -> str:
+    """A Markdown table of a model's keys, or of some of them."""
     docs = field_docs(model)
-    rows = ["| key | value | unit | default | meaning |", "| --- | --- | --- | --- | --- |"]
-    for name, field in model.model_fields.items():
-        meaning = " ".join(docs[name].split()).replace("|", "\\|")
-        rows.append(f"| `{name}` | {value_text(field)} | {unit(name)} | {default_text(field)} | {meaning} |")
+    rows = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
+    for name in names or model.model_fields:
+        field, meaning = model.model_fields[name], " ".join(docs[name].split()).replace("|", "\\|")
+        rows.append(f"| `{name}` | {value_text(field)} | {default_text(field)} | {meaning} |")
     return "\n".join(rows) + "\n"
-
-
-def unit(name: str) -> str:
-    """Unit of a key, by its ending."""
-    return next((text for ending, text in UNITS if name.endswith(ending)), "")
 
 
 def value_text(field: FieldInfo) -> str:

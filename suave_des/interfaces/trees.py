@@ -67,10 +67,7 @@ class PyTreesManager(ManagingSubsystem):
             if ticked_before >= MAX_TICKED:
                 problem = f"a tick of the tree does not end: {MAX_TICKED:,} behaviours so far"
                 raise RuntimeError(f"{problem}, the last one {behaviour.name!r}")
-        if not self.system.recorded:
-            return
-        ticked = _ticked(self.root)
-        if ticked != self._logged:
+        if self.system.recorded and (ticked := _ticked(self.root)) != self._logged:
             self._logged = ticked
             self.system.log("tick", ticked)
 
