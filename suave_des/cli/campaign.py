@@ -21,6 +21,7 @@ from suave_des.cli.options import (
     Quiet,
     check_no_use,
     command_line,
+    complete_scenarios,
     flags,
 )
 from suave_des.errors import InputError, number_of
@@ -59,6 +60,7 @@ def campaign(
             metavar="SCENARIO",
             help="A scenario or campaign file, or the name of a shipped scenario.",
             show_default=False,
+            autocompletion=complete_scenarios,
         ),
     ] = None,
     *,

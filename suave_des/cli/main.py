@@ -61,7 +61,8 @@ def _report(message: str, status: int) -> int:
 def _usage_line(error: Any) -> str:
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "suave-des"
-    return f"{error.format_message().rstrip('.')} (see {path} --help)"
+    names = "several names have commas between them, without blanks; " if "extra argument" in str(error) else ""
+    return f"{error.format_message().rstrip('.')} ({names}see {path} --help)"
 
 
 app = typer.Typer(
@@ -72,7 +73,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
-    epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted, 143 by kill.",
+    epilog="Exit status: 0 done; 1 kb check, kb test or validate --strict found something; 2 bad input;"
+    " 3 done, but missions failed; 130 interrupted, 143 by kill.",
 )
 
 

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.console import errors, mission_status, output, print_table, print_timeline
-from suave_des.cli.options import Fields, Files, Given, ManagerOptions, Overwrite, Scenario, Seed, command_line
+from suave_des.cli.options import (
+    Fields,
+    Files,
+    Given,
+    ManagerOptions,
+    Overwrite,
+    Scenario,
+    Seed,
+    command_line,
+    complete_managers,
+)
 from suave_des.files import FAMILIES
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
@@ -28,7 +38,12 @@ def run(
         ),
     ],
     manager: Annotated[
-        str, typer.Option(metavar="NAME", help="Managing subsystem by name, or your own as module:Class.")
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Managing subsystem by name, or your own as module:Class.",
+            autocompletion=complete_managers,
+        ),
     ] = "metacontrol",
     run_number: Annotated[
         int,

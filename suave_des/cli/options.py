@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from itertools import chain
 from pathlib import Path
@@ -17,11 +17,48 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
     from suave_des.scenario.loader import Replacements
 
-Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
+
+def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """What a shell is offered for the last of several names with commas between them."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, begun = incomplete.rpartition(",")
+        return [f"{before}{comma}{name}" for name in names() if name.startswith(begun)]
+
+    return complete
+
+
+def _managers() -> Iterable[str]:
+    from suave_des.registry import manager_names
+
+    return manager_names()
+
+
+def _metrics() -> Iterable[str]:
+    from suave_des.records.metrics import METRICS
+
+    return METRICS
+
+
+def _scenarios() -> Iterable[str]:
+    return sorted(path.stem for path in shipped_folder("scenarios").glob("*.yaml") if "_modes" not in path.stem)
+
+
+complete_managers, complete_metrics, complete_scenarios = map(_completing, (_managers, _metrics, _scenarios))
+
+Scenario = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A scenario file, or the name of a shipped one.",
+        autocompletion=complete_scenarios,
+    ),
+]
 Results = Annotated[
     list[Path],
     typer.Argument(
@@ -39,7 +76,13 @@ SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", sh
 """For commands that may go on from results, which have a seed already."""
 Workers = Annotated[int, typer.Option("--workers", help="Worker processes; results do not depend on the number.")]
 ManagersInData = Annotated[
-    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
+    str | None,
+    typer.Option(
+        "--managers",
+        metavar="NAME,...",
+        help="Managers to compare; by default all in the data.",
+        autocompletion=complete_managers,
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings about rules and ontologies.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
@@ -81,7 +124,13 @@ class Fields:
             option, kind = _option(name), next(each for each in _KINDS if each in _types_in(declared.annotation))
             help_text = self.help.get(name) or " ".join(texts[name].split())
             default = self.default.get(name) or option.default or _written(declared.default)
-            given = typer.Option(option.flag, metavar=option.metavar, help=help_text, show_default=default or False)
+            given = typer.Option(
+                option.flag,
+                metavar=option.metavar,
+                help=help_text,
+                show_default=default or False,
+                autocompletion=complete_managers if name == "managers" else None,
+            )
             annotation: Any = Annotated[bool if kind is bool else kind | None, given]
             yield _keyword(name, False if kind is bool else None, annotation)
 

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.console import TEXT_WIDTH, output
-from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated
+from suave_des.cli.options import (
+    Files,
+    Results,
+    SeedIfNew,
+    check_no_use,
+    comma_separated,
+    complete_managers,
+    complete_metrics,
+)
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
 
@@ -44,6 +52,7 @@ def compare(
         typer.Option(
             metavar="COLUMN,...",
             help="Columns of runs.csv.",
+            autocompletion=complete_metrics,
             show_default="search time, distance, found, reaction time",
         ),
     ] = None,
@@ -166,9 +175,12 @@ def replay(
     managers: Annotated[
         str | None,
         typer.Option(
+            "--managers",
+            "--manager",
             metavar="NAME,...",
             help="One or two managing subsystems, on the same random numbers.",
             show_default="metacontrol; for a campaign, the last and the first",
+            autocompletion=complete_managers,
         ),
     ] = None,
     run_number: Annotated[

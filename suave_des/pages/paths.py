@@ -73,7 +73,7 @@ def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs:
         paths = list(_paths(opened, frame, groups, runs))
         return Paths(vertices, paths, "" if paths else "No mission could be run again as it was")
     except SuaveDesError as error:
-        return Paths(note=f"Paths and timelines are left out: {error}")
+        return Paths(note=f"Paths and timelines are left out: {getattr(error, 'problem', error)}")
 
 
 def _paths(opened: MissionRunner, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Iterator[MissionPath]:

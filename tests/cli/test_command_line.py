@@ -95,6 +95,21 @@ class TestHelp:
         assert command("--version").out == f"suave-des {__version__}\n"
 
 
+@pytest.mark.parametrize(
+    ("begun", "offered"),
+    [
+        ("suave-des run release", "release15"),
+        ("suave-des campaign seams2023 --managers none,meta", "none,metacontrol"),
+        ("suave-des compare out --metrics search", "search_time_s"),
+    ],
+)
+def test_a_shell_completes_names(command, monkeypatch: pytest.MonkeyPatch, begun: str, offered: str) -> None:
+    monkeypatch.setenv("_SUAVE_DES_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", begun)
+    monkeypatch.setenv("COMP_CWORD", str(len(begun.split()) - 1))
+    assert command("").out.split() == [offered]
+
+
 def test_one_mission_is_not_called_missions(command) -> None:
     ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", *OUT)
     assert ended.out.endswith("\n1 mission is in out/runs.csv\n")
