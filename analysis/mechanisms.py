@@ -1,7 +1,7 @@
 """What each mechanism of the vehicle and its software is worth: each taken out, or set to another value, one at a time.
 
 Simulated missions are held against the real ones of 2023 (`seams2023`, the same condition in each run) and of 2025
-(`planta_exp1_campaign`, six conditions). Writes a CSV file and the table that docs/background/fidelity.md shows.
+(`planta_exp1_campaign`, six conditions). Writes a CSV file and the table that mechanisms.md shows.
 
     python analysis/mechanisms.py [--out DIR] [--runs N] [--workers N]
 """
