@@ -134,6 +134,13 @@ def test_every_page_is_two_steps_from_the_readme_which_links_a_handful():
     assert {*(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").rglob("*.ipynb")} <= within_two_steps
 
 
+def test_pages_write_into_folders_of_their_own_so_that_they_can_follow_each_other_in_one_checkout():
+    out = re.compile(r"^\$ suave-des .*--out (\w+)(?![.\w/])", flags=re.MULTILINE)
+    written = {(folder, page) for page in PAGES for folder in out.findall(page.read_text(encoding="utf-8"))}
+    folders = [folder for folder, _ in written]
+    assert sorted(folders) == sorted(set(folders))
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
 
