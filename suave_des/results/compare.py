@@ -6,7 +6,7 @@ Groups are compared run by run where runs share their random numbers, and else a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -29,7 +29,9 @@ from suave_des.results.missions import (
     caveats,
     counted,
     grouped,
+    listed,
     missions_of,
+    mostly_lost,
     read_missions,
     time_limit_s,
 )
@@ -38,6 +40,8 @@ from suave_des.results.statistics import Sample
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_WORSE = 0.9
+"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
 _USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
 
 
@@ -150,9 +154,36 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
     by_name = {metric.name: metric for metric in metrics}
     differences = [replace(each, conclusion=conclusion(each, by_name[each.metric])) for each in found]
     means = {each.group: each.mean.value for each in summaries if each.metric == metrics[0].name and each.n}
-    sentence = overall_conclusion(metrics[0], differences, means, [group.name for group in groups])
-    notes = [*missions.notes, *notes, *caveats(groups, metrics)]
+    sentence = " ".join(_conclusions(groups, metrics[0], differences, means))
+    notes = [*missions.notes, *notes, *caveats(groups, metrics), *_worse_paired(differences)]
     return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups))
+
+
+def _conclusions(
+    groups: Sequence[Group], metric: Metric, differences: Sequence[Difference], means: Mapping[str, float]
+) -> Iterator[str]:
+    """Yield the conclusion; of several points of a sweep at which managers are compared, one for each."""
+    points = dict.fromkeys(group.point for group in groups)
+    if len(points) == 1 or len(points) == len(groups):
+        points = {"": None}
+    for point in points:
+        own = [group for group in groups if not point or group.point == point]
+        names = [group.name for group in own]
+        text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
+        if metric.name == SEARCH_TIME:
+            text = mostly_lost(own) + text
+        yield f"{point.removeprefix(', ')}: {text.replace(point, '')}" if point else text
+
+
+def _worse_paired(differences: Sequence[Difference]) -> Iterator[str]:
+    """Yield a note on pairs whose differences vary more than those of independent runs would."""
+    worse = [
+        f"{each.group} - {each.other} in {each.metric}, {1.0 / each.variance_ratio:.1f} times"
+        for each in differences
+        if each.variance_ratio < _WORSE
+    ]
+    if worse:
+        yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
 
 
 def _metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
@@ -188,13 +219,24 @@ def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, f
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:
+    """Pair the managers at each point of a sweep; the points of a manager, if it is the only one."""
+    pairs = [(one, other) for one, other in combinations(groups, 2) if one.point == other.point]
     if against is None:
-        return list(combinations(groups, 2))
+        return pairs or list(combinations(groups, 2))
     by_name = {group.name: group for group in groups}
-    if against not in by_name:
-        remedy = did_you_mean(against, by_name, "there are")
-        raise InputError(f"nothing is called {shown(against)}", place="against", remedy=remedy)
-    return [(group, by_name[against]) for name, group in by_name.items() if name != against]
+    if against in by_name:
+        chosen = by_name[against]
+        others = [group for group in groups if group is not chosen]
+        return [(group, chosen) for group in others if group.point == chosen.point] or [
+            (each, chosen) for each in others
+        ]
+    at_points = [(group, by_name.get(f"{against}{group.point}")) for group in groups]
+    if not any(chosen for _, chosen in at_points):
+        known = {group.name.removesuffix(group.point): group for group in groups}
+        raise InputError(
+            f"nothing is called {shown(against)}", place="against", remedy=did_you_mean(against, known, "there are")
+        )
+    return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
 def _summarise(group: Group, metric: Metric, horizon_s: float) -> Summary:

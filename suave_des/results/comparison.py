@@ -111,6 +111,11 @@ class Difference:
         """Whether the test rejects at 5%, together with all others."""
         return self.p_holm < SIGNIFICANCE
 
+    @property
+    def is_equal(self) -> bool:
+        """Whether the two have the same value in each pair."""
+        return self.paired and self.n > 1 and self.difference.value == 0.0 and not self.difference.has_interval
+
     def row(self) -> dict[str, Any]:
         """Return all of it by the columns of a file."""
         return _row(self, methods=("difference",)) | ({} if self.test else {"test": None, "effect_name": None})
@@ -321,13 +326,12 @@ def _search_table(summaries: Sequence[Summary]) -> Table:
     horizon_s = min((each.horizon_s for each in known), default=0.0)
     headings = ("manager", f"mean to {horizon_s:.0f} s", "95% interval", "half found by", "95% interval")
     rows = []
-    for each in summaries if known else ():
-        if each in known:
-            mean, half = each.restricted_mean_s, each.censored_median_s
-            ends = "not reached" if math.isinf(half.low) else f"{half.low:.0f} to {_seconds(half.high)}"
-            rows.append((each.group, f"{mean.value:.2f}", mean.text(".1f"), _seconds(half.value), ends))
-        else:
-            rows.append((each.group, "", "", "", ""))
+    for each in known:
+        if abs(each.restricted_mean_s.value - each.mean.value) < 0.005 and math.isfinite(each.censored_median_s.value):
+            continue  # as in the table above
+        mean, half = each.restricted_mean_s, each.censored_median_s
+        ends = "not reached" if math.isinf(half.low) else f"{half.low:.0f} to {_seconds(half.high)}"
+        rows.append((each.group, f"{mean.value:.2f}", mean.text(".1f"), _seconds(half.value), ends))
     return Table(headings, rows, "missions that never found it as censored (Kaplan-Meier)")
 
 

@@ -12,6 +12,7 @@ from suave_des.results.statistics import FISHER, MANN_WHITNEY, MCNEMAR, WILCOXON
 _MOST_SENTENCES = 3
 """Of a metric of which neither more nor less is better, in the conclusion from all differences."""
 _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
+_OPEN = "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
 
 
 def conclusion(found: Difference, metric: Metric) -> str:
@@ -24,10 +25,12 @@ def conclusion(found: Difference, metric: Metric) -> str:
     test = f"{_basis(found)}, {p_text(found.p_holm)}"
     interval = _interval(found, metric)
     mean = f"{found.group} - {found.other}: {metric.amount(found.difference.value)}, {interval}"
+    if found.is_equal:
+        return f"{found.group} and {found.other} have the same {metric.title} in all {number_of(found.n, 'pair')}."
     if not found.is_significant:
         text = f"No difference in {metric.title} is shown between {found.group} and {found.other}"
-        if found.difference.has_interval and not found.difference.contains(0.0):
-            text += " by the test, though the interval of the mean, which is not corrected, does not contain 0"
+        if _is_open(found):
+            text += f" by the test, though {_OPEN}"
         return f"{text} ({mean}{test})."
     ranks = _direction_of_ranks(found)
     if ranks and found.difference.contains(0.0):
@@ -53,6 +56,11 @@ def _rank_claim(found: Difference, metric: Metric, ranks: float) -> str:
     return f"{greater} mostly exceeds {less} in {metric.title}"
 
 
+def _is_open(found: Difference) -> bool:
+    """Whether the interval of the mean shows a difference, and the corrected test does not."""
+    return not found.is_significant and found.difference.has_interval and not found.difference.contains(0.0)
+
+
 def _is_claimed(found: Difference) -> bool:
     """Whether a difference of the means may be claimed."""
     return found.is_significant and not (found.difference.contains(0.0) and _direction_of_ranks(found))
@@ -76,11 +84,14 @@ def overall_conclusion(
 
     Args:
         metric: the first one.
-        differences: of all metrics, with their conclusions.
+        differences: of all metrics and groups, with their conclusions.
         means: of this metric, by group, where they are known.
-        groups: names of all.
+        groups: names of those that it is about.
     """
-    own = [each for each in differences if each.metric == metric.name and each.test]
+    among = set(groups)
+    own = [
+        each for each in differences if each.metric == metric.name and each.test and {each.group, each.other} <= among
+    ]
     if len(groups) < 2:
         return f"There is only {groups[0]}, so there is nothing to compare it with."
     if not own or len(means) < 2:
@@ -90,14 +101,19 @@ def overall_conclusion(
     best = max(means, key=lambda name: metric.better * means[name])
     against = [each for each in own if best in (each.group, each.other)]
     shown = [each for each in against if _is_claimed(each) and _favours(each, best, metric)]
-    open_ones = [_other(each, best) for each in against if not each.is_significant]
+    open_ones = [_not_shown(each, best) for each in against if not each.is_significant]
+    tests = sum(1 for each in differences if each.test)
     sentences = []
     if shown:
-        sentences.append(_claims(best, metric, shown, open_ones))
+        sentences.append(_claims(best, metric, shown, open_ones, tests))
     elif open_ones:
         has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
         is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean,"
         sentences.append(f"{is_shown} and {_and(open_ones)}.")
+        if any(map(_is_open, against)):
+            sentences[-1] = (
+                f"{sentences[-1].removesuffix('.')}, after Holm's correction over {number_of(tests, 'test')}."
+            )
     others = [each.conclusion for each in against if each.is_significant and each not in shown]
     return " ".join([*sentences, *others])
 
@@ -107,7 +123,14 @@ def _favours(found: Difference, name: str, metric: Metric) -> bool:
     return (1.0 if found.group == name else -1.0) * metric.better * found.difference.value > 0.0
 
 
-def _claims(best: str, metric: Metric, shown: Sequence[Difference], open_ones: Sequence[str]) -> str:
+def _not_shown(found: Difference, best: str) -> str:
+    """Name the other one, and what speaks for a difference, or that there is none at all."""
+    if found.is_equal:
+        return f"{_other(found, best)} (equal in all {number_of(found.n, 'pair')})"
+    return f"{_other(found, best)} ({_OPEN})" if _is_open(found) else _other(found, best)
+
+
+def _claims(best: str, metric: Metric, shown: Sequence[Difference], open_ones: Sequence[str], tests: int) -> str:
     """Write by how much the best is better than those from which it differs, and from which it does not."""
     _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
     parts = [
@@ -118,7 +141,8 @@ def _claims(best: str, metric: Metric, shown: Sequence[Difference], open_ones: S
     largest = p_text(max(each.p_holm for each in shown))
     if len(shown) > 1:
         largest = f"all {largest}" if "<" in largest else f"largest {largest}"
-    sentence = f"{best} {metric.most}: {_and(parts)}; {largest} after Holm's correction"
+    over = f" after Holm's correction over {tests} tests" if tests > 1 else ""
+    sentence = f"{best} {metric.most}: {_and(parts)}; {largest}{over}"
     return f"{sentence}; no difference is shown to {_and(open_ones)}." if open_ones else f"{sentence}."
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pandas
 from numpy.typing import NDArray
 
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, number_of, shown
 from suave_des.records.metrics import DISTANCE, FOUND, SEARCH_TIME, Metric, metric_of
 from suave_des.records.runs import COLUMNS, is_foreign, read_runs
 from suave_des.records.store import RUNS_FILE, STORE_FILE, check_one_campaign, read_manifest
@@ -245,11 +245,13 @@ class Group:
         frame: a row for each independent value: for each mission, or, where points of a sweep are averaged, for each
             run, whose random numbers all points share; or for each draw that several runs share.
         is_of_missions: whether each row is one mission.
+        point: the end of the name that tells the value of a sweep; empty if all values are in the group.
     """
 
     name: str
     frame: pandas.DataFrame
     is_of_missions: bool = True
+    point: str = ""
 
     def values(self, metric: str) -> NDArray[np.float64]:
         """Return the values of a metric, nan where there is none."""
@@ -326,14 +328,14 @@ def grouped(
         for key, part in frame.groupby(["source", *by], dropna=False, observed=True)
     }
     groups, lacking = [], []
-    for name, (key, part) in zip(names, found, strict=True):
+    for (name, end), (key, part) in zip(names, found, strict=True):
         source, number = str(key[1]), points[key[1:]]
         rows = _means(part, number) if number > 1 else part
         if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
             lacking.append(f"{name} {left} of {left + len(rows)}")
         if (sharing := alike.get(source, 1)) > 1:
             rows = _means(rows.assign(run=first_alike(rows, sharing)), _runs_of_draws(frame, source, sharing))
-        groups.append(Group(name, rows, number == sharing == 1))
+        groups.append(Group(name, rows, number == sharing == 1, end))
     if lacking and not any(len(group.frame) for group in groups):
         remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
         raise InputError("no manager has a run with missions at all points of the sweep", remedy=remedy)
@@ -343,16 +345,19 @@ def grouped(
     return groups, notes
 
 
-def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[str]:
+def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[str, str]]:
+    """Return of each group the name, and the end of it that tells the values of a sweep."""
     sources: dict[object, set[object]] = {}
     for manager, source, *_ in keys:
         sources.setdefault(manager, set()).add(source)
-    return [
-        printable(str(manager))
-        + (f" ({printable(str(source))})" if len(sources[manager]) > 1 else "")
-        + "".join(f", {name} {_short(value)}" for name, value in zip(by, values, strict=True))
-        for manager, source, *values in keys
-    ]
+    ends = [name.rpartition(".")[2] for name in by]
+    labels = ends if len(set(ends)) == len(ends) else by
+    names = []
+    for manager, source, *values in keys:
+        point = "".join(f", {label} {_short(value)}" for label, value in zip(labels, values, strict=True))
+        of_source = f" ({printable(str(source))})" if len(sources[manager]) > 1 else ""
+        names.append((f"{printable(str(manager))}{of_source}{point}", point))
+    return names
 
 
 def _short(value: object) -> str:
@@ -460,6 +465,20 @@ def caveats(groups: Sequence[Group], metrics: Sequence[Metric]) -> Iterator[str]
             yield from _never_found(groups)
         elif metric.name != FOUND:
             yield from _left_out(groups, metric)
+
+
+def mostly_lost(groups: Sequence[Group]) -> str:
+    """Say which groups did not find the pipeline in most of their missions; empty if all found it in half of them."""
+    lost = [(group, 1.0 - group.known_values(FOUND)) for group in groups if len(group.known_values(FOUND))]
+    counts = [
+        f"{group.name} in {shares.sum():.0f} of {number_of(len(shares), 'mission')}"
+        if group.is_of_missions
+        else f"{group.name} in {shares.mean():.0%} of its missions"
+        for group, shares in lost
+        if shares.mean() > 0.5
+    ]
+    what = "their search time is when they ended"
+    return f"The pipeline was not found by {listed(counts)}; {what}. " if counts else ""
 
 
 def _never_found(groups: Sequence[Group]) -> Iterator[str]:

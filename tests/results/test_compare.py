@@ -233,10 +233,51 @@ class TestSweep:
         values = {"visibility.period_s": [60.0, 80.0]}
         frame = run_campaign("seams2023", ["none"], 5, 1, out=tmp_path / "out", sweep=values).frame()
         comparison = compare_folders([tmp_path / "out"], by=["visibility.period_s"])
-        found = difference(comparison, "none, visibility.period_s 60", "none, visibility.period_s 80")
+        found = difference(comparison, "none, period_s 60", "none, period_s 80")
         times = frame.pivot(index="run", columns="visibility.period_s", values="search_time_s")
         assert found.paired
         assert found.difference.value == pytest.approx((times[60.0] - times[80.0]).mean())
+
+    def test_managers_are_compared_within_each_point(self, tmp_path: Path) -> None:
+        values = {"visibility.period_s": [60.0, 80.0]}
+        run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
+        for against in (None, "none"):
+            found = compare_folders([tmp_path / "out"], by=["visibility.period_s"], against=against)
+            pairs = {tuple(sorted((each.group, each.other))) for each in found.differences}
+            assert pairs == {(f"bt, period_s {value}", f"none, period_s {value}") for value in (60, 80)}
+        first, second = found.conclusion.split("period_s 80: ")
+        assert first.startswith("period_s 60: bt ") or "bt, which has" in first
+        assert "bt" in second and "period_s" not in second
+
+
+class TestHeadlines:
+    """What a headline says beside the difference: of how many tests, and what the test does not show."""
+
+    def test_an_interval_without_0_that_the_corrected_test_does_not_support_is_named(self) -> None:
+        b = [100.0 + 0.1 * number for number in range(8)]
+        a = [value - 20.0 - 5.0 * (number % 3) for number, value in enumerate(b)]
+        a[0] = b[0] + 3.0
+        found = compare_frame(runs(a=a, b=b, c=[150.0, 90.0] * 4, d=[80.0, 160.0] * 4, e=[150.0, 95.0] * 4))
+        pair = difference(found, "a", "b")
+        assert pair.p < 0.05 <= pair.p_holm
+        assert not pair.difference.contains(0.0)
+        assert (
+            "b (the interval of the mean, which is not corrected for the number of tests, does not" in found.conclusion
+        )
+        tests = sum(1 for each in found.differences if each.test)
+        assert f"Holm's correction over {tests} tests" in found.conclusion
+
+    def test_that_most_missions_did_not_find_the_pipeline_comes_first(self) -> None:
+        lost = [300.0] * 15 + [120.0] * 5
+        found = compare_frame(runs(a=[130.0] * 11 + [300.0] * 9, b=lost))
+        assert found.conclusion.startswith("The pipeline was not found by b in 15 of 20 missions; ")
+        assert not compare_frame(runs(a=[100.0] * 20, b=[130.0] * 11 + [300.0] * 9)).conclusion.startswith("The pipe")
+
+    def test_pairs_that_vary_more_than_independent_runs_are_noted(self) -> None:
+        times = [100.0 + 5.0 * number for number in range(10)]
+        against = compare_frame(runs(a=times, b=times[::-1])).notes
+        assert any("larger, not smaller (a - b in search_time_s, 2.0 times" in note for note in against)
+        assert not any("larger, not smaller" in note for note in compare_frame(runs(a=times, b=times)).notes)
 
 
 class TestFewValues:
@@ -259,7 +300,8 @@ class TestFewValues:
         assert search.row()["censored_median_s"] is None
         found = difference(comparison, "a", "b")
         assert found.p == 1.0
-        assert "No difference in search time is shown" in found.conclusion
+        assert found.conclusion == "a and b have the same search time in all 25 pairs."
+        assert comparison.conclusion.startswith("The pipeline was not found by a in 25 of 25 missions, b in 25 of 25 m")
 
     def test_a_difference_that_is_the_same_in_each_pair_is_claimed(self) -> None:
         a = np.random.default_rng(1).normal(100.0, 5.0, 20)

@@ -126,7 +126,7 @@ def test_the_conclusion_names_the_largest_p_of_those_that_it_is_about() -> None:
     # By signed ranks b differs with p = 2 / 2**12, times 3 in Holm's correction, c with p = 10 / 2**12.
     ps = [each.p_holm for each in comparison.differences]
     assert ps == pytest.approx([6 / 2**12, 10 / 2**12, 6 / 2**12])
-    assert comparison.conclusion.endswith("largest p = 0.002 after Holm's correction.")
+    assert comparison.conclusion.endswith("largest p = 0.002 after Holm's correction over 3 tests.")
     assert f"{6 / 2**12:.3f}" == "0.001"
 
 
