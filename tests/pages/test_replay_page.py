@@ -173,6 +173,18 @@ def test_two_managers_reasoning_is_in_sight_on_a_projector(both, browser):
         assert found.value("getComputedStyle(document.body).zoom") == "1.4"
 
 
+def test_it_says_when_no_design_is_left(tmp_path, browser):
+    rules, file = tmp_path / "stay.swrl", tmp_path / "replay.html"
+    rules.write_text("stay: typeFD(?fg, fd_spiral_medium) -> fd_realisability(fd_spiral_low, false)")
+    loaded = load_scenario("seams2023", rules=[rules])
+    result = Simulator(loaded).run("metacontrol", 1, SEED, record=True)
+    file.write_text(replay_page([recorded_result(loaded, result)]), encoding="utf-8")
+    with opened(browser, file, hash_="#t=30") as found:
+        assert found.complaints == []
+        assert "no design is left for f_generate_search_path" in found.page.text_content(".state")
+        assert "no design left" in found.page.text_content("#legend")
+
+
 def test_names_are_text_never_markup(missions, tmp_path, browser):
     from dataclasses import replace
 

@@ -60,13 +60,37 @@ function prepare(mission) {
       if (open) open.set = t;
     }
   }
+  play.troubles = troublesOf(play);
   play.marks = [
+    ...play.troubles.map((each) => ({ t: each.from, kind: 'trouble' })),
     ...mission.adaptations.map((t) => ({ t, kind: 'adaptation' })),
     ...mission.thrusters.filter(([, , works]) => !works).map(([t]) => ({ t, kind: 'failure' })),
     ...(mission.seen ? [{ t: mission.seen[0], kind: 'seen' }] : []),
   ];
   play.view = { ...PRESETS['3d'], target: null };
   return play;
+}
+
+const GROUND_M = 0.2;
+const LYING_S = 5;
+
+/** What went wrong, with the times between which it lasted: no design was left, or the vehicle lay on the ground. */
+function troublesOf({ mission, track, duration }) {
+  const found = [];
+  const open = new Map();
+  const note = (text, t, holds, least = 0) => {
+    if (holds && !open.has(text)) open.set(text, t);
+    if (holds || !open.has(text)) return;
+    if (t - open.get(text) >= least) found.push({ text, from: open.get(text), to: t });
+    open.delete(text);
+  };
+  for (const { t_s: t, decided } of mission.cycles.cycles) {
+    for (const each of decided) note(`no design is left for ${each.function}`, t, each.chosen === null);
+  }
+  for (const text of [...open.keys()]) note(text, duration, false);
+  track.t.forEach((t, n) => note('the vehicle lies on the ground', t, track.z[n] - BED < GROUND_M, LYING_S));
+  note('the vehicle lies on the ground', duration, false, LYING_S);
+  return found;
 }
 
 function momentOf(play, asked) {
@@ -159,8 +183,10 @@ function drawPane({ play, box, parts, panel }, t) {
   parts.mode.firstChild.style.color = seaColour(moment.mode);
   [...parts.lamps.children].forEach((lamp, n) => lamp.classList.toggle('dead', moment.thrusters[n] === false));
   const { metrics } = play.mission;
-  parts.state.textContent = moment.isOver ? 'mission is over'
+  const trouble = play.troubles.findLast((each) => each.from <= t && t < each.to);
+  const phase = moment.isOver ? 'mission is over'
     : moment.isSeen ? `pipeline found after ${foundAfter(metrics)}` : metrics.pipeline_found ? 'searching' : 'searching, until the time limit';
+  parts.state.textContent = trouble ? `${phase}: ${trouble.text} (since ${trouble.from.toFixed(1)} s)` : phase;
   Object.assign(box.dataset, { x: pose.x.toFixed(3), y: pose.y.toFixed(3), z: pose.z.toFixed(3) });
   panel.update(moment);
 }

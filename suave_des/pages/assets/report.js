@@ -98,19 +98,23 @@ function drawSweep() {
   for (const [number, rows] of chosen) {
     const byValue = new Map();
     for (const row of known(rows, state.metric)) {
-      const value = columns[name][row];
-      if (!byValue.has(value)) byValue.set(value, []);
-      byValue.get(value).push(columns[state.metric][row]);
+      const [value, run] = [columns[name][row], `${columns.run[row]}|${seedOf(row)}`];
+      if (!byValue.has(value)) byValue.set(value, new Map());
+      const byRun = byValue.get(value);
+      byRun.set(run, [...(byRun.get(run) ?? []), columns[state.metric][row]]);
     }
     const values = [...byValue.keys()].sort((a, b) => (typeof a === 'number' ? a - b : 0));
+    const samples = values.map((value) => [...byValue.get(value).values()].map(mean)); // points of a sweep share a run's draws
     traces.push({
-      type: 'scatter', mode: 'lines+markers', name: plain(groups[number]), x: values, y: values.map((value) => mean(byValue.get(value))),
-      text: values.map((value) => byValue.get(value).length), line: { color: groupColour(number), width: 2, dash: groupDash(number) },
-      hovertemplate: '%{y:.2f} at %{x} (%{text} missions)<extra>%{fullData.name}</extra>', marker: { symbol: groupSymbol(number), size: 7 },
+      type: 'scatter', mode: 'lines+markers', name: plain(groups[number]), x: values, y: samples.map(mean),
+      error_y: { type: 'data', array: samples.map(halfInterval), color: groupColour(number), thickness: 1.3, width: 4 },
+      text: samples.map((sample) => `± ${halfInterval(sample)?.toFixed(2) ?? '?'}, ${sample.length} runs`),
+      line: { color: groupColour(number), width: 2, dash: groupDash(number) },
+      hovertemplate: '%{y:.2f} %{text} at %{x}<extra>%{fullData.name}</extra>', marker: { symbol: groupSymbol(number), size: 7 },
     });
   }
   const others = drawn.swept.filter((each) => each !== name && state.sweep[each] === undefined);
-  byId('sweep-title').textContent = `Means over ${name}${others.length ? `, averaged over ${others.join(', ')}` : ''}`;
+  byId('sweep-title').textContent = `Means and 95% intervals over ${name}${others.length ? `, averaged over ${others.join(', ')}` : ''}`;
   show('sweep', traces, layoutOf(name, titles[state.metric]));
 }
 
@@ -128,14 +132,16 @@ function drawPaired() {
       if (other !== undefined && other !== null) differences.push(columns[state.metric][row] - other);
     }
     if (!differences.length) continue;
+    const half = drawn.swept.some((name) => state.sweep[name] === undefined) ? null : halfInterval(differences);
     traces.push({
       type: 'histogram', x: differences, name: plain(groups[number]), opacity: 0.62, nbinsx: 45, histnorm: 'percent',
       marker: { color: groupColour(number), line: { color: colour('--card'), width: 0.6 } },
       hovertemplate: `%{y:.1f}% of ${differences.length.toLocaleString('en')} pairs<br>differ by %{x}<extra>%{fullData.name}</extra>`,
     }, {
       type: 'scatter', mode: 'markers', x: [mean(differences)], y: [0], name: plain(groups[number]), cliponaxis: false,
+      error_x: { type: 'data', array: [half], color: colour('--ink') },
       marker: { symbol: 'triangle-up', size: 12, color: groupColour(number), line: { color: colour('--card'), width: 1 } },
-      hovertemplate: 'mean difference %{x:.2f}<extra>%{fullData.name}</extra>',
+      hovertemplate: `mean difference %{x:.2f}${half === null ? '' : ` ± ${half.toFixed(2)}`}<extra>%{fullData.name}</extra>`,
     });
   }
   show('paired', traces, layoutOf(`${titles[state.metric]}: difference to ${plain(groups[state.reference])}`, 'share of pairs (%)', {

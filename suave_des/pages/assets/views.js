@@ -149,6 +149,7 @@ function drawSide({ drawing: d, width, height }, play, moment) {
 const MARKS = {
   adaptation: { colour: '--ink', corners: [[0, 0.75], [-1, -1], [1, -1]], words: 'adaptation' },
   failure: { colour: '--bad', corners: [[0, -1.25], [1.25, 0], [0, 1.25], [-1.25, 0]], words: 'thruster fails' },
+  trouble: { colour: '--warm', corners: [[-1, -1], [1, -1], [1, 1], [-1, 1]], words: 'no design left, or on the ground' },
   seen: { colour: '--good', corners: null, words: 'pipeline found' },
 };
 
