@@ -28,9 +28,11 @@ def serve(missions: int) -> None:
     from suave_des import load_scenario
     from suave_des.simulation.simulator import Simulator
 
-    simulators = {name: Simulator(load_scenario(name)) for name in SCENARIOS}
+    simulators: dict[str, Simulator] = {}
     for line in sys.stdin:
         scenario, manager = line.split()
+        if scenario not in simulators:
+            simulators[scenario] = Simulator(load_scenario(scenario))
         began_s = time.process_time()
         for run in range(1, missions + 1):
             simulators[scenario].run(manager, run, SEED)

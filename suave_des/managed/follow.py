@@ -43,10 +43,6 @@ class InspectionPath(NamedTuple):
         lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
         return cls(np.insert(x_y_m, 2, SEA_BED_Z_M + altitude_m, axis=1), (0.0, *lengths_m))
 
-    def from_point(self, first: int) -> Self:
-        """Make the rest of the path, from a point on."""
-        return type(self)(self.points_m[first:], self.lengths_m[first:])
-
 
 @dataclass(eq=False)
 class FollowPipeline(WaypointFunction):
@@ -61,8 +57,7 @@ class FollowPipeline(WaypointFunction):
     revision: FollowRevision
     path: InspectionPath
     detector: PipelineDetector
-    _route: InspectionPath = field(init=False)  # the path from the point on that was seen first
-    _next: int = field(default=0, init=False)
+    _next: int = field(default=0, init=False)  # point of the path
     _has_arrived: bool = field(default=False, init=False)
     _travelled_m: float = field(default=0.0, init=False)
     _published_m: float = field(default=0.0, init=False)
@@ -85,10 +80,9 @@ class FollowPipeline(WaypointFunction):
         if not self.revision.keeps_distance_on_activation:
             self._travelled_m = 0.0
         self._has_arrived = False
-        if self.revision.restarts_on_activation:
-            self._next = 0
-        if self.detector.first_point is not None and not self.finished.triggered:
-            self._route = self.path.from_point(self.detector.first_point)
+        first = self.detector.first_point
+        if first is not None and not self.finished.triggered:
+            self._next = first if self.revision.restarts_on_activation else max(first, self._next)
             self.start_at(self.env.now)
 
     def deactivated(self) -> None:
@@ -98,7 +92,7 @@ class FollowPipeline(WaypointFunction):
         self.stop()
         if self.revision.counts_interrupted_piece and self._has_arrived:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-            self._travelled_m += math.dist(self._route.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
+            self._travelled_m += math.dist(self.path.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
             self._published_m = self._travelled_m
 
     def arrival_check(self, start_s: float) -> ArrivalCheck:
@@ -112,7 +106,7 @@ class FollowPipeline(WaypointFunction):
 
     def waypoints(self, count: int) -> Array:
         """Return the current point and those after it; none if the end is reached."""
-        return self._route.points_m[self._next : self._next + count]
+        return self.path.points_m[self._next : self._next + count]
 
     def completed(self) -> None:
         """Report that the end of the path is reached."""
@@ -124,7 +118,7 @@ class FollowPipeline(WaypointFunction):
 
     def reached(self, count: int) -> None:
         """Add to the distance, starting at the first point, and publish it at each point after that."""
-        lengths_m = self._route.lengths_m[self._next + (not self._has_arrived) : self._next + count]
+        lengths_m = self.path.lengths_m[self._next + (not self._has_arrived) : self._next + count]
         self._next += count
         self._has_arrived = True
         for length_m in lengths_m:

@@ -33,54 +33,6 @@ _cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Re
 _MAX_CACHED: Final = 16384
 
 
-class Adapter:
-    """Maps plans to mode changes: a function design is carried out by the mode of its name."""
-
-    def __init__(self, system: System) -> None:
-        self._system = system
-        self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
-
-    def is_in_force(self, plan: Plan) -> bool:
-        """Return whether carrying a plan out would neither change a mode nor record anything."""
-        current_mode = self._system.modes.current_mode
-        for decision in plan.decisions:
-            if decision.design is not None and current_mode(decision.function) != decision.design:
-                return False
-        return plan.without_design == self._without_design
-
-    def carry_out(self, plan: Plan, groundings: dict[str, str], functions: Collection[str]) -> dict[str, str]:
-        """Request the modes of a plan.
-
-        Args:
-            plan: the decisions.
-            groundings: the function designs in use, by function.
-            functions: those that still have an objective; decisions on others are dropped.
-
-        Returns:
-            The function designs that are in use from now on, by function.
-        """
-        grounded = {}
-        for decision in plan.decisions:
-            function, design = decision.function, decision.design
-            if function not in functions:
-                continue
-            if design is None:
-                if function not in self._without_design:
-                    self._log("no_design_left", function, decision)
-            elif self._system.change_mode(function, design):
-                grounded[function] = design
-                before = groundings.get(function, NO_GROUNDING)
-                if before != design:
-                    self._log("adaptation", f"{function}: {before} -> {design}", decision)
-        self._without_design = plan.without_design
-        return grounded
-
-    def _log(self, event: str, what: str, decision: Decision) -> None:
-        if self._system.recorded:
-            left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
-            self._system.log(event, f"{what}: {decision.reason}{left_out}")
-
-
 class Metacontrol(ManagingSubsystem):
     """The metacontrol manager.
 
@@ -120,6 +72,7 @@ class Metacontrol(ManagingSubsystem):
         self._listens_since_s = 0.0  # values that were published before are ignored
         self._cancelled: set[str] = set()  # functions whose objectives were removed since the last cycle began
         self._recorded_statuses: frozenset[str] = frozenset()
+        self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
         self._awaited = self._attributes_to_await()
         latency, stream = scenario.latencies.inference_s, "metacontrol/inference"
         self._latency_s: float | Callable[[], float] = (  # a number, or what draws one
@@ -127,7 +80,6 @@ class Metacontrol(ManagingSubsystem):
         )
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_tick_s("metacontrol", self.period_s)
-        self._adapter = Adapter(system)
         bridge_s = revision.task_bridge_period_s
         self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
         self._has_objectives_from_launch = bool(system.functions)
@@ -181,8 +133,7 @@ class Metacontrol(ManagingSubsystem):
             for line in sorted(reasoning.statuses - self._recorded_statuses):
                 self.system.log("inferred", line)
             self._recorded_statuses = reasoning.statuses
-        needed = self.objectives.keys() - self._cancelled
-        grounded = self._adapter.carry_out(reasoning.plan, self.groundings, needed)
+        grounded = self._request_modes(reasoning.plan)
         if not grounded.items() <= self.groundings.items():
             self.reasoning_time_s += latency_s
         self.groundings |= grounded
@@ -192,6 +143,33 @@ class Metacontrol(ManagingSubsystem):
         for component in recovered:
             if self.components.get(component) == RECOVERED:
                 del self.components[component]
+
+    def _request_modes(self, plan: Plan) -> dict[str, str]:
+        """Request the mode of each design of a plan, but for functions that no longer have an objective.
+
+        Returns:
+            The function designs that are in use from now on, by function.
+        """
+        grounded = {}
+        for decision in plan.decisions:
+            function, design = decision.function, decision.design
+            if function not in self.objectives or function in self._cancelled:
+                continue
+            if design is None:
+                if function not in self._without_design:
+                    self._log_decision("no_design_left", function, decision)
+            elif self.system.change_mode(function, design):
+                grounded[function] = design
+                before = self.groundings.get(function, NO_GROUNDING)
+                if before != design:
+                    self._log_decision("adaptation", f"{function}: {before} -> {design}", decision)
+        self._without_design = plan.without_design
+        return grounded
+
+    def _log_decision(self, event: str, what: str, decision: Decision) -> None:
+        if self.system.recorded:
+            left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
+            self.system.log(event, f"{what}: {decision.reason}{left_out}")
 
     # What changes the state.
 
@@ -281,11 +259,13 @@ class Metacontrol(ManagingSubsystem):
             if reasoning.statuses - self._recorded_statuses:
                 return False
             self._recorded_statuses = reasoning.statuses
+        current_mode = self.system.modes.current_mode
         for decision in reasoning.plan.decisions:
             function, design = decision.function, decision.design
-            if design is not None and (self.groundings.get(function), self.objectives[function]) != (design, None):
+            now = self.groundings.get(function), self.objectives[function], current_mode(function)
+            if design is not None and now != (design, None, design):
                 return False
-        return self._adapter.is_in_force(reasoning.plan)
+        return reasoning.plan.without_design == self._without_design
 
     def _is_listening(self) -> bool:
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective

@@ -133,7 +133,8 @@ def _way(mission: Recorded) -> InspectionPath | None:
     for _, detail in details(mission.record, "pipeline_detected"):
         number = detail.rpartition(" ")[2]
         if number.isdecimal() and int(number) < len(points):
-            return InspectionPath.there_and_back(points, altitude_m).from_point(int(number))
+            path = InspectionPath.there_and_back(points, altitude_m)
+            return InspectionPath(path.points_m[int(number) :], path.lengths_m[int(number) :])
     return None
 
 

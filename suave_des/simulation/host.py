@@ -134,36 +134,27 @@ class ManagerHost:
     def _wait_for_event(self, due_s: float, period_s: float) -> Generator[simpy.Event, Any, float]:
         """Wait until the first time of `adapt`, from `due_s` on, at which a call may change something; return it."""
         env = self.system.env
-        self._idle_regions.add(self._regions(env.now))
+        tick_s, next_due_s = env.now, due_s
+        self._idle_regions.add(self._regions(tick_s))
         self._is_waiting = True
         try:
             while True:
-                tick_s = self._next_event_s(due_s, period_s)
-                if tick_s == inf:
+                event_s = min([each.next_crossing_s(tick_s, limits) for each, limits in self._depends_on], default=inf)
+                if event_s == inf:
                     yield env.event()  # until interrupted
-                yield exactly_at(env, tick_s)
+                tick_s = _tick_at_or_after(event_s, next_due_s, period_s)
+                if not self._are_known:  # the regions are only then
+                    yield exactly_at(env, tick_s)
                 if self._regions(tick_s) not in self._idle_regions:
+                    if self._are_known:
+                        yield exactly_at(env, tick_s)
                     self._is_waiting = False
                     return tick_s
-                due_s = tick_s + period_s
+                next_due_s = tick_s + period_s
         except simpy.Interrupt:
             tick_s = _tick_at_or_after(env.now, due_s, period_s)
             yield until(env, tick_s)
             return tick_s
-
-    def _next_event_s(self, due_s: float, period_s: float) -> float:
-        """Find the first time of `adapt` at which measured values lie, or may lie, outside all idle regions."""
-        tick_s = self.system.env.now
-        while True:
-            event_s = min(
-                [each.next_crossing_s(tick_s, thresholds) for each, thresholds in self._depends_on], default=inf
-            )
-            if event_s == inf:
-                return inf
-            tick_s = _tick_at_or_after(event_s, due_s, period_s)
-            if not self._are_known or self._regions(tick_s) not in self._idle_regions:
-                return tick_s
-            due_s = tick_s + period_s
 
     def _regions(self, t_s: float) -> tuple[int, ...]:
         return tuple([each.region(t_s, thresholds) for each, thresholds in self._depends_on])

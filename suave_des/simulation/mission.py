@@ -39,7 +39,7 @@ from suave_des.registry import ManagerLike, cause_of, is_built_in, manager_class
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.host import RAISED, ManagerHost
-from suave_des.simulation.prepared import PreparedScenario, StartPlace
+from suave_des.simulation.prepared import PreparedScenario, draw_start
 from suave_des.vehicle.kernel import POSITION
 from suave_des.vehicle.model import Pose
 from suave_des.vehicle.vehicle import row_at
@@ -120,9 +120,9 @@ class Mission:
         self._recorder = recorder = Recorder(env, record, described.reaction_metric)
 
         # The vehicle, and what is measured.
-        self._start = StartPlace.of(draws)
+        self._start_m, self._origin_m = draw_start(draws)
         self._track = prepared.take_track()
-        self._vehicle = prepared.make_vehicle(draws, self._start, self._track, manager_type.needs_knowledge)
+        self._vehicle = prepared.make_vehicle(draws, self._start_m, self._track, manager_type.needs_knowledge)
         self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, draws, recorder.log)
         signals = {each.key: each for each in measure_signals(loaded, draws, prepared.duration_s)}
         self._visibility = signals[WATER_VISIBILITY]
@@ -145,6 +145,7 @@ class Mission:
         self._observe()
 
         # The managing subsystem.
+        files, learned = ({}, {}) if manager is None else prepared.manager_inputs(self._manager_name)
         system = System(
             env=env,
             modes=self.mode_manager,
@@ -156,11 +157,11 @@ class Mission:
             _vehicle=self._vehicle,
             _draws=draws,
             _recorder=recorder,
-            _files={} if manager is None else prepared.manager_files(self._manager_name),
+            _files=files,
             _open_knowledge=lambda: prepared.knowledge,
         )
-        learned = prepared.learned(self._manager_name), prepared.training is not None
-        self._host = ManagerHost(manager_type, system, self.bus, self._error_of, *learned)
+        is_training = prepared.training is not None
+        self._host = ManagerHost(manager_type, system, self.bus, self._error_of, learned, is_training)
         self.manager = self._host.manager
         self._start_processes()
 
@@ -307,8 +308,8 @@ class Mission:
             manager=self._manager_name,
             run=self._run,
             seed=self._seed,
-            initial_x_m=self._start.position_m[0],
-            initial_y_m=self._start.position_m[1],
+            initial_x_m=self._start_m[0],
+            initial_y_m=self._start_m[1],
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
             search_time_s=coordinator.search_time_or_limit_s,
@@ -343,7 +344,7 @@ class Mission:
                 env,
                 sender(domain.GENERATE_SEARCH_PATH),
                 revision.spiral,
-                self._start.origin_m,
+                self._origin_m,
                 self._prepared.view_tangent,
                 draws.phase(domain.GENERATE_SEARCH_PATH, revision.spiral.tick_period_s),
                 draws.value("latencies.search_start_s"),

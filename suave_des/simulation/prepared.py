@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from math import cos, pi, sin
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,23 +30,11 @@ if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
     from suave_des.knowledge.reasoner import Reasoner
 
 
-class StartPlace(NamedTuple):
-    """The place where a mission begins.
-
-    Attributes:
-        position_m: x and y of the vehicle, world frame.
-        origin_m: x and y of the origin of the search, world frame.
-    """
-
-    position_m: tuple[float, float]
-    origin_m: tuple[float, float]
-
-    @classmethod
-    def of(cls, draws: Draws) -> StartPlace:
-        """Draw it for a run, including the drift before the mission."""
-        value = draws.value
-        x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
-        return cls((x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")))
+def draw_start(draws: Draws) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Draw where a run's mission begins, and where its search has its origin: x and y of each, world frame, m."""
+    value = draws.value
+    x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
+    return (x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m"))
 
 
 class PreparedScenario:
@@ -68,8 +56,7 @@ class PreparedScenario:
         self.vehicle_model, self.autopilot = vehicle_model(scenario.vehicle), autopilot_of(scenario.calibration)
         self.view_tangent = scenario.vehicle.camera.tangent
         self._spare_tracks: list[Array] = []
-        self._learned: dict[str, Mapping[str, Any]] = {}
-        self._manager_files: dict[str, Mapping[str, Path]] = {}
+        self._manager_inputs: dict[str, tuple[Mapping[str, Path], Mapping[str, Any]]] = {}
 
     @cached_property
     def knowledge(self) -> Reasoner:
@@ -78,36 +65,28 @@ class PreparedScenario:
 
         return open_knowledge(self.loaded)
 
-    def learned(self, manager: str) -> Mapping[str, Any]:
-        """Return a manager's training result: in training a mutable one, otherwise the content of its file, if any.
+    def manager_inputs(self, manager: str) -> tuple[Mapping[str, Path], Mapping[str, Any]]:
+        """Find the files that a manager declares, by their names as given, and its training result.
+
+        The result is mutable in training; otherwise it is the content of the file that `learned` names, if any.
 
         Raises:
-            InputError: the file cannot be read, or has something else in it.
+            InputError: a file is not there; or the training result cannot be read, or has something else in it.
         """
-        if self.training is not None:
-            return self.training.setdefault(manager, {})
-        if manager not in self._learned:
-            name = self.loaded.manager_settings(manager).get("learned")
+        if manager not in self._manager_inputs:
+            declared = dict(self.loaded.declared_files(manager, manager_class(manager)))
+            name = None if self.training is not None else self.loaded.manager_settings(manager).get("learned")
             path = None if name is None else self.loaded.manager_file(manager, str(name))
-            self._learned[manager] = {} if path is None else read_learned(path)
-        return self._learned[manager]
+            self._manager_inputs[manager] = declared, {} if path is None else read_learned(path)
+        files, learned = self._manager_inputs[manager]
+        return files, learned if self.training is None else self.training.setdefault(manager, {})
 
-    def manager_files(self, manager: str) -> Mapping[str, Path]:
-        """Find the files that a manager declares, by their names as given.
-
-        Raises:
-            InputError: one is not there.
-        """
-        if manager not in self._manager_files:
-            self._manager_files[manager] = dict(self.loaded.declared_files(manager, manager_class(manager)))
-        return self._manager_files[manager]
-
-    def make_vehicle(self, draws: Draws, start: StartPlace, track: Array, reasons: bool) -> Vehicle:
+    def make_vehicle(self, draws: Draws, start_m: tuple[float, float], track: Array, reasons: bool) -> Vehicle:
         """Make the vehicle of one mission.
 
         Args:
             draws: of the run.
-            start: where it begins.
+            start_m: x and y of the place where it begins.
             track: to be filled with the vehicle's states, a row for each time step.
             reasons: whether a reasoner runs on the simulator's computer, and slows it down.
         """
@@ -119,7 +98,7 @@ class PreparedScenario:
         return Vehicle(
             self.vehicle_model,
             self.autopilot,
-            Pose(*start.position_m, value("start.z_m"), 0.0, 0.0, value("start.heading_rad")),
+            Pose(*start_m, value("start.z_m"), 0.0, 0.0, value("start.heading_rad")),
             self.duration_s,
             altitude_error_m=value("calibration.altitude_error_m"),
             current_m_per_s=current_m_per_s,

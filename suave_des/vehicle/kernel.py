@@ -20,8 +20,9 @@ HEADING_INTEGRAL = 16  # of the heading error, as an angular acceleration, rad/s
 LEG_START = slice(17, 20)  # of the leg that the autopilot flies, world frame, m
 LEG_END = slice(20, 23)  # the set-point, world frame, m
 LEG_TIME = 23  # since the leg began, s
-SET_POINT_NUMBER = 24  # of the set-point that the leg leads to; the one at the start is number 0
-COLUMNS = 25
+LEG_QUARTER = 24  # a quarter of the leg's duration, s
+SET_POINT_NUMBER = 25  # of the set-point that the leg leads to; the one at the start is number 0
+COLUMNS = 26
 
 # Places in the set-point vector, after x, y and z of its position, world frame, m.
 HALF_HEADING_COS, HALF_HEADING_SIN = 3, 4  # cosine and sine of half the heading
@@ -32,7 +33,7 @@ MASS = 0  # kg
 IXX, IYY, IZZ = 1, 2, 3  # principal moments of inertia, kg m^2
 NET_BUOYANCY = 4  # buoyancy less weight, N
 RIGHTING = 5  # buoyancy times its height above the centre of mass, N m
-DRAG = 6  # six coefficients of -c |nu| nu, N s^2/m^2 and N m s^2
+DRAG = 6  # six coefficients of -c |nu| nu, each divided by its mass or moment of inertia, 1/m and 1/rad
 THRUST_LIMIT = 12  # of each thruster, N
 POSITION_GAIN, POSITION_GAIN_Z = 13, 14  # velocity for a position error, 1/s
 JERK = 15  # of a leg, m/s^3
@@ -69,6 +70,12 @@ def quarter_of_leg(length: float, jerk: float) -> float:
 
 
 @compiled
+def clamp(value: float, limit: float) -> float:
+    """Limit a value to -limit .. limit; a little quicker here than min and max."""
+    return -limit if value < -limit else limit if value > limit else value
+
+
+@compiled
 def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, float, float]:
     """Begin the leg to a new set-point, as ArduPilot's waypoint controller does (AC_WPNav, set_wp_destination).
 
@@ -80,9 +87,7 @@ def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, 
     """
     x, y, z = track[row, 0], track[row, 1], track[row, 2]
     to_x, to_y, to_z = track[row, 20], track[row, 21], track[row, 22]
-    leg_x, leg_y, leg_z = to_x - track[row, 17], to_y - track[row, 18], to_z - track[row, 19]
-    length = math.sqrt(leg_x * leg_x + leg_y * leg_y + leg_z * leg_z)
-    is_over = track[row, LEG_TIME] >= 4.0 * quarter_of_leg(length, prm[JERK])
+    is_over = track[row, LEG_TIME] >= 4.0 * track[row, LEG_QUARTER]
     if is_over and (to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2 <= ARRIVED_M * ARRIVED_M:
         return to_x, to_y, to_z, track[row, 13], track[row, 14]
     qw, qx, qy, qz = track[row, 3], track[row, 4], track[row, 5], track[row, 6]
@@ -108,7 +113,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     """
     h, set_point, prm, allocation, effectiveness = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
-    heading_w, heading_z = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN]
+    heading_w, heading_z, number = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN], set_point[NUMBER]
     # Read number by number: unpacking a slice would create an array, which takes as long as a step.
     x, y, z = track[first, 0], track[first, 1], track[first, 2]
     qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
@@ -117,20 +122,22 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     ix, iy, iz, ir = track[first, 13], track[first, 14], track[first, 15], track[first, 16]
     from_x, from_y, from_z = track[first, 17], track[first, 18], track[first, 19]
     to_x, to_y, to_z = track[first, 20], track[first, 21], track[first, 22]
-    leg_time = track[first, LEG_TIME]
-    if track[first, SET_POINT_NUMBER] != set_point[NUMBER]:
+    leg_time, quarter = track[first, LEG_TIME], track[first, LEG_QUARTER]
+    is_new_leg = track[first, SET_POINT_NUMBER] != set_point[NUMBER]
+    if is_new_leg:
         from_x, from_y, from_z, ix, iy = begin_leg(track, first, prm)
         to_x, to_y, to_z, leg_time = set_point[0], set_point[1], set_point[2], 0.0
     along_x, along_y, along_z = to_x - from_x, to_y - from_y, to_z - from_z
     length = math.sqrt(along_x * along_x + along_y * along_y + along_z * along_z)
+    if is_new_leg:
+        quarter = quarter_of_leg(length, prm[JERK])
     if length > 0.0:
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
-    quarter = quarter_of_leg(length, prm[JERK])
     top_speed = prm[JERK] * quarter * quarter
     # A multiplication takes a fraction of the time of a division.
     inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = 1.0 / mass, 1.0 / ixx, 1.0 / iyy, 1.0 / izz
-    drag_u, drag_v, drag_w = prm[DRAG] / mass, prm[DRAG + 1] / mass, prm[DRAG + 2] / mass
-    drag_p, drag_q, drag_r = prm[DRAG + 3] / ixx, prm[DRAG + 4] / iyy, prm[DRAG + 5] / izz
+    drag_u, drag_v, drag_w = prm[DRAG], prm[DRAG + 1], prm[DRAG + 2]
+    drag_p, drag_q, drag_r = prm[DRAG + 3], prm[DRAG + 4], prm[DRAG + 5]
     for row in range(first + 1, last + 1):
         # Rotation matrix R, body to world (Handbook, 2.69).
         r00 = 1.0 - 2.0 * (qy * qy + qz * qz)
@@ -166,9 +173,9 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         ey = prm[POSITION_GAIN] * ey + along_y * speed - wy
         ez = prm[POSITION_GAIN_Z] * ez + along_z * speed - wz
         bound = prm[INTEGRAL_LIMIT]
-        ix = min(max(ix + h * prm[VELOCITY_INTEGRAL_GAIN] * ex, -bound), bound)
-        iy = min(max(iy + h * prm[VELOCITY_INTEGRAL_GAIN] * ey, -bound), bound)
-        iz = min(max(iz + h * prm[VELOCITY_INTEGRAL_GAIN_Z] * ez, -bound), bound)
+        ix = clamp(ix + h * prm[VELOCITY_INTEGRAL_GAIN] * ex, bound)
+        iy = clamp(iy + h * prm[VELOCITY_INTEGRAL_GAIN] * ey, bound)
+        iz = clamp(iz + h * prm[VELOCITY_INTEGRAL_GAIN_Z] * ez, bound)
         fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
         fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
         fz = mass * (prm[VELOCITY_GAIN_Z] * ez + iz)
@@ -182,7 +189,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         e_roll = sign * (-qx * heading_w - qy * heading_z)
         e_yaw = sign * (-qz * heading_w + qw * heading_z)
         bound = prm[HEADING_INTEGRAL_LIMIT]
-        ir = min(max(ir + h * prm[HEADING_INTEGRAL_GAIN] * e_yaw, -bound), bound)
+        ir = clamp(ir + h * prm[HEADING_INTEGRAL_GAIN] * e_yaw, bound)
         d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
         d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
 
@@ -192,7 +199,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         for i in range(6):
             thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
             thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
-            thrust = min(max(thrust, -limit), limit)
+            thrust = clamp(thrust, limit)
             t0 += effectiveness[0, i] * thrust
             t1 += effectiveness[1, i] * thrust
             t2 += effectiveness[2, i] * thrust
@@ -259,7 +266,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir
         track[row, 17], track[row, 18], track[row, 19] = from_x, from_y, from_z
         track[row, 20], track[row, 21], track[row, 22] = to_x, to_y, to_z
-        track[row, LEG_TIME], track[row, SET_POINT_NUMBER] = leg_time, set_point[NUMBER]
+        track[row, LEG_TIME], track[row, LEG_QUARTER], track[row, SET_POINT_NUMBER] = leg_time, quarter, number
 
 
 @compiled

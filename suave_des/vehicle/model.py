@@ -139,7 +139,9 @@ def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tup
     ap = autopilot
     # The integral is limited to the force that the four horizontal thrusters together give along one axis.
     integral_limit = 4.0 * model.thrust_limit_n * sqrt(0.5) / model.mass_kg
-    forces = model.buoyancy_n - model.weight_n, model.buoyancy_n * model.centre_of_buoyancy_m, *model.quadratic_drag
+    inertia = (model.mass_kg,) * 3 + model.inertia_kg_m2
+    drag = [coefficient / inert for coefficient, inert in zip(model.quadratic_drag, inertia, strict=True)]
+    forces = model.buoyancy_n - model.weight_n, model.buoyancy_n * model.centre_of_buoyancy_m, *drag
     legs = model.thrust_limit_n, ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
     horizontal = ap.velocity_gain_per_s, ap.velocity_integral_gain_per_s2
     vertical = ap.vertical_velocity_gain_per_s, ap.vertical_velocity_integral_gain_per_s2

@@ -39,10 +39,10 @@ def env() -> simpy.Environment:
     return simpy.Environment()
 
 
-def test_path_goes_on_from_the_point_seen_and_back_along_all_points() -> None:
-    path = InspectionPath.there_and_back(np.array(LINE), 1.25).from_point(40)
-    assert path.points_m[:, :2].tolist() == [list(point) for point in (*LINE[40:], *reversed(LINE))]
-    assert set(path.points_m[:, 2]) == {-18.75} and path.lengths_m[1:6] == (0.5, 0.5, 0.5, 0.5, 0.0)
+def test_path_goes_there_and_back_along_all_points() -> None:
+    path = InspectionPath.there_and_back(np.array(LINE), 1.25)
+    assert path.points_m[:, :2].tolist() == [list(point) for point in (*LINE, *reversed(LINE))]
+    assert set(path.points_m[:, 2]) == {-18.75} and path.lengths_m[41:46] == (0.5, 0.5, 0.5, 0.5, 0.0)
 
 
 @BOTH
