@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -22,9 +22,11 @@ from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from suave_des.records.mission_folder import MissionRecord
+    from suave_des.results.assisted import AssistedComparison
+    from suave_des.results.comparison import Comparison
     from suave_des.results.mission_figures import Rules
 
 
@@ -68,36 +70,88 @@ def compare(
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
     ] = False,
+    assisted_by: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="DIR... are real missions, and this a campaign under the same conditions."),
+    ] = None,
+    population: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many conditions drawn as theirs were."),
+    ] = None,
+    plan: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="METRIC:VALUE",
+            help="Plan real missions for intervals this narrow; without --assisted-by, DIR... is their population.",
+        ),
+    ] = None,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = CompareFormat.TABLE,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write .csv, .json, .md or .tex instead of printing; with --assisted-by also .png, .pdf or .svg.",
+        ),
     ] = None,
 ) -> None:
     """Compare managers by their results.
 
-    Runs that share their random numbers are compared in pairs, which takes fewer missions.
+    Runs that share their random numbers are compared in pairs, which takes fewer missions. A few real missions can be
+    assisted by simulated ones, and planned.
     """
     from suave_des.results.compare import compare_folders
-    from suave_des.results.comparison import ENDINGS, FORMS
+    from suave_des.results.comparison import ENDINGS
 
     if out is not None:
-        _check_out(out, ENDINGS)
-    comparison = compare_folders(
-        results,
-        managers=comma_separated(managers),
-        metrics=comma_separated(metrics),
-        by=comma_separated(by),
-        against=against,
-        half_widths=half_width or (),
-        unpaired=unpaired,
-    )
-    if out is not None:
-        write_files(out.parent, {out.name: FORMS[ENDINGS[out.suffix.lower()]](comparison)})
+        _check_out(out, (*ENDINGS, *(() if assisted_by is None else (".png", ".pdf", ".svg"))))
+    names, columns = comma_separated(managers), comma_separated(metrics)
+    comparison: Comparison | AssistedComparison
+    if assisted_by is not None or population is not None or plan:
+        unused = {"--by": by, "--against": against, "--half-width": half_width, "--unpaired": unpaired}
+        check_no_use(unused, "with --assisted-by or --plan")
+        comparison = _assisted(results, assisted_by, population, plan or (), names, columns)
+    else:
+        comparison = compare_folders(
+            results,
+            managers=names,
+            metrics=columns,
+            by=comma_separated(by),
+            against=against,
+            half_widths=half_width or (),
+            unpaired=unpaired,
+        )
+    if out is not None and out.suffix.lower() in ENDINGS:
+        write_files(out.parent, {out.name: getattr(comparison, ENDINGS[out.suffix.lower()])()})
         print(f"compared in {out}")
+    elif out is not None:
+        from suave_des.results.figures import draw_assisted, write_picture
+
+        write_picture(draw_assisted(cast("AssistedComparison", comparison)), out)
+        print(f"drawn in {out}")
     elif as_format is CompareFormat.TABLE:
         print(comparison.text(min(output().width, TEXT_WIDTH)), end="")
     else:
-        print(FORMS[as_format.value](comparison), end="")
+        print(getattr(comparison, as_format.value)(), end="")
+
+
+def _assisted(
+    results: Sequence[Path],
+    same: Path | None,
+    population: Path | None,
+    plan: Sequence[str],
+    managers: Sequence[str],
+    metrics: Sequence[str],
+) -> AssistedComparison:
+    """Compare real missions, assisted by simulated ones, or plan them."""
+    from suave_des.results.assisted import compare_assisted, planned
+
+    if same is not None and population is not None:
+        return compare_assisted(results, same, population, managers=managers, metrics=metrics, half_widths=plan)
+    if same is not None or population is not None:
+        given, lacking = ("--assisted-by", "--population") if population is None else ("--population", "--assisted-by")
+        raise InputError(f"{given} is given without {lacking}", remedy="give both: suave-des campaign makes them")
+    check_no_use({"--metrics": metrics or None}, "with --plan, which names its own")
+    return planned(results, plan, managers=managers)
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:

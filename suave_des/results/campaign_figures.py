@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -27,6 +27,9 @@ from suave_des.results import style
 from suave_des.results.missions import Group, Missions, first_alike, runs_sharing_draw, time_limit_s
 from suave_des.results.statistics import Sample
 from suave_des.results.style import folded, key_words, value_words
+
+if TYPE_CHECKING:
+    from suave_des.results.assisted import AssistedComparison
 
 _ROW_IN = 0.62
 """Height of a row of a figure that has one for each manager."""
@@ -189,6 +192,33 @@ def running_means(values: Sample) -> tuple[NDArray[np.int_], Sample, Sample]:
         half = _CURVE_POINTS // 2
         shown = np.unique(np.r_[np.geomspace(1, len(n), half), np.linspace(1, len(n), half)].round().astype(int))
     return shown, values[0] + means[shown - 1], halves[shown - 1]
+
+
+def draw_assisted(found: AssistedComparison) -> style.Picture:
+    """Draw real against simulated means of each condition, and each manager's mean alone and assisted, by metric."""
+    names = list(dict.fromkeys(found.estimates["group"]))
+    looks = dict(zip(names, style.looks(names), strict=True))
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.4 * len(found.metrics)), layout="constrained")
+    for (left, right), metric in zip(figure.subplots(len(found.metrics), 2, squeeze=False), found.metrics, strict=True):
+        conditions = found.conditions[found.conditions["metric"] == metric.name]
+        estimates = found.estimates[(found.estimates["metric"] == metric.name) & (found.estimates["other"] == "")]
+        for row, (name, number) in enumerate(looks.items()):
+            mark: dict[str, Any] = {"marker": style.marker(number), "color": style.line(number)["color"]}
+            part = conditions[conditions["manager"] == name]
+            left.scatter(metric.scale * part["same"], metric.scale * part["real"], s=14, label=style.text(name), **mark)
+            for each in estimates[estimates["group"] == name].to_dict("records"):
+                for kind, shift, fill_colour in (("alone", -0.15, "white"), ("assisted", 0.15, mark["color"])):
+                    ends = np.array([each[kind], each[f"{kind}_ci95_low"], each[f"{kind}_ci95_high"]], float)
+                    value, low, high = metric.scale * ends
+                    errors = [[value - low], [high - value]]
+                    right.errorbar(value, row + shift, xerr=errors, mfc=fill_colour, ms=4.0, capsize=2.0, **mark)
+        ends = metric.scale * conditions[["same", "real"]].to_numpy()
+        left.plot([ends.min(), ends.max()], [ends.min(), ends.max()], color=style.GREY, lw=0.7, zorder=0)
+        left.set(xlabel=f"{metric.heading}: simulated, by condition", ylabel="real")
+        right.set(xlabel=f"{metric.brief}: alone (open), assisted", ylim=(len(names) - 0.5, -0.5))
+        right.set_yticks(range(len(names)), [style.text(name) for name in names])
+    figure.axes[0].legend()
+    return figure
 
 
 def draw_detections(groups: Sequence[Group]) -> style.Picture:

@@ -17,8 +17,7 @@ import pandas
 
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import share_of
-from suave_des.files import as_number
-from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
+from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.results import statistics
 from suave_des.results.comparison import Comparison, Difference, Summary
 from suave_des.results.conclusions import conclusion, overall_conclusion
@@ -27,11 +26,13 @@ from suave_des.results.missions import (
     Group,
     Missions,
     caveats,
+    chosen_metrics,
     counted,
     grouped,
     listed,
     missions_of,
     mostly_lost,
+    read_half_widths,
     read_missions,
     time_limit_s,
 )
@@ -40,9 +41,10 @@ from suave_des.results.statistics import Sample
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from suave_des.results.assisted import AssistedComparison, Source
+
 _WORSE = 0.9
 """Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
-_USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
 
 
 class Choices(TypedDict, total=False):
@@ -120,6 +122,24 @@ class CampaignFrame(pandas.DataFrame):
         """
         return compare_frame(self, **choices)
 
+    def assist(
+        self, real: Source, population: Source, managers: Sequence[str] = (), metrics: Sequence[str] = ()
+    ) -> AssistedComparison:
+        """Estimate what real missions show, assisted by these, which are of the same conditions.
+
+        Args:
+            real: real missions, as compare_assisted takes them; likewise population.
+            population: a campaign under many conditions.
+            managers: names; empty: all that have real missions.
+            metrics: columns of runs.csv; empty: the usual ones.
+
+        Raises:
+            InputError: the missions do not belong together, or are too few.
+        """
+        from suave_des.results.assisted import compare_assisted
+
+        return compare_assisted(real, self, population, managers=managers, metrics=metrics)
+
     def figure(self, kind: str = "auto") -> Figure:
         """Draw the missions, as `suave-des figure` does.
 
@@ -139,8 +159,8 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
     for module in ("statsmodels", "lifelines"):
         statistics.library(module)
     groups, notes = grouped(missions, choices.get("managers", ()), choices.get("by", ()))
-    metrics = _metrics(choices.get("metrics", ()), groups)
-    half_widths = _half_widths(choices.get("half_widths", ()), metrics)
+    metrics = chosen_metrics(choices.get("metrics", ()), groups)
+    half_widths = read_half_widths(choices.get("half_widths", ()), metrics)
     pairs = _pairs(groups, choices.get("against"))
     unpaired, horizon_s = choices.get("unpaired", False), time_limit_s(groups)
     summaries = tuple(_summarise(group, metric, horizon_s) for metric in metrics for group in groups)
@@ -184,38 +204,6 @@ def _worse_paired(differences: Sequence[Difference]) -> Iterator[str]:
     ]
     if worse:
         yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
-
-
-def _metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
-    """Return the metrics to compare: those named, or those of the usual ones that at least one mission has."""
-    found = []
-    for name in dict.fromkeys(wanted or _USUAL):
-        metric = metric_of(name)
-        if metric is None:
-            remedy = did_you_mean(name, METRICS, "there are")
-            raise InputError(f"there is no metric {shown(name)}", place="metrics", remedy=remedy)
-        if any(len(group.known_values(name)) for group in groups):
-            found.append(metric)
-        elif wanted:
-            raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
-    return tuple(found)
-
-
-def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, float]:
-    """Read METRIC:HALF_WIDTH, for instance search_time_s:2."""
-    names = [metric.name for metric in metrics]
-    found = {}
-    for text in texts:
-        name, _, number = (part.strip() for part in text.partition(":"))
-        half_width = as_number(number)
-        if name not in names:
-            remedy = did_you_mean(name, names, "compared are")
-            raise InputError(f"{shown(name)} is not compared", place="half-width", remedy=remedy)
-        if not 0.0 < half_width < math.inf:
-            remedy = f"give METRIC:HALF_WIDTH with a number above 0, for instance {SEARCH_TIME}:2"
-            raise InputError(f"{shown(text)} has no half-width", place="half-width", remedy=remedy)
-        found[name] = half_width
-    return found
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from textwrap import fill
 from typing import Any
@@ -211,17 +211,17 @@ class Comparison:
 
     def text(self, width: int = 95) -> str:
         """Write the conclusions, the tables, and the methods, for a terminal of that width."""
-        parts = [_folded(self.conclusion, width)]
+        parts = [folded(self.conclusion, width)]
         sections = zip(self.sections(), self.sections(has_effects=False), strict=True)
         for (title, tables, conclusions), (_, narrow, _) in sections:
             for place, (table, other) in enumerate(zip(tables, narrow, strict=True)):
                 heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
                 parts.append(heading + (table if table.width() <= width else other).text(width))
             if conclusions:
-                parts.append("\n".join(_folded(f"- {each}", width) for each in conclusions))
+                parts.append("\n".join(folded(f"- {each}", width) for each in conclusions))
         if (needed := self.runs_needed()).rows:
             parts.append(f"runs of each manager that an interval of the difference needs\n{needed.text(width)}")
-        parts.append("\n".join(_folded(line, width) for line in self.remarks()))
+        parts.append("\n".join(folded(line, width) for line in self.remarks()))
         return "\n\n".join(parts) + "\n"
 
     def __str__(self) -> str:
@@ -292,18 +292,12 @@ class Comparison:
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-FORMS: Mapping[str, Callable[[Comparison], str]] = {
-    "csv": Comparison.csv,
-    "json": Comparison.json,
-    "markdown": Comparison.markdown,
-    "latex": Comparison.latex,
-}
-"""Writers by the name of their format."""
 ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
-"""Formats by the ending of a file's name."""
+"""Methods that write a comparison, by the ending of a file's name."""
 
 
-def _folded(text: str, width: int) -> str:
+def folded(text: str, width: int) -> str:
+    """Break a paragraph into lines for a terminal of that width."""
     return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
 
 

@@ -16,10 +16,12 @@ import pandas
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError, did_you_mean, number_of, shown
-from suave_des.records.metrics import DISTANCE, FOUND, SEARCH_TIME, Metric, metric_of
+from suave_des.files import as_number
+from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
 from suave_des.records.runs import COLUMNS, is_foreign, read_runs
 from suave_des.records.store import RUNS_FILE, STORE_FILE, check_one_campaign, read_manifest
 
+_USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
 SHARING = "runs_sharing_draw"
 """Column of missions, and attribute of a frame: how many runs in a row share their draws."""
 PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
@@ -28,7 +30,7 @@ _MOST_GROUPS = 60
 _MEMBER = "ensemble_member"
 """Column of runs.csv: the parameter set of a run."""
 _FEW = 20
-_SAME_LIMIT_S = 1.5
+SAME_LIMIT_S = 1.5
 """Programs write limits that differ by a second for the same one."""
 
 
@@ -364,6 +366,49 @@ def _short(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else printable(str(value))
 
 
+# What to compare
+
+
+def chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
+    """Return the metrics to compare: those named, or those of the usual ones that at least one mission has.
+
+    Raises:
+        InputError: there is no such metric, or no mission has it.
+    """
+    found = []
+    for name in dict.fromkeys(wanted or _USUAL):
+        metric = metric_of(name)
+        if metric is None:
+            remedy = did_you_mean(name, METRICS, "there are")
+            raise InputError(f"there is no metric {shown(name)}", place="metrics", remedy=remedy)
+        if any(len(group.known_values(name)) for group in groups):
+            found.append(metric)
+        elif wanted:
+            raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
+    return tuple(found)
+
+
+def read_half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, float]:
+    """Read METRIC:HALF_WIDTH, for instance search_time_s:2, by the metric.
+
+    Raises:
+        InputError: the metric is not compared, or the half-width is no number above 0.
+    """
+    names = [metric.name for metric in metrics]
+    found = {}
+    for text in texts:
+        name, _, number = (part.strip() for part in text.partition(":"))
+        half_width = as_number(number)
+        if name not in names:
+            remedy = did_you_mean(name, names, "compared are")
+            raise InputError(f"{shown(name)} is not compared", place="half-width", remedy=remedy)
+        if not 0.0 < half_width < math.inf:
+            remedy = f"give METRIC:HALF_WIDTH with a number above 0, for instance {SEARCH_TIME}:2"
+            raise InputError(f"{shown(text)} has no half-width", place="half-width", remedy=remedy)
+        found[name] = half_width
+    return found
+
+
 # Runs that share their draws
 
 
@@ -490,7 +535,7 @@ def _never_found(groups: Sequence[Group]) -> Iterator[str]:
             counts.append(f"{group.name} {int(lost.sum())} of {len(found)}")
             first_s, last_s = float(times_s[lost].min()), float(times_s[lost].max())
             ends_s[group.name] = float(np.median(times_s[lost]))
-            if last_s - first_s > _SAME_LIMIT_S:
+            if last_s - first_s > SAME_LIMIT_S:
                 early.append(f"{group.name} after {first_s:.0f} to {last_s:.0f} s")
         elif lost.any():
             counts.append(f"{group.name} {1.0 - np.nanmean(found):.1%}")
@@ -504,7 +549,7 @@ def _never_found(groups: Sequence[Group]) -> Iterator[str]:
         )
     elif counts:
         yield f"{ended}: a mean search time is the mean up to that limit, and would be longer without it"
-    if not early and ends_s and max(ends_s.values()) - min(ends_s.values()) > _SAME_LIMIT_S:
+    if not early and ends_s and max(ends_s.values()) - min(ends_s.values()) > SAME_LIMIT_S:
         limits = listed([f"{name} after {end_s:.0f} s" for name, end_s in ends_s.items()])
         yield (
             f"missions that never found the pipeline ended at different times ({limits}): means, differences and tests"

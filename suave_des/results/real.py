@@ -38,6 +38,8 @@ NUMBER_COLUMNS = (CONDITION, "block")
 _REMEDY = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
 _RELATIVE, _ABSOLUTE = 1e-3, 0.01
 """Data files give conditions rounded; values as near as this are the same."""
+_START_M = 0.25
+"""Starts under the same condition differ by no more, apart from a shift that all have."""
 _LISTED = 12
 _TOLERANCE = 1e-6
 """Places come from sums of steps; an interval must contain the values that it names."""
@@ -337,6 +339,44 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
         named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
         frame = frame.drop(columns=named).assign(**{CONDITION: np.concatenate(known)})
     return RealRuns(tuple(files), frame, tuple(notes))
+
+
+def matched(
+    real: pandas.DataFrame, simulated: pandas.DataFrame, names: Sequence[str]
+) -> tuple[pandas.DataFrame, pandas.DataFrame]:
+    """Return real and simulated missions with the numbers of their conditions, the points of a sweep.
+
+    Args:
+        real: a row for each; their conditions are found as by read_real.
+        simulated: a row for each, in the order of the points.
+        names: columns that are swept.
+
+    Raises:
+        InputError: nothing is swept, or the real missions are not of these conditions.
+    """
+    place = "real missions"
+    if not names:
+        remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
+        raise InputError("the missions are all of one condition", place="assisted by", remedy=remedy)
+    points = simulated[list(names)].drop_duplicates()
+    conditions = Conditions(tuple(names), tuple(points.itertuples(index=False, name=None)))
+    try:
+        numbers = conditions.numbers(real)
+    except InputError as error:
+        raise InputError(error.problem, place=place, remedy=error.remedy) from None
+    if numbers is None and (numbers := conditions.in_order(real["manager"])) is None:
+        problem = f"they do not say their conditions, which {len(conditions)} do not share evenly"
+        raise InputError(problem, place=place, remedy=f"add a column {CONDITION} with the number of each, from 1")
+    own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
+    real, simulated = real.assign(**{CONDITION: numbers}), simulated.assign(**{CONDITION: own})
+    for name in real.columns.intersection(simulated.columns).intersection(["initial_x_m", "initial_y_m"]):
+        off = real.groupby(CONDITION)[name].mean() - simulated.groupby(CONDITION)[name].mean()
+        if ((off - off.median()).abs() > _START_M).any():
+            worst = int((off - off.median()).abs().to_numpy().argmax())
+            problem = f"{name} is {off.iloc[worst]:+.2f} m from the simulated one under condition {off.index[worst]}"
+            remedy = f"under the others it is {off.median():+.2f} m: simulate the same conditions, in the same order"
+            raise InputError(problem, place=place, remedy=remedy)
+    return real, simulated
 
 
 def _numbered(file: Runs, conditions: Conditions) -> NDArray[np.int64] | None:

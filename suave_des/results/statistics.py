@@ -272,22 +272,24 @@ def holm(ps: Sequence[float]) -> list[float]:
     return [float(p) for p in adjusted]
 
 
-def runs_for(spread: float, half_width: float) -> int | None:
+def runs_for(spread: float, half_width: float, fixed: float = 0.0, least: int = 2) -> int | None:
     """Return how many runs make half the 95% interval of a mean that narrow.
 
     Args:
         spread: standard deviation of a run's value; of a difference of two means, the root of the sum of squares.
         half_width: wanted, above 0.
+        fixed: standard error of what is added to the mean and does not depend on the number of runs.
+        least: number of runs, 2 or more.
 
     Returns:
-        The least number, 2 or more; None for more than ten million.
+        The least number; None for more than ten million.
     """
 
     def suffices(runs: int) -> bool:
-        return t_quantile(runs - 1) * spread / math.sqrt(runs) <= half_width
+        return t_quantile(runs - 1) * math.hypot(spread / math.sqrt(runs), fixed) <= half_width
 
-    least = bisect_left(range(_MOST_RUNS + 1), True, lo=2, key=suffices)
-    return least if least <= _MOST_RUNS else None
+    found = bisect_left(range(_MOST_RUNS + 1), True, lo=least, key=suffices)
+    return found if found <= _MOST_RUNS else None
 
 
 # Distributions, and conclusions from small samples: what a validation asks

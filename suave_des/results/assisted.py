@@ -1,0 +1,462 @@
+"""Means of a few real missions, assisted by simulated ones under the same conditions and under many others.
+
+A mean of real missions is corrected by what the simulation says about the conditions in which they were made: real +
+weight * (population - same). This is prediction-powered inference (Angelopoulos et al. 2023; PPI++, arXiv:2311.01453)
+with conditions as clusters. It holds for a wrong simulation, too, whose error is measured under the same conditions.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+
+from suave_des.errors import InputError, did_you_mean, number_of
+from suave_des.estimates import STUDENT, Estimate, interval_names, t_quantile
+from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
+from suave_des.resources import find
+from suave_des.results import missions, statistics
+from suave_des.results.comparison import Difference, capital, folded
+from suave_des.results.conclusions import difference_claim
+from suave_des.results.missions import Missions
+from suave_des.results.real import CONDITION, matched
+from suave_des.results.statistics import Sample
+from suave_des.tables import Table, markdown_text
+
+Source = pandas.DataFrame | str | Path | Sequence[Path]
+"""Missions: a data frame with the columns of runs.csv, or folders and files as of compare_folders."""
+LEAST_CONDITIONS = 3
+LEAST_TO_WEIGH = 10
+"""Conditions from which on the weight is estimated: with fewer, its own error costs more than it gains."""
+DEVIATIONS = "planta_exp1_deviations.csv"
+"""How far the real missions of 2025 are from simulated ones, in scenarios/published."""
+_NOTICEABLE = 0.1
+"""Least weight, and least gain of an interval's width, with which the simulation is said to help."""
+_RUNS_EACH = (1, 5)
+"""Runs under each condition that plans are made for: the fewest missions, and the exemplar's usual random_interval."""
+
+
+def assisted_mean(
+    real: Sample, same: Sample, population: Sample, chance: Sequence[float] = (0.0, 0.0, 0.0), shared: float = 0.0
+) -> tuple[Estimate, float]:
+    """Estimate the mean over a population of conditions from real missions under a few of them.
+
+    Args:
+        real: mean of the real missions under each condition, shape (conditions,).
+        same: mean of the simulated missions under the same conditions, in the same order.
+        population: mean of the simulated missions under each of many other conditions, shape (draws,).
+        chance: variances that these means have by chance within a condition: real, same, population.
+        shared: variance of the mean of `same` by random numbers that its conditions share.
+
+    Returns:
+        The mean, with its interval by Student's t over the conditions, and the weight of the simulation, from 0 to 1.
+        From LEAST_TO_WEIGH conditions on, the weight is that of PPI++. With fewer it is 1, or 0 where that makes the
+        interval narrower; and what the conditions show of their variance is not taken to be less than what follows from
+        chance and, for a weight of 0, from how the population varies: few conditions may be alike by accident.
+    """
+    n, draws, is_weighed = len(real), len(population), len(real) >= LEAST_TO_WEIGH
+    spread = float(population.var(ddof=1))
+
+    def variance(weight: float) -> float:
+        between = 0.0 if is_weighed else (1.0 - weight) ** 2 * max(0.0, spread - chance[2])
+        seen = float((real - weight * same).var(ddof=1))
+        return max(seen, between + chance[0] + weight**2 * chance[1]) / n + weight**2 * (spread / draws + shared)
+
+    if is_weighed:
+        both = float(np.concatenate([same, population]).var(ddof=1))
+        covariance = float(np.mean((real - real.mean()) * (same - same.mean())))
+        weight = min(max(covariance / ((1.0 + n / draws) * both), 0.0), 1.0) if both else 0.0
+    else:
+        weight = float(variance(1.0) <= variance(0.0))
+    mean = float(real.mean() + weight * (population.mean() - same.mean()))
+    half = t_quantile(n - 1 - is_weighed) * math.sqrt(variance(weight)) or math.nan
+    return Estimate(mean, mean - half, mean + half, STUDENT), weight
+
+
+@dataclass(frozen=True)
+class AssistedComparison:
+    """What real missions show, alone and assisted by simulated ones; or a plan of real missions.
+
+        found = compare_assisted("real.csv", "same", "population")
+        print(found.conclusions[0])
+        found.estimates[["group", "other", "assisted", "narrower"]]
+
+    Attributes:
+        estimates: a row for each metric and manager, or pair of managers: group, other (whose mean is subtracted, or
+            empty), metric, runs (real missions of the group), conditions, alone and assisted (means with the ends of
+            their intervals), weight, narrower (how many times as wide the interval of the real missions alone is),
+            equal_runs (real missions, as many in each condition, that would give the assisted interval), helps, and
+            conclusion.
+        plan: a row for each metric, manager and number of runs in each condition: half_width, runs_each, conditions and
+            runs that it takes, and runs_alone, without the simulation; none: over ten million, or the population has
+            too few draws.
+        notes: what a reader should know about the data.
+        metrics: that are compared.
+        conditions: means, variances and numbers of real and simulated missions by metric, manager and condition.
+    """
+
+    estimates: pandas.DataFrame
+    plan: pandas.DataFrame
+    notes: tuple[str, ...]
+    metrics: tuple[Metric, ...] = field(repr=False)
+    conditions: pandas.DataFrame = field(repr=False, default_factory=pandas.DataFrame)
+
+    @property
+    def conclusions(self) -> list[str]:
+        """A sentence for each estimate."""
+        return list(self.estimates.get("conclusion", ()))
+
+    def tables(self) -> Iterator[Table]:
+        """Yield a table for each metric, and one of the plan."""
+        headings = ("mean", "n", "alone", "95% interval", "assisted", "95% interval", "weight", "equals")
+        for metric in self.metrics if len(self.estimates) else ():
+            own = self.estimates[self.estimates["metric"] == metric.name]
+            yield Table(headings, [_cells(row, metric) for row in own.to_dict("records")], capital(metric.heading))
+        if len(self.plan):
+            headings_of_plan = ("manager", "half-width", "runs in each", "conditions", "real runs", "not assisted")
+            by_name = {metric.name: metric for metric in self.metrics}
+            rows = [_plan_cells(row, by_name[row["metric"]]) for row in self.plan.to_dict("records")]
+            yield Table(headings_of_plan, rows, "Real missions needed", "ll")
+
+    def remarks(self) -> list[str]:
+        """Describe the numbers, and what to know about the data."""
+        how = (
+            "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
+            "equals: real missions that would give the assisted interval alone, as many in each condition as now.",
+        )
+        return [*(how if len(self.estimates) else ()), *(f"Note: {note}." for note in self.notes)]
+
+    def text(self, width: int = 95) -> str:
+        """Write tables, conclusions and notes for a terminal of that width."""
+        parts = [f"{table.title}\n{table.text(width)}" for table in self.tables()]
+        parts.append("\n".join(folded(f"- {each}", width) for each in self.conclusions))
+        return "\n\n".join(filter(None, [*parts, "\n".join(folded(line, width) for line in self.remarks())])) + "\n"
+
+    def __str__(self) -> str:
+        """Return all of it as text."""
+        return self.text()
+
+    def markdown(self) -> str:
+        """Write the same for a page."""
+        parts = [f"### {table.title}\n\n{table.markdown()}" for table in self.tables()]
+        parts.append("\n".join(f"- {markdown_text(each)}" for each in self.conclusions))
+        return "\n\n".join(filter(None, [*parts, *map(markdown_text, self.remarks())])) + "\n"
+
+    def latex(self) -> str:
+        """Write the tables for LaTeX with booktabs."""
+        remarks = [f"% {line}" for line in self.remarks()]
+        return "\n".join([r"% needs \usepackage{booktabs}", *remarks, *(each.latex() for each in self.tables())]) + "\n"
+
+    def csv(self) -> str:
+        """Write the estimates as CSV; without any, the plan."""
+        frame = self.estimates if len(self.estimates) else self.plan
+        return frame.to_csv(index=False, lineterminator="\n")
+
+    def json(self) -> str:
+        """Write all of it; numbers with all their digits, null where there is none."""
+        rows = {name: json.loads(getattr(self, name).to_json(orient="records")) for name in ("estimates", "plan")}
+        return json.dumps({"notes": self.notes, **rows}, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _estimate_in(row: Mapping[Any, Any], name: str) -> Estimate:
+    value, low, high = (math.nan if row[each] is None else row[each] for each in (name, *interval_names(name)))
+    return Estimate(value, low, high)
+
+
+def _cells(row: Mapping[Any, Any], metric: Metric) -> tuple[str, ...]:
+    cells = []
+    for found in (_estimate_in(row, "alone"), _estimate_in(row, "assisted")):
+        cells += [metric.number(found.value), found.text(f".{metric.interval_decimals}f", metric.scale)]
+    name = f"{row['group']} - {row['other']}" if row["other"] else row["group"]
+    equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] == row["equal_runs"] else ""
+    return name, f"{row['runs']} in {row['conditions']}", *cells, f"{row['weight']:.2f}", equal
+
+
+def _plan_cells(row: Mapping[Any, Any], metric: Metric) -> tuple[str, ...]:
+    counts = (row[name] for name in ("runs_each", "conditions", "runs", "runs_alone"))
+    cells = ("not reached" if math.isnan(count) else f"{count:,.0f}" for count in counts)
+    return row["manager"], f"{metric.title} ±{metric.scale * row['half_width']:g}", *cells
+
+
+# What is compared
+
+
+def _read(source: Source) -> Missions:
+    if isinstance(source, pandas.DataFrame):
+        return missions.missions_of(source)
+    return missions.read_missions([Path(source)] if isinstance(source, str | Path) else list(source))
+
+
+def compare_assisted(
+    real: Source,
+    same: Source,
+    population: Source,
+    *,
+    managers: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+    half_widths: Sequence[str] = (),
+) -> AssistedComparison:
+    """Estimate each manager's means, and the differences between managers, from real missions and simulated ones.
+
+    A mission that never found the pipeline counts with the time limit as its search time.
+
+    Args:
+        real: real missions in a few conditions, which are those of `same`: by columns named like what it sweeps, by a
+            column `condition` with numbers from 1, or by order.
+        same: a campaign that sweeps the conditions of the real missions.
+        population: a campaign under many conditions, drawn as those of the real missions were.
+        managers: names; empty: all that have real missions.
+        metrics: columns of runs.csv; empty: search time and distance inspected.
+        half_widths: METRIC:HALF_WIDTH of intervals for which a plan is made, with the deviations seen here.
+
+    Raises:
+        InputError: results cannot be read, do not belong together, or are too few.
+    """
+    ours, theirs, many = _read(real), _read(same), _read(population)
+    groups, notes = missions.grouped(replace(ours, frame=ours.frame.assign(source="")), managers, averages=False)
+    chosen = missions.chosen_metrics(metrics or PAPER_METRICS, groups)
+    wanted = missions.read_half_widths(half_widths, chosen)
+    names = [group.name for group in groups]
+    frames = [pandas.concat([group.frame for group in groups]), theirs.frame, many.frame]
+    horizon_s = _check(dict(zip(("real missions", "assisted by", "population"), frames, strict=True)), names, chosen)
+    in_real, in_same = matched(frames[0], theirs.frame, theirs.swept)
+    notes += [*missions.caveats(groups, chosen), *_unlike(theirs, many.frame)]
+    drawn, rows, parts = _with_draws(many), [], []
+    for metric in chosen:
+        tables = _tables({"real": in_real, "same": in_same, "draw": drawn}, metric.name, horizon_s)
+        of_conditions = {name: table.stack() for name, table in tables.items() if not name.startswith("draw")}
+        parts.append(pandas.DataFrame(of_conditions).dropna(subset=["real", "same"]).assign(metric=metric.name))
+        shared = _shared(in_same, metric.name, horizon_s)
+        for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
+            rows.append(_estimate(both, metric, tables, shared))
+    conditions, estimates = pandas.concat(parts).reset_index(), pandas.DataFrame(rows)
+    plan = pandas.DataFrame(_plan(drawn, wanted, deviations(conditions), names, horizon_s) if wanted else ())
+    all_notes = (*ours.notes, *theirs.notes, *many.notes, *notes)
+    return AssistedComparison(estimates, plan, all_notes, chosen, conditions)
+
+
+def _check(frames: Mapping[str, pandas.DataFrame], names: Sequence[str], metrics: Sequence[Metric]) -> float:
+    """Check that missions belong together, and return the time limit of all; infinite if none is known.
+
+    Raises:
+        InputError: they lack a manager or a metric, have a number that is none, or differ in their time limits.
+    """
+    limits_s: list[float] = []
+    for place, frame in frames.items():
+        for name in names:
+            if name not in set(frame["manager"]):
+                remedy = did_you_mean(name, dict.fromkeys(frame["manager"]), "there are")
+                raise InputError(f"there is no mission of {name}", place=place, remedy=remedy)
+        for metric in metrics:
+            values = frame[metric.name].to_numpy(float) if metric.name in frame else np.array([math.nan])
+            if np.isinf(values).any() or np.isnan(values).all() or (metric.half_width > 1.0 and np.isnan(values).any()):
+                problem = f"{metric.name} has a value that is no number, or no value at all"
+                raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
+        lost_s = frame.loc[frame[FOUND] == 0.0, SEARCH_TIME]
+        lasted_s = frame.get("mission_duration_s", frame[FOUND] * math.nan)  # real missions may not say it
+        limit_s = float(lost_s.max() if len(lost_s) else lasted_s.max())
+        if abs(limit_s - min(limits_s, default=limit_s)) > missions.SAME_LIMIT_S:
+            problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
+            raise InputError(problem, place=place, remedy="give missions with one time limit")
+        limits_s += [] if math.isnan(limit_s) else [limit_s]
+    return math.floor(min(limits_s)) if limits_s else math.inf
+
+
+def _with_draws(population: Missions) -> pandas.DataFrame:
+    """Return simulated missions with the number of their draw, which several runs may share.
+
+    Raises:
+        InputError: they are of a sweep.
+    """
+    if population.swept:
+        problem = f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
+        raise InputError(problem, place="population", remedy="draw the conditions, as perturbations")
+    frame = population.frame
+    drawn = frame.assign(draw=missions.first_alike(frame, missions.runs_sharing_draw(frame)))
+    return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
+
+
+def _unlike(same: Missions, population: pandas.DataFrame) -> Iterator[str]:
+    """Say where the population cannot be what the conditions of the real missions were drawn from."""
+    for name in same.swept:
+        if same.frame[name].nunique() > 1 and (name not in population or population[name].nunique() < 2):
+            yield f"the population does not vary {name}, in which the conditions of the real missions differ"
+        elif name in population and pandas.api.types.is_numeric_dtype(population[name]):
+            low, high = population[name].min(), population[name].max()
+            if outside := [f"{value:g}" for value in same.frame[name].unique() if not low <= value <= high]:
+                are = f"{low:.4g} to {high:.4g} in the population, and {missions.listed(outside)} for real missions"
+                yield f"{name} is {are}: they do not seem to be drawn from it"
+
+
+# Estimates
+
+
+def _values(frame: pandas.DataFrame, metric: str, horizon_s: float) -> pandas.Series[float]:
+    """Return the values of a metric; search times up to the horizon."""
+    values = frame[metric].astype(float)
+    return values.clip(upper=horizon_s) if metric == SEARCH_TIME else values
+
+
+def _tables(frames: Mapping[str, pandas.DataFrame], metric: str, horizon_s: float) -> dict[str, pandas.DataFrame]:
+    """Return mean (side), variance (side_var) and number (side_n) of missions: conditions or draws by managers."""
+    found: dict[str, pandas.DataFrame] = {}
+    for side, frame in frames.items():
+        by = frame.assign(value=_values(frame, metric, horizon_s)).groupby(
+            ["draw" if side == "draw" else CONDITION, "manager"], observed=True
+        )["value"]
+        found |= {side: by.mean().unstack(), f"{side}_var": by.var().unstack(), f"{side}_n": by.count().unstack()}
+    return found
+
+
+def _shared(same: pandas.DataFrame, metric: str, horizon_s: float) -> pandas.DataFrame:
+    """Return by run and manager how far simulated missions are on average from the mean of their condition.
+
+    Points of a sweep share a run's random numbers, so that the means of all conditions may be off by the same chance.
+    """
+    known = same.assign(off=_values(same, metric, horizon_s))
+    known["off"] -= known.groupby(["manager", CONDITION], observed=True)["off"].transform("mean")
+    return known.groupby(["seed", "run", "manager"], observed=True)["off"].mean().unstack("manager")
+
+
+def _estimate(
+    both: list[str], metric: Metric, tables: Mapping[str, pandas.DataFrame], shared: pandas.DataFrame
+) -> dict[str, Any]:
+    """Estimate the mean of one manager, or the difference of two, over the conditions that both have.
+
+    Raises:
+        InputError: there are too few conditions, simulated missions in one of them, or draws.
+    """
+    known = tables["real"].reindex(columns=both).notna() & tables["same"].reindex(columns=both).notna()
+    common = known.index[known.all(axis=1)]
+    own = {name: tables[name].reindex(columns=both).reindex(common) for name in tables if not name.startswith("draw")}
+    draws, of_runs = (each.reindex(columns=both).dropna() for each in (tables["draw"], shared))
+    for number, least, of, remedy in (
+        (len(common), LEAST_CONDITIONS, "condition", "how they differ gives the interval"),
+        (int(own["same_n"].min().min()) if len(common) else 2, 2, "simulated mission", "in each condition, better 20"),
+        (len(draws), LEAST_TO_WEIGH, "draw", "in the population, better some hundred"),
+    ):
+        if number < least:
+            problem = f"{metric.title} of {' - '.join(both)}: there {'is' if number == 1 else 'are'}"
+            remedy = f"at least {least} are needed: {remedy}"
+            raise InputError(f"{problem} {number_of(number, of)}", remedy=remedy)
+    signs = np.array([1.0, -1.0][: len(both)])
+    real, same, drawn = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
+    sizes = own["real_n"], own["same_n"], float(tables["draw_n"].mean().mean())
+    chance = [float((own["same_var"] / size).mean().sum()) for size in sizes]
+    in_common = float((of_runs.to_numpy() @ signs).var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
+    alone = statistics.mean_interval(real)
+    assisted, weight = assisted_mean(real, same, drawn, chance, in_common)
+    if metric.name == FOUND:
+        alone, assisted = (each.cut(1.0 - len(both), 1.0) for each in (alone, assisted))
+    half, runs = (assisted.high - assisted.low) / 2.0, int(own["real_n"][both[0]].sum())
+    narrower = (alone.high - alone.low) / 2.0 / half
+    needed = statistics.runs_for(float(real.std(ddof=1)), half) if half > 0.0 else None
+    row = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name, "runs": runs, "conditions": len(common)}
+    row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight, "narrower": narrower}
+    row["equal_runs"] = math.nan if needed is None else round(needed * runs / len(common))
+    row["helps"] = weight >= _NOTICEABLE and narrower >= 1.0 + _NOTICEABLE
+    return row | {"conclusion": _conclusion(row, metric)}
+
+
+def _conclusion(row: Mapping[str, Any], metric: Metric) -> str:
+    """Write what an estimate shows, and whether the simulation helped."""
+    found, group, other = _estimate_in(row, "assisted"), row["group"], row["other"]
+    missions_in = f"from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
+    is_shown = bool(other) and found.has_interval and not found.contains(0.0)
+    if is_shown:
+        claim = difference_claim(Difference(group, other, metric.name, True, "", 0, 0, found), metric)
+        found = found if found.value > 0.0 else -found
+    else:
+        claim = f"{metric.title} of {group}{other and f' - {other}'}: {metric.amount(found.value)}"
+    claim += f" (95% interval {found.text(f'.{metric.interval_decimals}f', metric.scale) or 'not known'})"
+    if not row["helps"]:
+        return f"{claim} {missions_in}; the simulation does not help."
+    equal = f", as that of {row['equal_runs']:,} real missions alone" if row["equal_runs"] == row["equal_runs"] else ""
+    return f"{claim} {missions_in}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
+
+
+# Plans
+
+
+def deviations(conditions: pandas.DataFrame) -> pandas.DataFrame:
+    """Return how far real missions are from simulated ones under the same conditions.
+
+    Args:
+        conditions: as of AssistedComparison.
+
+    Returns:
+        A row for each manager and metric: manager, metric, conditions, runs, deviation_mean and deviation_std (real -
+        simulated, between conditions, without the chance within), chance_std (of a real mission within a condition).
+    """
+    rows = []
+    for (metric, manager), part in conditions.groupby(["metric", "manager"], sort=False, observed=True):
+        off, within = part["real"] - part["same"], part["real_var"].fillna(part["same_var"])
+        chance = float((within / part["real_n"] + part["same_var"] / part["same_n"]).mean())
+        row = {"manager": manager, "metric": metric, "conditions": len(part), "runs": int(part["real_n"].sum())}
+        row |= {"deviation_mean": off.mean(), "deviation_std": math.sqrt(max(0.0, float(off.var()) - chance))}
+        rows.append(row | {"chance_std": math.sqrt(float(within.mean()))})
+    return pandas.DataFrame(rows)
+
+
+def planned(
+    population: Source,
+    half_widths: Sequence[str],
+    *,
+    managers: Sequence[str] = (),
+    seen: pandas.DataFrame | None = None,
+) -> AssistedComparison:
+    """Plan real missions: how many are needed under how many conditions, with the simulation's help and without.
+
+    Args:
+        population: a campaign under many conditions, drawn as those of the real missions will be.
+        half_widths: METRIC:HALF_WIDTH of the intervals that the means are to have.
+        managers: names; empty: all of the campaign.
+        seen: how far real missions are from simulated ones, as of deviations; None: as those of 2025 (exp1) are.
+
+    Raises:
+        InputError: results cannot be read, or a name is not there.
+    """
+    many = _read(population)
+    groups, notes = missions.grouped(many, managers, averages=False)
+    metrics = missions.chosen_metrics([text.partition(":")[0].strip() for text in half_widths], groups)
+    wanted, names = missions.read_half_widths(half_widths, metrics), [group.name for group in groups]
+    if seen is None:
+        seen = pandas.read_csv(find(DEVIATIONS, "scenarios/published"))
+        notes.append("real missions are taken to be as far from simulated ones as those of 2025 (exp1) are")
+    known = set(zip(seen["manager"], seen["metric"], strict=True))
+    lacking = [f"{metric} of {name}" for metric in wanted for name in names if (name, metric) not in known]
+    if lacking:
+        notes.append(f"how far real missions are from simulated ones is not known for {missions.listed(lacking)}")
+    rows = pandas.DataFrame(_plan(_with_draws(many), wanted, seen, names, missions.time_limit_s(groups)))
+    return AssistedComparison(pandas.DataFrame(), rows, (*many.notes, *notes), metrics)
+
+
+def _plan(
+    drawn: pandas.DataFrame,
+    wanted: Mapping[str, float],
+    seen: pandas.DataFrame,
+    managers: Sequence[str],
+    horizon_s: float,
+) -> Iterator[dict[str, Any]]:
+    for row in seen[seen["metric"].isin(list(wanted)) & seen["manager"].isin(managers)].to_dict("records"):
+        tables = _tables({"draw": drawn[drawn["manager"] == row["manager"]]}, row["metric"], horizon_s)
+        means, half_width, chance = tables["draw"].iloc[:, 0], wanted[row["metric"]], row["chance_std"] ** 2
+        between = max(0.0, float(means.var()) - chance / float(tables["draw_n"].mean().iloc[0]))
+        for each in _RUNS_EACH:
+            spread, fixed = (
+                math.hypot(row["deviation_std"], math.sqrt(chance / each)),
+                math.sqrt(float(means.var()) / len(means)),
+            )
+            assisted = statistics.runs_for(spread, half_width, fixed, LEAST_CONDITIONS) or math.nan
+            spread = math.sqrt(between + chance / each)
+            alone = statistics.runs_for(spread, half_width, least=LEAST_CONDITIONS) or math.nan
+            counts = {"conditions": assisted, "runs": each * assisted, "runs_alone": each * alone}
+            names = {"manager": row["manager"], "metric": row["metric"], "half_width": half_width, "runs_each": each}
+            yield names | counts

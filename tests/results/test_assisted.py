@@ -1,0 +1,274 @@
+"""Real missions assisted by simulated ones: the estimator, what it is given, and how often its intervals hold."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.errors import InputError
+from suave_des.results.assisted import AssistedComparison, assisted_mean, compare_assisted, deviations, planned
+from suave_des.results.compare import CampaignFrame
+from suave_des.results.figures import draw_assisted
+from tests.helpers.command import command_here
+
+REAL = Path(__file__).parents[2] / "scenarios" / "published" / "planta_exp1_runs.csv"
+
+
+def missions(
+    seed: int, conditions: np.ndarray, runs: int, shift_s: float = 0.0, noise_s: float = 2.0, managers: str = "ab"
+) -> pandas.DataFrame:
+    """Missions of managers whose search takes 60 s more for each metre of start.y_m; the second's 10 s more."""
+    chance = np.random.default_rng(seed)
+    rows = [
+        {
+            "manager": manager,
+            "scenario": "s",
+            "run": run,
+            "seed": seed,
+            "start.y_m": y_m,
+            "search_time_s": 60.0 * y_m + 10.0 * (manager == "b") + shift_s + noise_s * chance.normal(),
+            "distance_inspected_m": 20.0 * y_m + noise_s * chance.normal(),
+            "pipeline_found": True,
+            "mission_duration_s": 300.0,
+        }
+        for manager in managers
+        for y_m in conditions
+        for run in range(1, runs + 1)
+    ]
+    return pandas.DataFrame(rows)
+
+
+def population(seed: int = 3, draws: int = 200, **changed: float) -> pandas.DataFrame:
+    conditions = np.random.default_rng(seed).uniform(1.0, 3.0, draws)
+    frame = missions(seed, conditions, 1, **changed)
+    return frame.assign(run=frame.groupby("manager").cumcount() + 1)
+
+
+POINTS = np.array([1.1, 1.4, 1.9, 2.1, 2.2, 2.9])
+
+
+def real_missions(runs: int, shift_s: float = 0.0, points: np.ndarray = POINTS) -> pandas.DataFrame:
+    return missions(1, points, runs, shift_s).drop(columns=["run", "seed"])
+
+
+def compared(**changed: pandas.DataFrame) -> AssistedComparison:
+    given = {"real": real_missions(2, 25.0), "same": missions(2, POINTS, 5), "population": population()} | changed
+    return compare_assisted(given["real"], given["same"], given["population"])
+
+
+# The estimator
+
+
+def test_the_mean_is_that_of_ppi_python() -> None:
+    real = np.array([52.0, 118, 83, 61, 97, 130, 75, 88, 143, 69, 110, 92])
+    same = np.array([55.0, 121, 80, 57, 101, 127, 79, 93, 136, 66, 113, 99])
+    many = np.array([50.0, 64, 71, 83, 88, 95, 104, 110, 116, 125, 133, 140, 59, 77, 92, 101, 120, 86, 98, 107])
+    # ppi_mean_pointestimate of ppi-python 0.2.3, for this and for a simulation that is hardly of use
+    found, weight = assisted_mean(real, same, many)
+    assert found.value == pytest.approx(94.54777428140198, abs=1e-9)
+    assert weight == pytest.approx(0.6792332531485169, abs=1e-9)
+    noise = np.array([30.0, -40, 22, -28, 35, -31, -18, 44, -25, 39, -33, 11])
+    assert assisted_mean(real, same + noise, many)[0].value == pytest.approx(93.51167902, abs=1e-8)
+
+
+def test_with_few_conditions_the_simulation_counts_fully_or_not_at_all() -> None:
+    real, many = np.array([52.0, 118, 83]), np.linspace(50.0, 140.0, 200)
+    found, weight = assisted_mean(real, real + 4.0 + np.array([1.0, -1.0, 0.0]), many)
+    assert weight == 1.0
+    assert found.value == pytest.approx(many.mean() - 4.0)
+    off, weight = assisted_mean(real, np.array([190.0, 60.0, 100.0]), many)
+    assert weight == 0.0
+    assert off.value == pytest.approx(real.mean())
+
+
+def test_deviations_that_happen_to_be_equal_are_not_taken_for_certain() -> None:
+    real, many = np.array([52.0, 118, 83]), np.linspace(50.0, 140.0, 10_000)
+    narrow, _ = assisted_mean(real, real + 4.0, many)
+    wide, _ = assisted_mean(real, real + 4.0, many, (9.0, 3.0, 3.0), 2.0)
+    assert narrow.high - narrow.low < 3.0
+    variance = 12.0 / 3 + many.var(ddof=1) / 10_000 + 2.0
+    assert wide.high - wide.low == pytest.approx(2 * 4.302653 * math.sqrt(variance), 1e-6)
+
+
+@pytest.mark.parametrize("shift_s", [0.0, 40.0])
+@pytest.mark.parametrize("n", [3, 6, 30])
+def test_intervals_hold_the_truth_also_of_a_biased_simulation(n: int, shift_s: float) -> None:
+    chance, covered = np.random.default_rng(n), 0
+    for _ in range(200):
+        at = chance.choice([50.0, 120.0, 130.0], n)
+        real = at + chance.normal(0.0, 6.0, n) + shift_s
+        many = chance.choice([50.0, 120.0, 130.0], 400) + chance.normal(0.0, 3.0, 400)
+        found, _ = assisted_mean(real, at + chance.normal(0.0, 2.0, n), many, (9.0, 4.0, 9.0))
+        covered += found.contains(100.0 + shift_s)
+    assert covered / 200 >= 0.92
+
+
+# Comparisons
+
+
+def test_a_comparison_corrects_what_the_conditions_do() -> None:
+    found = compared()
+    by_name = found.estimates.set_index(["metric", "group", "other"])
+    row = by_name.loc[("search_time_s", "a", "")]
+    assert (row["runs"], row["conditions"], row["weight"]) == (12, 6, 1.0)
+    truth_s = 60.0 * 2.0 + 25.0
+    assert row["assisted_ci95_low"] < truth_s < row["assisted_ci95_high"]
+    assert row["narrower"] > 3.0 and row["equal_runs"] > 60
+    difference = by_name.loc[("search_time_s", "a", "b")]
+    assert difference["assisted"] == pytest.approx(-10.0, abs=3.0)
+    assert any(text.startswith("a finds the pipeline") and "sooner than b" in text for text in found.conclusions)
+    assert [note.split(" are ")[0] for note in found.notes] == ["the fewest runs of one of them"]
+
+
+def test_all_forms_say_the_same(tmp_path: Path) -> None:
+    found = compared()
+    value = f"{found.estimates['assisted'][0]:.2f}"
+    assert all(value in text for text in (str(found), found.markdown(), found.latex()))
+    assert json.loads(found.json())["estimates"][0]["assisted"] == pytest.approx(found.estimates["assisted"][0])
+    assert len(found.csv().splitlines()) == 1 + len(found.estimates) == 7
+    assert max(map(len, str(found).splitlines())) <= 95
+    draw_assisted(found).savefig(tmp_path / "figure.png", dpi=40)
+
+
+def test_a_simulation_that_does_not_help_is_said_not_to() -> None:
+    chance = np.random.default_rng(1)
+    same = missions(2, POINTS, 5).assign(search_time_s=chance.uniform(50.0, 250.0, 60))
+    found = compared(same=same)
+    first = found.estimates.iloc[0]
+    assert not first["helps"]
+    assert "the simulation does not help" in first["conclusion"]
+
+
+def test_conditions_are_found_by_number_and_by_order() -> None:
+    real = real_missions(2, 25.0)
+    numbered = real.assign(condition=np.repeat([1, 2, 3, 4, 5, 6] * 2, 2)).drop(columns="start.y_m")
+    expected = compared().estimates
+    for other in (numbered, numbered.drop(columns="condition")):
+        pandas.testing.assert_frame_equal(compared(real=other).estimates, expected)
+
+
+def test_missions_that_never_found_the_pipeline_count_with_the_limit() -> None:
+    real, same = real_missions(2), missions(2, POINTS, 5)
+    for frame, end_s in ((real, 301.0), (same, 300.0)):
+        frame.loc[0, ["search_time_s", "pipeline_found"]] = [end_s, False]
+    found = compared(real=real, same=same)
+    first = found.conditions[found.conditions["condition"] == 1].iloc[0]
+    assert first["real"] == pytest.approx((300.0 + real["search_time_s"][1]) / 2)
+    assert any("never found the pipeline (a 1 of 12" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"real": real_missions(2, points=POINTS + 9.0)}, "no condition of the campaign has start.y_m=10.1"),
+        ({"same": missions(2, POINTS, 1)}, "there is 1 simulated mission"),
+        ({"same": missions(2, POINTS[:1], 5)}, "all of one condition"),
+        ({"real": real_missions(2, points=POINTS[:2])}, "there are 2 conditions"),
+        ({"population": population(draws=5)}, "there are 5 draws"),
+        ({"population": missions(2, POINTS, 5)}, "it sweeps start.y_m"),
+        ({"population": population().assign(search_time_s=math.nan)}, "search_time_s has a value that is no number"),
+        ({"same": missions(2, POINTS, 5).assign(distance_inspected_m=math.inf)}, "distance_inspected_m has a value"),
+        ({"same": missions(2, POINTS, 5, managers="a")}, "there is no mission of b"),
+        ({"population": population().assign(mission_duration_s=400.0)}, "missions end after 400 s, others after 300 s"),
+        ({"real": real_missions(3).drop(columns="start.y_m")[:-1]}, "6 do not share evenly"),
+        ({"real": real_missions(1).assign(condition=7).drop(columns="start.y_m")}, "there is no condition 7"),
+    ],
+)
+def test_what_does_not_belong_together(changed: dict[str, pandas.DataFrame], text: str) -> None:
+    with pytest.raises(InputError) as raised:
+        compared(**changed)
+    assert text in str(raised.value) and raised.value.remedy
+
+
+def test_other_starts_are_other_conditions() -> None:
+    real, same = real_missions(2), missions(2, POINTS, 5)
+    same["initial_y_m"] = same["start.y_m"] + 0.4
+    in_order = real.assign(initial_y_m=real["start.y_m"]).drop(columns="start.y_m")
+    assert compared(real=in_order, same=same).estimates["conditions"].eq(6).all()
+    turned = in_order.iloc[::-1].sort_values("manager", kind="stable")
+    with pytest.raises(InputError, match=r"initial_y_m is .* from the simulated one"):
+        compared(real=turned, same=same)
+
+
+def test_a_population_of_other_conditions_is_noticed() -> None:
+    notes = compared(population=population().assign(**{"start.y_m": 2.0})).notes
+    assert any("does not vary start.y_m" in note for note in notes)
+    frame = population()
+    notes = compared(population=frame[frame["start.y_m"] < 2.5]).notes
+    assert any("in the population, and 2.9 for real missions" in note for note in notes)
+
+
+def test_runs_that_share_a_draw_are_one_draw() -> None:
+    frame = population(draws=50)
+    four = pandas.concat([frame.assign(run=4 * (frame["run"] - 1) + each) for each in (1, 2, 3, 4)])
+    four.attrs["runs_sharing_draw"] = 4
+    once, often = (compared(population=each).estimates.query("other == ''") for each in (frame, four))
+    assert often["assisted_ci95_high"].to_numpy() == pytest.approx(once["assisted_ci95_high"].to_numpy())
+
+
+# Plans
+
+
+def test_a_plan_needs_fewer_missions_with_the_simulation() -> None:
+    seen = deviations(compared().conditions)
+    row = seen[(seen["manager"] == "a") & (seen["metric"] == "search_time_s")].iloc[0]
+    assert row["deviation_mean"] == pytest.approx(25.0, abs=2.0)
+    assert row["chance_std"] == pytest.approx(2.0, abs=1.0)
+    plan = planned(population(), ["search_time_s:5"], seen=seen).plan
+    assert (plan["runs"] < plan["runs_alone"]).all()
+    assert (plan["runs"] == plan["runs_each"] * plan["conditions"]).all()
+    unreachable = planned(population(draws=20), ["search_time_s:0.5"], seen=seen)
+    assert unreachable.plan["runs"].isna().all() and "not reached" in str(unreachable)
+
+
+def test_plans_rest_on_the_deviations_of_2025_and_say_so() -> None:
+    frame = population().replace({"manager": {"a": "metacontrol", "b": "mine"}})
+    found = planned(frame, ["search_time_s:5"])
+    assert found.plan["manager"].eq("metacontrol").all()
+    assert [each.split(" ")[0] for each in found.notes] == ["real", "how"]
+    assert "search_time_s of mine" in found.notes[1]
+    with pytest.raises(InputError, match="there is no metric"):
+        planned(frame, ["serach_time_s:5"])
+
+
+# From files
+
+
+@pytest.fixture(scope="module")
+def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("assisted")
+    run_campaign("planta_exp1_campaign", ["none", "bt"], 2, 1, out=folder / "same")
+    drawn = {"start.y_m": {"distribution": "uniform", "minimum": 2.0, "maximum": 3.0}}
+    shift = {"distribution": "uniform", "minimum": 0.0, "maximum": 200.0, "shared": "shift"}
+    drawn |= {f"thruster_events.{place}.time_s": shift for place in (0, 1)}
+    run_campaign("planta_exp1", ["none", "bt"], 40, 1, out=folder / "population", perturbations=drawn)
+    return folder
+
+
+def test_the_command(campaigns: Path) -> None:
+    assisted = ["compare", str(REAL), "--managers", "none,bt", "--assisted-by", "same"]
+    both = [*assisted, "--population", "population"]
+    shown = command_here(*both, "--plan", "search_time_s:8", cwd=campaigns)
+    assert shown.returncode == 0
+    assert "30 in 6" in shown.stdout and "Real missions needed" in shown.stdout
+    for name in ("found.png", "found.tex"):
+        assert command_here(*both, "--out", name, cwd=campaigns).returncode == 0
+        assert (campaigns / name).stat().st_size > 1000
+    half = command_here(*assisted, cwd=campaigns)
+    assert half.returncode == 2 and "without --population" in half.stderr
+    plan = command_here("compare", "population", "--plan", "search_time_s:8", "--managers", "bt", cwd=campaigns)
+    assert plan.returncode == 0 and "those of 2025" in plan.stdout
+
+
+def test_a_frame_assists_as_the_folder_does(campaigns: Path) -> None:
+    given = REAL, campaigns / "population", ["none", "bt"]
+    frame = CampaignFrame(pandas.read_csv(campaigns / "same" / "runs.csv"))
+    found = frame.assist(*given)
+    expected = compare_assisted(given[0], campaigns / "same", given[1], managers=given[2])
+    pandas.testing.assert_frame_equal(found.estimates, expected.estimates)
