@@ -126,7 +126,7 @@ def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tm
     [
         (
             ["--data", "missing.csv"],
-            "missing.csv: no such file (give a path, or one of the shipped files: planta_exp1_runs.csv, s",
+            "missing.csv: no such file (give a path, or one of the shipped files: planta_exp1",
         ),
         (["--data", "unknown.csv"], "unknown.csv: line 2: there is no manager 'magic'"),
         (["--data", "columns.csv"], "columns.csv: line 1: has no column"),
