@@ -97,14 +97,17 @@ class Table:
             lines.append(f"| {' | '.join(map(markdown_text, cells))} |")
         return "\n".join(lines)
 
-    def latex(self, over: Sequence[str] = ()) -> str:
+    def latex(self, over: Sequence[str] = (), *, label: str = "", note: str = "") -> str:
         """Write the table for LaTeX with booktabs, its title as caption.
 
         Args:
             over: headings over as many columns each, all but the first.
+            label: for references; empty: none.
+            note: text below the table.
         """
         columns = len(self.headings)
         lines = [r"\begin{table}", r"  \centering", rf"  \caption{{{latex_text(self.title)}}}"]
+        lines += [rf"  \label{{{label}}}"] if label else []
         lines += [rf"  \begin{{tabular}}{{{self._alignment}}}", r"    \toprule"]
         if over:
             each = (columns - 1) // len(over)
@@ -121,7 +124,8 @@ class Table:
                 lines += [r"    \midrule", rf"    \multicolumn{{{columns}}}{{l}}{{{latex_text(row[0])}}} \\"]
             else:
                 lines.append(f"    {' & '.join([latex_text(row[0]), *map(_latex_number, row[1:])])} \\\\")
-        return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", r"\end{table}"])
+        below = [rf"  \par\smallskip\footnotesize {latex_text(note)}"] if note else []
+        return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", *below, r"\end{table}"])
 
     def csv(self) -> str:
         """Write the table as CSV."""

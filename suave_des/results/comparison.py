@@ -256,15 +256,18 @@ class Comparison:
                     by_group.setdefault(each.group, [each.group]).extend(cells)
         means = Table(("Manager", *("Mean", "Std") * len(metrics)), list(by_group.values()), self._sizes())
         lines = [r"% needs \usepackage{booktabs}", *(f"% Note: {note}." for note in self.notes)]
-        lines.append(means.latex([capital(metric.heading) for metric in metrics]))
+        lines.append(means.latex([capital(metric.heading) for metric in metrics], label="tab:means"))
         if self.differences:
             rows: list[tuple[str, ...]] = []
             for metric in self.metrics:
                 rows.append((capital(metric.heading),))
-                cells_of = (_difference_row(each, metric) for each in self.differences if each.metric == metric.name)
+                tested = (each for each in self.differences if each.metric == metric.name and each.test)
+                cells_of = (_difference_row(each, metric) for each in tested)
                 rows += [(name, mean, interval, effect, p) for name, _, mean, interval, _, p, effect in cells_of]
             headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
-            lines.append(Table(headings, rows, " ".join(self.methods())).latex().replace("p (Holm)", "$p$ (Holm)"))
+            table = Table(headings, rows, "Differences between managers.")
+            text = table.latex(label="tab:differences", note=" ".join(self.methods()))
+            lines.append(text.replace("p (Holm)", "$p$ (Holm)"))
         return "\n".join(lines) + "\n"
 
     def _sizes(self) -> str:

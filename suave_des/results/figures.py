@@ -38,7 +38,7 @@ def _rainclouds(groups: Sequence[Group]) -> Figure:
 
 CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
     "distributions": campaign_figures.draw_distributions,
-    "raincloud": _rainclouds,
+    "raincloud": lambda groups: campaign_figures.draw_rainclouds(groups, {}),
     "detections": campaign_figures.draw_detections,
     "convergence": campaign_figures.draw_convergence,
     "reactions": campaign_figures.draw_reactions,
@@ -168,7 +168,10 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     if name not in CAMPAIGN_KINDS:
         raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
     groups = grouped(missions, averages=name == _OF_MEANS)[0]
-    figure = CAMPAIGN_KINDS[name](groups)
+    is_published = (
+        name == "raincloud" and not missions.swept
+    )  # real missions belong beside those of their scenario only
+    figure = _rainclouds(groups) if is_published else CAMPAIGN_KINDS[name](groups)
     if missions.swept:
         shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)

@@ -81,8 +81,11 @@ _SETTINGS: Any = {
 
 
 def looks(names: Sequence[str]) -> list[int]:
-    """Return for each manager the number of its look, which `line`, `marker` and `hatch` take."""
-    others = count(len(_KNOWN_MANAGERS) if set(names).intersection(_KNOWN_MANAGERS) else 0)
+    """Return for each manager the number of its look, which `line`, `marker` and `hatch` take.
+
+    Those of the exemplar keep theirs whoever is shown, and no other manager has one of these.
+    """
+    others = count(len(_KNOWN_MANAGERS))
     return [_KNOWN_MANAGERS.index(name) if name in _KNOWN_MANAGERS else next(others) for name in names]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import pandas
@@ -106,6 +107,16 @@ def test_real_missions_are_not_averaged_like_the_campaign_beside_them(
     assert published.mean.value == pytest.approx(real["search_time_s"].mean())
     assert published.horizon_s > 0.0 and math.isnan(simulated.horizon_s)
     assert any("(runs_per_draw) of simulated are averaged" in note for note in comparison.notes)
+
+
+def test_missions_of_draws_without_run_numbers_are_not_averaged_like_numbered_ones(
+    of_draws: Path, tmp_path: Path
+) -> None:
+    lacking = tmp_path / "lacking"
+    shutil.copytree(of_draws, lacking)
+    pandas.read_csv(lacking / "runs.csv").assign(run="").to_csv(lacking / "runs.csv", index=False)
+    comparison = compare_folders([lacking, of_draws], metrics=["search_time_s"])
+    assert [each.n for each in comparison.summaries] == [20, 4]
 
 
 def test_further_metrics_are_not_what_was_swept(tmp_path: Path) -> None:
