@@ -1,6 +1,8 @@
 """suave-des replay and report: what they take, and what they say where they cannot."""
 
 import json
+import re
+from importlib.resources import files
 
 import pytest
 
@@ -118,3 +120,19 @@ def test_report_says_what_is_wrong(content, told, tmp_path, capsys):
     assert status("report", tmp_path) == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize("ground", ["card", "paper"])
+@pytest.mark.parametrize("theme", [":root {", ':root[data-theme="dark"] {'])
+def test_text_stands_out_from_its_ground(theme, ground):
+    style = files("suave_des").joinpath("pages", "assets", "common.css").read_text(encoding="utf-8")
+    found = re.findall(r"--(\w+): #([0-9a-f]{6})", style[style.index(theme) :].partition("}")[0])
+
+    def luminance(name):  # as WCAG 2.2 defines it
+        parts = (part / 255.0 for part in bytes.fromhex(dict(found)[name]))
+        linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+        return sum(share * part for share, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+    for text in ("ink", "soft", "faint", "accent", "good", "bad", "warm"):
+        dark, bright = sorted((luminance(text), luminance(ground)))
+        assert (bright + 0.05) / (dark + 0.05) >= 4.5, text
