@@ -431,20 +431,13 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Read a campaign's manifest.json; empty without one.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: it cannot be read, or is of another campaign than the missions that are kept beside it.
     """
     path = folder / MANIFEST_FILE
     found = read_json(path) if path.exists() else None
-    return found if isinstance(found, dict) else {}
-
-
-def check_one_campaign(folder: Path) -> None:
-    """Check that the result files of a folder are of the campaign whose missions are kept in it, as far as both say so.
-
-    Raises:
-        InputError: they are of another campaign.
-    """
-    written, kept = read_manifest(folder).get("campaign_sha256"), stored_identity(folder)
+    manifest = found if isinstance(found, dict) else {}
+    written, kept = manifest.get("campaign_sha256"), stored_identity(folder)
     if written is not None and kept is not None and written != kept:
         remedy = f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
         raise InputError(f"{RUNS_FILE} and {STORE_FILE} are of different campaigns", file=folder, remedy=remedy)
+    return manifest

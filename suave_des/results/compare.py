@@ -78,7 +78,8 @@ def compare_folders(paths: Sequence[Path], **choices: Unpack[Choices]) -> Compar
     Raises:
         InputError: results cannot be read, a name is not in them, or an extra is not installed.
     """
-    return compare(read_missions(paths), **choices)
+    missions = read_missions(paths)
+    return compare(missions, **choices)
 
 
 def compare_frame(frame: pandas.DataFrame, **choices: Unpack[Choices]) -> Comparison:

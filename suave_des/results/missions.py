@@ -19,7 +19,7 @@ from suave_des.errors import InputError, did_you_mean, number_of, shown
 from suave_des.files import as_number
 from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
 from suave_des.records.runs import COLUMNS, is_foreign, read_runs
-from suave_des.records.store import RUNS_FILE, STORE_FILE, check_one_campaign, read_manifest
+from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
 
 _USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
 SHARING = "runs_sharing_draw"
@@ -126,10 +126,9 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
 
 
 def _read_source(path: Path) -> Missions:
+    manifest = read_manifest(path if path.is_dir() else path.parent)
     if not path.is_dir():
-        return _read_file(path, read_manifest(path.parent))
-    manifest = read_manifest(path)
-    check_one_campaign(path)
+        return _read_file(path, manifest)
     if (path / RUNS_FILE).exists():
         found = _read_file(path / RUNS_FILE, manifest)
         frame = found.frame.assign(**{SHARING: _sharing(manifest)})
