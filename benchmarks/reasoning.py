@@ -27,7 +27,6 @@ from typing import Any
 
 from suave_des.kb import KnowledgeBase
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.java import make_archive
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
@@ -207,7 +206,6 @@ def measure(count: int, seed: int) -> dict[str, Any]:
     with empty_memory() as folder:
         load_s = seconds(Ontology.load)
         summaries = measure_backends(kb, count, draw)
-        make_archive()
         first = {name: first_inference_s(name) for name in ("pellet", "cached")}
         assert any((folder / "inferences").iterdir())  # or the last two of the three had no cached inference
     filled_s, states = policy_s()

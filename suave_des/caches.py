@@ -1,7 +1,7 @@
 """The user's cache folder, for what can be made again, and files in it that are checked before use.
 
-`inferences/` has what Pellet inferred, `numba/` machine code, `java/` an archive of Pellet's classes, `findings/` what
-`kb check` found. Each may be deleted at any time.
+`inferences/` has what Pellet inferred, `numba/` machine code, `findings/` what `kb check` found.
+Each may be deleted at any time.
 """
 
 from __future__ import annotations

@@ -19,8 +19,6 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from suave_des.caches import private_cache
-from suave_des.knowledge.pellet.java import archive_path
-from tests.helpers.java_archive import share_java_archive
 from tests.helpers.quick_workers import _warm_process, quick_campaigns, quick_workers
 
 __all__ = ["_warm_process", "quick_campaigns", "quick_workers"]
@@ -36,17 +34,14 @@ importlib.metadata.version = functools.cache(importlib.metadata.version)
 gc.disable()
 _searched_without = 0
 
-# Machine code and Java's archive are the same for all: they are kept where they always are, so that each run of the
-# tests need not make them anew. So are compiled modules, whatever the environment says: hundreds of processes start.
+# Machine code is the same for all: it is kept where it always is, so that each run of the tests need not make it
+# anew. So are compiled modules, whatever the environment says: hundreds of processes start.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(private_cache("numba")))
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-users_archive: Path | None = None
 users_environment = dict(os.environ)
 if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
-    users_archive = archive_path()
     os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
-    share_java_archive(Path(os.environ["SUAVE_DES_CACHE_DIR"]), users_archive)
 
 os.environ.pop("COLUMNS", None)  # which several test processes at once are given, as if there were a terminal
 
@@ -58,7 +53,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def pytest_xdist_setupnodes(config: pytest.Config, specs: list[object]) -> None:
     """In a new checkout or environment, make once what each process would make otherwise, or do without.
 
-    That is compiled modules, machine code of inner loops, and Java's archive.
+    That is compiled modules, and machine code of inner loops.
     """
     if len(specs) < 2:
         return
@@ -66,14 +61,11 @@ def pytest_xdist_setupnodes(config: pytest.Config, specs: list[object]) -> None:
     programs = []
     if not all(Path(cache_from_source(source)).exists() for source in sources):
         programs += [("-m", "tests.helpers.warm_worker"), ("-m", "pytest", "--collect-only", "-n", "0", *config.args)]
-    if users_archive is not None and not users_archive.exists():
-        programs.append(("-c", "from suave_des.knowledge.pellet.java import make_archive; make_archive()"))
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": users_environment}
     for process in [
         subprocess.Popen([sys.executable, *program], cwd=Path(__file__).parents[1], **silent) for program in programs
     ]:
         process.wait()
-    share_java_archive(Path(os.environ["SUAVE_DES_CACHE_DIR"]), users_archive)
 
 
 def pytest_collection_finish() -> None:

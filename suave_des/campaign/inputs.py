@@ -14,6 +14,7 @@ import logging
 import platform
 import sys
 import sysconfig
+from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -148,6 +149,15 @@ def check_campaign(campaign: Campaign) -> dict[str, str]:
     with _located(campaign.file):
         check_drawn(campaign.loaded, campaign.variation)
     given = any(spec.replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
+    points = sorted(set(campaign.variation.sweep.each_value()))
+    useless = Counter(
+        words
+        for point in points
+        for words in campaign.variation.scenario(campaign.loaded, point).scenario.without_effect()
+    )
+    for words, number in useless.items():
+        where = f", at {number} of {len(points)} swept values" if len(points) > 1 else ""
+        logging.getLogger(MISTAKES_LOGGER).warning("note: %s%s", words, where)
     return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, given=given)}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import operator
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -32,6 +31,7 @@ from suave_des.knowledge.rdf import (
     is_fact,
     local_name,
     namespace,
+    number_in,
     reached,
     value_of,
 )
@@ -296,40 +296,43 @@ def expectations(content: Content, model: Model) -> dict[str, dict[str, Decimal]
     return {name: dict(sorted(expected.items())) for name, expected in found.items()}
 
 
-def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
-    """Check that numbers are decimals, operators known, and functional properties have one value each.
+def wrong_values(triples: Iterable[Triple]) -> Iterator[tuple[str, str, str]]:
+    """Find numbers that are no decimals, unknown operators, and functional properties with several values.
 
     A reasoner would not explain the first two. Of two values that an ontology asserts for one functional data
     property Pellet silently keeps the one that it read last.
 
-    Raises:
-        KnowledgeError: with the file and line of the individual.
+    Yields:
+        the IRI of the individual, what is wrong, and what would be right.
     """
-    functional = {s for s, p, o in content.triples if p == RDF_TYPE and o == OWL + "FunctionalProperty"}
-    names = Names(content.triples)
+    triples = tuple(triples)
+    functional = {s for s, p, o in triples if p == RDF_TYPE and o == OWL + "FunctionalProperty"}
+    names = Names(triples)
     seen: dict[tuple[str, str], Value] = {}
-    for subject, predicate, value in content.triples:
-        shown = value.text if isinstance(value, Lit) else value
-        if predicate == HAS_VALUE and not _is_decimal(value):
-            raise wrong_in(subject, sources, f"hasValue {shown!r} is not an xsd:decimal", "a number such as 2.25")
+    for subject, predicate, value in triples:
+        shown, datatype = value if isinstance(value, Lit) else (value, "")
+        if predicate == HAS_VALUE and (number_in(value) is None or datatype not in EXACT):
+            but = f" but an xsd:{local_name(datatype)}" if datatype not in (*EXACT, "") else ""
+            yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
         if predicate == QA_OPERATOR and shown not in OPERATORS:
-            problem = f"qa_comparison_operator {shown!r} is unknown"
-            raise wrong_in(subject, sources, problem, f"one of {' '.join(OPERATORS)}")
+            yield subject, f"qa_comparison_operator {shown!r} is unknown", f"one of {' '.join(OPERATORS)}"
         if predicate in functional and isinstance(value, Lit):
             one = value_of(value, names)
             other = seen.setdefault((subject, predicate), one)
             if one != other:
-                name = local_name(predicate)
-                problem = f"contradiction: the functional property {name} has the values {other} and {one}"
-                raise wrong_in(subject, sources, problem, "keep one of them")
+                values = f"the values {other} and {one}"
+                problem = f"contradiction: the functional property {local_name(predicate)} has {values}"
+                yield subject, problem, "keep one of them"
 
 
-def _is_decimal(value: str | Lit) -> bool:
-    return (
-        isinstance(value, Lit)
-        and value.datatype in EXACT
-        and re.fullmatch(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)\s*", value.text, re.ASCII) is not None
-    )
+def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
+    """Check the values of individuals, as wrong_values does.
+
+    Raises:
+        KnowledgeError: with the file and line of the individual.
+    """
+    for subject, problem, remedy in wrong_values(content.triples):
+        raise wrong_in(subject, sources, problem, remedy)
 
 
 def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:

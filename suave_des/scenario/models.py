@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from importlib.metadata import entry_points
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
@@ -45,6 +46,7 @@ from suave_des.scenario.quantities import (
     Strict,
     Within,
     mean,
+    support,
     wrong,
 )
 from suave_des.scenario.revision import Revision
@@ -382,6 +384,31 @@ class Scenario(Strict):
                 (*MISSION_FUNCTIONS, *own.mission_wide, *own.search_pipeline, *own.inspect_pipeline, *surface)
             )
         )
+
+    def without_effect(self) -> Iterator[str]:
+        """Yield what changes no mission, and why, in words: a failure that comes too early, or what comes too late."""
+        monitors, earliest_s, latest_s = self.revision.monitors, 0.0, 0.0
+        had_failure, effective_s = False, self.revision.thruster_failures.effective_from_s
+        times_s: dict[str, float] = {}
+        for number, event in enumerate(self.thruster_events):
+            low_s, high_s = (max(0.0, bound) for bound in support(event.time_s))
+            if monitors.thruster_event_times == "after_previous":
+                low_s, high_s = low_s + earliest_s, high_s + latest_s
+            earliest_s = max(earliest_s, low_s)
+            latest_s = max(latest_s, high_s) + monitors.thruster_check_period_s
+            times_s[f"thruster_events.{number}"] = earliest_s
+            if event.event == "failure" and not had_failure:
+                had_failure = True
+                if latest_s <= effective_s:
+                    key = "revision.thruster_failures.effective_from_s"
+                    yield f"thruster_events.{number}: the first failure has no effect before {effective_s:g} s ({key})"
+        later = {f"signals.{name}": each.time_s for name, each in self.signals.items() if each.kind == "step"}
+        later |= {} if self.leak is None else {"leak": self.leak.time_s}
+        times_s |= {key: support(time_s)[0] for key, time_s in later.items()}
+        for key, time_s in times_s.items():
+            if time_s >= self.mission.time_limit_s:
+                limit = f"mission.time_limit_s is {self.mission.time_limit_s:g} s"
+                yield f"{key}: {time_s:g} s is after the end of each mission ({limit})"
 
     def reasoning_share(self) -> float:
         """Share of the time in which metacontrol's reasoner runs: one inference in each of its periods."""

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import suave_des
-from tests.helpers.java_archive import share_java_archive
 
 _TELLS_WHAT_IT_OPENS = """
 import os, sys
@@ -49,7 +48,6 @@ class Cluster:
         hooks = folder / "hooks"
         hooks.mkdir(parents=True)
         (hooks / "sitecustomize.py").write_text(_TELLS_WHAT_IT_OPENS)
-        share_java_archive(folder / ".cache" / "suave-des")
         own = {
             name: value
             for name, value in os.environ.items()

@@ -57,6 +57,25 @@ def test_the_model(tmp_path: Path) -> None:
     assert only(findings, "qa_empty: isQAtype: a QAvalue must be of exactly one").line is not None
 
 
+def test_a_number_of_another_datatype_is_an_error_each_but_a_whole_number_is_a_decimal(tmp_path: Path) -> None:
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path = tmp_path / "mine.owl"
+    path.write_text(text.replace('#decimal">1.0<', '#double">1.0<').replace('#decimal">0.5<', '#integer">1<'))
+    assert [each.message.partition(": ")[2] for each in errors(findings_of(Subject([path])))] == [
+        "hasValue '1.0' is not an xsd:decimal but an xsd:double"
+    ] * text.count('#decimal">1.0<')
+
+
+def test_a_quality_attribute_that_is_not_declared_or_twice(tmp_path: Path) -> None:
+    measured = individual("qa_current", "QAvalue", link("isQAtype", "water_current"))
+    unknown = only(found(tmp_path, extra=measured), "isQAtype water_current is not defined")
+    assert (unknown.level, unknown.remedy) == (Level.ERROR, "declare a QualityAttributeType of this name")
+    twice = '<owl:NamedIndividual rdf:about="http://ros/mros#performance">'
+    twice += f'<rdf:type rdf:resource="{TOMASYS}QualityAttributeType"/></owl:NamedIndividual>'
+    again = only(found(tmp_path, extra=twice), "declares the quality attribute type performance, and so does")
+    assert again.level is Level.WARN
+
+
 UNDEFINED = {
     "class": (
         "tomasys#FunctionDesign",

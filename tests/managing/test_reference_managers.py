@@ -66,6 +66,13 @@ def test_oracle_changes_modes_at_the_moment_of_the_true_crossing() -> None:
     assert high_s[0] == 0.0 and crossed_s[0] - 2.0 < high_s[1] <= crossed_s[0]
 
 
+def test_oracle_sees_that_a_threshold_itself_is_reached() -> None:
+    step = {"kind": "step", "time_s": 20.0, "before": 3.0, "after": 3.25}
+    events = run_mission("seams2023", "oracle", 1, 1, values={"signals.water_visibility": step}).events
+    (high_s,) = [each.t_s for each in events if each.detail == "f_generate_search_path = fd_spiral_high"]
+    assert high_s == pytest.approx(20.0)
+
+
 def test_oracle_takes_no_time_to_recover_a_thruster() -> None:
     events = run_mission("seams2023", "oracle", 1, 1).events
     failed_s = next(each.t_s for each in events if each.event == "component_status")

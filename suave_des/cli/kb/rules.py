@@ -57,13 +57,16 @@ def check(
 
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
-    from suave_des.findings import Level, has_level, summary
+    from suave_des.findings import Finding, Level, has_level, ordered, summary
     from suave_des.kb.check import check as run_checks
     from suave_des.scenario.loader import load_scenario
+    from suave_des.scenario.yamlfile import shown_name
     from suave_des.scenario_knowledge import subject_of
 
     loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
     findings = run_checks(replace(subject_of(loaded), shapes=shapes or (), time_limit_s=time_limit))
+    useless = (Finding(Level.WARN, words, shown_name(loaded.path)) for words in loaded.scenario.without_effect())
+    findings = ordered([*findings, *useless])
     if form is FindingsFormat.MARKDOWN:
         print(*_markdown(findings), "", summary(findings), sep="\n")
     else:

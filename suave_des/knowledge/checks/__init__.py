@@ -11,7 +11,7 @@ from suave_des.knowledge.checks.model import check_revision
 from suave_des.knowledge.checks.registry import Material, Scope, Subject, run_checks
 from suave_des.knowledge.checks.rules import findings_on_rule
 from suave_des.knowledge.content import merge, with_rules
-from suave_des.knowledge.model import build_model, check_values, with_operators
+from suave_des.knowledge.model import build_model, with_operators
 from suave_des.knowledge.ontology_file import OntologyFile, enumerated_texts
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.checks import Vocabulary, about_rule
@@ -32,10 +32,6 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
     """
     content = merge(sources, subject.values)
     findings: list[Finding] = []
-    try:
-        check_values(content, sources)
-    except KnowledgeError as error:
-        findings.append(Finding.of(error))
     try:
         model, _ = build_model(content, sources)
     except KnowledgeError as error:

@@ -11,12 +11,14 @@ from collections.abc import Collection, Iterator
 from itertools import chain
 from typing import Final
 
+from rdflib import URIRef
+
 from suave_des.domain import DEFAULT_MODE, UNGROUND_MODE
 from suave_des.errors import KnowledgeError, nearest
 from suave_des.findings import Level
 from suave_des.knowledge.checks.registry import Found, Material, Scope, check
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.model import OPERATORS, Model, assumption
+from suave_des.knowledge.model import OPERATORS, Model, assumption, wrong_values
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import is_metamodel
 from suave_des.knowledge.rdf import (
@@ -46,6 +48,14 @@ _ABOUT_CLASSES: Final = frozenset(
     (RDFS + "subClassOf", RDFS + "domain", RDFS + "range", OWL + "equivalentClass", OWL + "disjointWith")
 )
 _PROPERTIES: Final = ("object property", "data property", "annotation property")
+_ATTRIBUTE: Final = TOMASYS + "QualityAttributeType"
+
+
+@check(Level.ERROR, Scope.MODEL)
+def values(material: Material) -> Iterator[Found]:
+    """Find the values that no state can be compared with, or that contradict one another."""
+    for subject, problem, remedy in wrong_values((*material.content.triples, *material.model.triples())):
+        yield local_name(subject), None, f"{local_name(subject)}: {problem}", remedy
 
 
 @check(Level.ERROR, Scope.MODEL)
@@ -55,7 +65,9 @@ def undefined_names(material: Material) -> Iterator[Found]:
     Only those of the ontologies' own namespaces: names of other vocabularies may be defined elsewhere.
     """
     kinds, triples = material.vocabulary.kinds, material.content.triples
-    described = {subject for subject, _, _ in triples} | {each.iri for each in material.model.individuals()}
+    of_states = {each.iri for each in material.model.individuals()}
+    described = {subject for subject, _, _ in triples} | of_states
+    kinds_of = Kinds(material.content, material.model)
     namespaces = {namespace(iri) for iri in described}
     assumed = {(material.model.attributes[name], QA_OPERATOR) for name in material.assumed}
     for subject, predicate, value in triples:
@@ -72,11 +84,21 @@ def undefined_names(material: Material) -> Iterator[Found]:
                 used = local_name(predicate), str(value), ("individual",)
         if used is not None and namespace(used[1]) in namespaces:
             words, name, meant = used
-            known = [iri for iri in described if kinds.get(iri, frozenset()) & {*meant}]
+            wanted_kind = kinds_of.wanted.get((predicate, 1)) if meant == ("individual",) else None
+            known = [iri for iri in described - of_states if kinds.get(iri, frozenset()) & {*meant}]
+            known = [iri for iri in known if wanted_kind is None or wanted_kind in kinds_of.of[iri]]
             same = sorted(iri for iri in known if local_name(iri) == local_name(name))
             remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
+            if remedy is None and wanted_kind is not None:
+                remedy = f"declare {with_article(wanted_kind)} of this name"
             problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
             yield local_name(subject), None, problem, remedy
+
+
+def with_article(iri: str) -> str:
+    """Write the name of a class with its article."""
+    name = local_name(iri)
+    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
 
 
 def _designs(material: Material, function: str) -> set[str]:
@@ -159,6 +181,17 @@ def without_operator(content: Content, model: Model, measured: Collection[str]) 
     compared = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
     expected = frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
     return sorted(name for name in expected.intersection(measured) if model.attributes[name] not in compared)
+
+
+@check(Level.WARN, Scope.MODEL)
+def attributes_declared_twice(material: Material) -> Iterator[Found]:
+    """Find the quality attribute types that several files declare: what each of them says of one holds."""
+    for name, iri in material.model.attributes.items():
+        declared = (URIRef(iri), URIRef(RDF_TYPE), URIRef(_ATTRIBUTE))
+        paths = [each.path for each in material.sources if declared in each.graph]
+        for path in paths[:-1]:
+            problem = f"declares the quality attribute type {name}, and so does {paths[-1]}"
+            yield path, None, problem, "declare it in one of them"
 
 
 @check(Level.INFO, Scope.MISSIONS)

@@ -19,6 +19,7 @@ from suave_des.knowledge.checks.model import (
     rules_of_2023,
     undeclared_differences,
     unmeasured_rules,
+    with_article,
 )
 from suave_des.knowledge.checks.registry import Found, Material, Scope, Subject, check, run_checks
 from suave_des.knowledge.ontology import Ontology
@@ -144,12 +145,6 @@ def _use(atom: Atom, kinds: Kinds) -> str | None:
     if value is None:
         return f"{name} is a property of {with_article(subject)}"
     return f"{name} leads from {with_article(subject)} to {with_article(value)}"
-
-
-def with_article(iri: str) -> str:
-    """Write the name of a class with its article."""
-    name = local_name(iri)
-    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
 
 
 @check(Level.WARN, Scope.RULES)

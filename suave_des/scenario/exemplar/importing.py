@@ -545,6 +545,8 @@ def _perturbations(
     for number, key in enumerate(DRAWN):
         low, high = getattr(runner.settings, key.name)
         if (low, high) == (0.0, 0.0):
+            if key.name in runner.parameters:
+                notes.append(f"{runner.parameters[key.name].place}: nothing is drawn from [0, 0]")
             continue
         path = key.path.removeprefix(PERTURBED)
         paths = [path]
