@@ -325,16 +325,6 @@ def wrong_values(triples: Iterable[Triple]) -> Iterator[tuple[str, str, str]]:
                 yield subject, problem, "keep one of them"
 
 
-def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
-    """Check the values of individuals, as wrong_values does.
-
-    Raises:
-        KnowledgeError: with the file and line of the individual.
-    """
-    for subject, problem, remedy in wrong_values(content.triples):
-        raise wrong_in(subject, sources, problem, remedy)
-
-
 def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
     """Return an error on an individual, with the file and line where it is described."""
     name = local_name(subject)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
@@ -11,12 +12,20 @@ from pathlib import Path
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
-from suave_des.knowledge.model import Model, assumption, build_model, check_values, expectations, with_operators
+from suave_des.knowledge.model import (
+    Model,
+    assumption,
+    build_model,
+    expectations,
+    with_operators,
+    wrong_in,
+    wrong_values,
+)
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
 from suave_des.knowledge.rdf import Names, Triple, facts_of
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.checks import Vocabulary, check_property_use
-from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
+from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.state import Fact, KnowledgeState
 from suave_des.resources import shipped_folder
 
@@ -38,7 +47,8 @@ class Ontology:
         model: the functions, designs, components and quality attributes.
         vocabulary: the names that rules may use.
         sources: the ontology files with their graphs.
-        assumptions: what was added to the ontologies, in words.
+        stated: all triples of the files, those that only states assert among them.
+        assumed: the comparison operators that were added to the ontologies, by quality attribute type.
     """
 
     files: tuple[Path, ...]
@@ -48,7 +58,8 @@ class Ontology:
     model: Model = field(repr=False)
     vocabulary: Vocabulary = field(repr=False)
     sources: tuple[OntologyFile, ...] = field(repr=False)
-    assumptions: tuple[str, ...]
+    stated: tuple[Triple, ...] = field(repr=False)
+    assumed: Mapping[str, str]
 
     @classmethod
     def load(
@@ -75,26 +86,49 @@ class Ontology:
             RuleError: a rule as text cannot be read or used.
         """
         sources = collect([Path(path) for path in ontologies] or [shipped_folder("ontology") / "suave.owl"])
-        merged = merge(sources, dict(values or {}))
-        check_values(merged, sources)
-        names = Names(merged.triples)
+        files = [RulesFile.read(Path(path)) for path in rules]
+        base = cls.merged(sources, files, RulesFile.rules, values or {}, disabled_rules, operators or {})
+        for subject, problem, remedy in wrong_values(base.stated):
+            raise wrong_in(subject, sources, problem, remedy)
+        check_property_use(base.stated, base.content.enabled_rules)
+        return base
+
+    @classmethod
+    def merged(
+        cls,
+        sources: Sequence[OntologyFile],
+        files: Sequence[RulesFile],
+        usable: Callable[[RulesFile, Vocabulary], Sequence[Rule]],
+        values: Mapping[str, Decimal],
+        disabled_rules: Collection[str],
+        operators: Mapping[str, str],
+    ) -> Ontology:
+        """Merge files that have been read; values and property use are not checked.
+
+        Args:
+            sources: the ontologies with their imports.
+            files: of rules as text.
+            usable: gives those rules of a file that can be used.
+            values, disabled_rules, operators: as of load.
+
+        Raises:
+            KnowledgeError: two things share a name, a value names no QAvalue, or there is no such rule to disable.
+        """
+        merged = merge(sources, values)
         model, content = build_model(merged, sources)
-        content, added = with_operators(content, model, operators or {})
+        content, assumed = with_operators(content, model, operators)
         individuals = (individual.iri for individual in model.individuals())
         vocabulary = Vocabulary.of(merged.triples, individuals, enumerated_texts(sources))
-        files = [RulesFile.read(Path(path)) for path in rules]
-        content = with_rules(content, [file.rules(vocabulary) for file in files], disabled_rules)
-        check_property_use(merged.triples, content.enabled_rules)
-        digest = _content_hash(sources, values or {}, added)
         return cls(
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
-            content_hash=hash_with_rules(digest, [file.text for file in files], disabled_rules),
-            content=content,
-            names=names,
+            content_hash=_content_hash(sources, values, assumed, files, disabled_rules),
+            content=with_rules(content, [usable(file, vocabulary) for file in files], disabled_rules),
+            names=Names(merged.triples),
             model=model,
             vocabulary=vocabulary,
-            sources=sources,
-            assumptions=tuple(assumption(name, sign) for name, sign in added.items()),
+            sources=tuple(sources),
+            stated=merged.triples,
+            assumed=assumed,
         )
 
     def with_rules(self, rules: Iterable[Rule]) -> Ontology:
@@ -109,7 +143,12 @@ class Ontology:
         """Return the ontology with different triples, in which the model is found again."""
         whole = replace(self.content, triples=(*triples, *self.model.triples()))
         model, content = build_model(whole, self.sources)
-        return replace(self, content=content, model=model, names=Names(whole.triples))
+        return replace(self, content=content, model=model, names=Names(whole.triples), stated=whole.triples)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What was added to the ontologies, in words."""
+        return tuple(assumption(name, sign) for name, sign in self.assumed.items())
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -168,34 +207,34 @@ class Ontology:
         """The facts of the ontologies and of a state."""
         return self.facts.union(facts_of(self.assertions(state), self.names))
 
+    def unsolved(self, functions: Iterable[str]) -> Iterator[tuple[str, str, str]]:
+        """Yield those functions that are not there or have no design: name, what is wrong, what would be right."""
+        for name in sorted(functions):
+            if name not in self.model.functions:
+                remedy = f"functions in the ontology: {', '.join(self.functions) or 'none'}"
+                yield name, f"there is no function {name}, which the mission needs", remedy
+            elif not self.designs(name):
+                remedy = f"add an individual of FunctionDesign with solvesF {name}"
+                yield name, f"function {name} has no function design", remedy
+
     def check(self, functions: Collection[str]) -> None:
         """Check that the mission's functions have function designs.
 
         Raises:
             KnowledgeError: there is no such function, or no function design for it.
         """
-        where = ", ".join(map(str, self.files))
-        for function in sorted(functions):
-            if function not in self.model.functions:
-                raise KnowledgeError(
-                    f"there is no function {function}",
-                    file=where,
-                    remedy=f"the mission needs it; functions in the ontology: {', '.join(self.functions) or 'none'}",
-                )
-            if not self.designs(function):
-                raise KnowledgeError(
-                    f"function {function} has no function design",
-                    file=where,
-                    remedy=f"add an individual of FunctionDesign with solvesF {function}",
-                )
+        for _, problem, remedy in self.unsolved(functions):
+            raise KnowledgeError(problem, file=", ".join(map(str, self.files)), remedy=remedy)
 
 
-def _content_hash(sources: Sequence[OntologyFile], values: Mapping[str, Decimal], operators: Mapping[str, str]) -> str:
-    total = hashlib.sha256()
-    for digest in sorted(hashlib.sha256(source.content).hexdigest() for source in sources):
-        total.update(digest.encode())
-    for name, value in sorted(values.items()):
-        total.update(f"{name}={format(value.normalize(), 'f')}\n".encode())
-    for name, sign in operators.items():
-        total.update(f"{name} {sign}\n".encode())
-    return total.hexdigest()
+def _content_hash(
+    sources: Sequence[OntologyFile],
+    values: Mapping[str, Decimal],
+    operators: Mapping[str, str],
+    files: Sequence[RulesFile],
+    disabled: Collection[str],
+) -> str:
+    contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources)
+    numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
+    parts = contents, numbers, dict(operators), [file.text for file in files], sorted(set(disabled))
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

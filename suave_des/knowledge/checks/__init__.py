@@ -10,12 +10,11 @@ from suave_des.findings import Finding, Level, relative_path
 from suave_des.knowledge.checks.model import check_revision
 from suave_des.knowledge.checks.registry import Material, Scope, Subject, run_checks
 from suave_des.knowledge.checks.rules import findings_on_rule
-from suave_des.knowledge.content import merge, with_rules
-from suave_des.knowledge.model import build_model, with_operators
-from suave_des.knowledge.ontology_file import OntologyFile, enumerated_texts
-from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.rules import Rule, RuleError
 from suave_des.knowledge.rules.checks import Vocabulary, about_rule
-from suave_des.knowledge.rules.files import RulesFile
+from suave_des.knowledge.rules.files import RulesFile, rules_of
 
 __all__ = ["Subject", "findings_on_rule", "static_findings"]
 
@@ -28,35 +27,32 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
         sources: its ontologies and their imports.
 
     Raises:
-        InputError: a file of rules cannot be read at all.
+        InputError: a file of rules cannot be read at all; the scenario names a value or a rule that is not there.
     """
-    content = merge(sources, subject.values)
-    findings: list[Finding] = []
+    findings, groups = list[Finding](), list[Sequence[Rule]]()
+
+    def usable(file: RulesFile, vocabulary: Vocabulary) -> Sequence[Rule]:
+        found = list(file.looked_up(vocabulary))
+        findings.extend(map(Finding.of, file.parsed.errors))
+        findings.extend(replace(Finding.of(rule), rule=name) for name, rule in found if isinstance(rule, RuleError))
+        if not found and not file.parsed.errors:
+            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(file.path)))
+        groups.append([rule for _, rule in found if isinstance(rule, Rule)])
+        return groups[-1]
+
+    files = [RulesFile.read(path) for path in subject.rules]
     try:
-        model, _ = build_model(content, sources)
+        base = Ontology.merged(sources, files, usable, subject.values, subject.disabled_rules, subject.operators)
     except KnowledgeError as error:
+        if error.file is None:  # about a name that the scenario gives, and no file
+            raise
         return [*findings, Finding.of(error)]
-    vocabulary = Vocabulary.of(content.triples, [each.iri for each in model.individuals()], enumerated_texts(sources))
-    groups = []
-    for path in subject.rules:
-        file, group = RulesFile.read(path), list[Rule]()
-        findings += map(Finding.of, file.parsed.errors)
-        for name, rule in file.looked_up(vocabulary):
-            if isinstance(rule, Rule):
-                group.append(rule)
-            else:
-                findings.append(replace(Finding.of(rule), rule=name))
-        if not file.parsed.rules and not file.parsed.errors:
-            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(path)))
-        groups.append(group)
-    findings += _replacing(content.rules, groups)
-    whole, assumed = with_operators(with_rules(content, groups, subject.disabled_rules), model, subject.operators)
-    material = Material(subject, sources, whole, model, vocabulary, assumed)
+    findings += _replacing([rule for source in sources for rule in rules_of(source)], groups)
     try:
-        check_revision(material, subject.measured or (), subject.revision)
+        check_revision(base, subject.measured or (), subject.revision)
     except KnowledgeError as error:
         findings.append(Finding.of(error))
-    return [*findings, *run_checks(material, *Scope)]
+    return [*findings, *run_checks(Material(subject, base), *Scope)]
 
 
 def _replacing(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:

@@ -54,7 +54,7 @@ _ATTRIBUTE: Final = TOMASYS + "QualityAttributeType"
 @check(Level.ERROR, Scope.MODEL)
 def values(material: Material) -> Iterator[Found]:
     """Find the values that no state can be compared with, or that contradict one another."""
-    for subject, problem, remedy in wrong_values((*material.content.triples, *material.model.triples())):
+    for subject, problem, remedy in wrong_values(material.base.stated):
         yield local_name(subject), None, f"{local_name(subject)}: {problem}", remedy
 
 
@@ -64,12 +64,12 @@ def undefined_names(material: Material) -> Iterator[Found]:
 
     Only those of the ontologies' own namespaces: names of other vocabularies may be defined elsewhere.
     """
-    kinds, triples = material.vocabulary.kinds, material.content.triples
-    of_states = {each.iri for each in material.model.individuals()}
+    kinds, triples = material.base.vocabulary.kinds, material.content.triples
+    of_states = {each.iri for each in material.base.model.individuals()}
     described = {subject for subject, _, _ in triples} | of_states
-    kinds_of = Kinds(material.content, material.model)
+    kinds_of = Kinds(material.content, material.base.model)
     namespaces = {namespace(iri) for iri in described}
-    assumed = {(material.model.attributes[name], QA_OPERATOR) for name in material.assumed}
+    assumed = {(material.base.model.attributes[name], QA_OPERATOR) for name in material.base.assumed}
     for subject, predicate, value in triples:
         used: tuple[str, str, Collection[str]] | None = None  # words, what is used, what it should be
         is_term = isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
@@ -101,40 +101,24 @@ def with_article(iri: str) -> str:
     return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
 
 
-def _designs(material: Material, function: str) -> set[str]:
-    """Names of the designs that solve a function."""
-    model, iri = material.model, material.model.functions.get(function)
-    solving = {s for s, p, o in material.content.triples if local_name(p) == "solvesF" and o == iri}
-    return {name for name, design in model.designs.items() if design in solving}
-
-
 @check(Level.ERROR, Scope.MISSIONS)
 def missing_functions(material: Material) -> Iterator[Found]:
     """Find the functions that the mission needs and that are not there, or have no design."""
-    for name in sorted(material.subject.needed):
-        if name not in material.model.functions:
-            yield name, None, f"there is no function {name}, which the mission needs", None
-        elif not _designs(material, name):
-            yield name, None, *_no_design(name)
+    return ((name, None, problem, remedy) for name, problem, remedy in material.base.unsolved(material.subject.needed))
 
 
 @check(Level.WARN, Scope.MODEL)
 def functions_without_design(material: Material) -> Iterator[Found]:
     """Find the other functions that have no design."""
-    for name in sorted(material.model.functions.keys() - {*material.subject.needed}):
-        if not _designs(material, name):
-            yield name, None, *_no_design(name)
-
-
-def _no_design(function: str) -> tuple[str, str]:
-    return f"function {function} has no function design", f"add an individual of FunctionDesign with solvesF {function}"
+    others = material.base.model.functions.keys() - {*material.subject.needed}
+    return ((name, None, problem, remedy) for name, problem, remedy in material.base.unsolved(others))
 
 
 def _designs_and_modes(material: Material) -> Iterator[tuple[str, set[str], set[str]]]:
     """(function, its designs, its modes that a design could have the name of) of the model, if modes are checked."""
-    for function in sorted(material.model.functions if material.subject.modes is not None else ()):
+    for function in sorted(material.base.model.functions if material.subject.modes is not None else ()):
         modes = {*(material.subject.modes or {}).get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
-        yield function, _designs(material, function), modes
+        yield function, {*material.base.designs(function)}, modes
 
 
 @check(Level.ERROR, Scope.MISSIONS)
@@ -161,7 +145,7 @@ def modes_without_design(material: Material) -> Iterator[Found]:
 @check(Level.WARN, Scope.MISSIONS)
 def attributes_that_do_not_fit(material: Material) -> Iterator[Found]:
     """Find quality attributes that missions measure and ontologies lack, or compare with nothing."""
-    model, measured = material.model, material.subject.measured
+    model, measured = material.base.model, material.subject.measured
     for name in sorted({*(measured or ())} - model.attributes.keys()):
         problem = f"missions measure {name}, but no ontology has a quality attribute type of this name"
         yield name, None, problem, nearest(name, model.attributes)
@@ -186,9 +170,9 @@ def without_operator(content: Content, model: Model, measured: Collection[str]) 
 @check(Level.WARN, Scope.MODEL)
 def attributes_declared_twice(material: Material) -> Iterator[Found]:
     """Find the quality attribute types that several files declare: what each of them says of one holds."""
-    for name, iri in material.model.attributes.items():
+    for name, iri in material.base.model.attributes.items():
         declared = (URIRef(iri), URIRef(RDF_TYPE), URIRef(_ATTRIBUTE))
-        paths = [each.path for each in material.sources if declared in each.graph]
+        paths = [each.path for each in material.base.sources if declared in each.graph]
         for path in paths[:-1]:
             problem = f"declares the quality attribute type {name}, and so does {paths[-1]}"
             yield path, None, problem, "declare it in one of them"
@@ -200,16 +184,16 @@ def unknown_to_missions(material: Material) -> Iterator[Found]:
     content, subject = material.content, material.subject
     asserted = {each for each, predicate, _ in content.triples if predicate == C_STATUS}
     if subject.reported is not None and C_STATUS not in content.head_properties():
-        for name, iri in sorted(material.model.components.items()):
+        for name, iri in sorted(material.base.model.components.items()):
             if name not in subject.reported and iri not in asserted:
                 problem = (
                     f"nothing in the simulation reports the status of component {name}, so missions never have one"
                 )
                 yield name, None, problem, f"reported are {', '.join(subject.reported)}"
-    expected = frozenset().union(*material.model.estimated.values()) - {local_name(PERFORMANCE)}
+    expected = frozenset().union(*material.base.model.estimated.values()) - {local_name(PERFORMANCE)}
     for name in sorted(expected.difference(subject.measured if subject.measured is not None else expected)):
         yield name, None, f"missions do not measure {name}, so what designs expect of it is compared with nothing", None
-    for name, sign in material.assumed.items():
+    for name, sign in material.base.assumed.items():
         yield name, None, assumption(name, sign), None
 
 
@@ -223,7 +207,7 @@ def rules_of_2023(content: Content) -> list[tuple[Rule, Atom]]:
     ]
 
 
-def check_revision(base: Material | Ontology, measured: Collection[str], revision: str) -> None:
+def check_revision(base: Ontology, measured: Collection[str], revision: str) -> None:
     """Check that ontologies of the exemplar's revision 2023 are used with that revision.
 
     With a later one no design is ever ruled out, as its code assumes no operator, so that objectives stay in error;
@@ -327,9 +311,11 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
 def rules_for_other_models(material: Material) -> list[Rule]:
     """Find the rules of TOMASys and mros that need what this model does not have; they have rules for any."""
     found = []
-    for rule, _ in dead_rules(material.content, material.model):
+    for rule, _ in dead_rules(material.content, material.base.model):
         source = material.source(rule)
-        is_known = all(atom.kind == "builtin" or material.vocabulary.kinds.get(atom.predicate) for atom in rule.atoms)
+        is_known = all(
+            atom.kind == "builtin" or material.base.vocabulary.kinds.get(atom.predicate) for atom in rule.atoms
+        )
         if is_known and source is not None and is_metamodel(source):
             found.append(rule)
     return found

@@ -8,7 +8,7 @@ rule of an imported ontology is a note. `kb check` adds the shapes of the model 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from enum import Enum
 from functools import cached_property
@@ -17,12 +17,12 @@ from typing import Final
 
 from suave_des.findings import Finding, Level
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.model import Model
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import OWL, RDF_TYPE
 from suave_des.knowledge.rules import Place, Rule
-from suave_des.knowledge.rules.checks import Vocabulary, about_rule
+from suave_des.knowledge.rules.checks import about_rule
 from suave_des.resources import shipped_folder
 
 
@@ -80,19 +80,16 @@ class Material:
 
     Attributes:
         subject: what is to be checked.
-        sources: its ontology files.
-        content: what is in them, with the rules as text, and the operators that the revision assumes.
-        model: the functions, designs, components and quality attributes in it.
-        vocabulary: the names that rules may use.
-        assumed: the operators that the revision assumes, by quality attribute.
+        base: the ontologies and rules, with the operators that the revision assumes.
     """
 
     subject: Subject
-    sources: Sequence[OntologyFile]
-    content: Content
-    model: Model
-    vocabulary: Vocabulary
-    assumed: Mapping[str, str] = field(default_factory=dict)
+    base: Ontology
+
+    @cached_property
+    def content(self) -> Content:
+        """All that the files state, that which only holds in states, too."""
+        return replace(self.base.content, triples=tuple(dict.fromkeys((*self.base.content.triples, *self.base.stated))))
 
     @cached_property
     def rules(self) -> tuple[Rule, ...]:
@@ -107,7 +104,7 @@ class Material:
 
     def source(self, rule: Rule) -> OntologyFile | None:
         """The ontology that a rule is from; None for a rule as text."""
-        return next((each for each in self.sources if each.path == rule.file), None)
+        return next((each for each in self.base.sources if each.path == rule.file), None)
 
     def is_own(self, rule: Rule) -> bool:
         """Whether a rule is in a file that the user gave, and that is not TOMASys, which has rules for any model."""
@@ -120,7 +117,7 @@ class Material:
         if isinstance(what, Path):
             return Finding(level, message, str(what), remedy=remedy)
         if isinstance(what, str):
-            file, line = place_of(what, self.sources)
+            file, line = place_of(what, self.base.sources)
             return Finding(level, message, str(file), line, remedy=remedy)
         source = self.source(what)
         line = None if source is None else source.line_of_rule(what.name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import operator
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import replace
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Final
@@ -69,7 +68,7 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Found]:
     """Find what Pellet would drop or ignore without a word."""
     skipped = set(map(id, rules_for_other_models(material)))
     for rule in material.rules:
-        for each in fatal_problems(rule, material.vocabulary) if id(rule) not in skipped else ():
+        for each in fatal_problems(rule, material.base.vocabulary) if id(rule) not in skipped else ():
             place = Place(each.line or 1, each.column) if each.column else None
             yield rule, place, each.message, each.remedy
 
@@ -99,7 +98,7 @@ def for_other_models(material: Material) -> Iterator[Found]:
 @check(Level.WARN, Scope.RULES)
 def never_fires(material: Material) -> Iterator[Found]:
     """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
-    content, model = material.content, material.model
+    content, model = material.content, material.base.model
     skipped = set(map(id, rules_for_other_models(material)))
     found = [(rule, atom, f"{write_atom(atom)} holds in no state", None) for rule, atom in dead_rules(content, model)]
     for rule, atom, problem, remedy in (*found, *unmeasured_rules(content, model, material.subject.measured)):
@@ -120,7 +119,7 @@ def equal_individuals(material: Material) -> Iterator[Found]:
 @check(Level.WARN, Scope.RULES)
 def things_of_two_kinds(material: Material) -> Iterator[Found]:
     """Find variables and individuals that a rule would have to be of two kinds at once."""
-    kinds = Kinds(material.content, material.model)
+    kinds = Kinds(material.content, material.base.model)
     for rule in material.rules:
         known: dict[Term, tuple[str, str]] = {}
         reported: set[Term] = set()
@@ -258,7 +257,7 @@ def no_effect(material: Material) -> Iterator[Found]:
 @check(Level.WARN, Scope.RULES)
 def comparisons_that_decide_nothing(material: Material) -> Iterator[Found]:
     """Find comparisons that no value satisfies, alone or together, and those with a text that none is."""
-    vocabulary = material.vocabulary
+    vocabulary = material.base.vocabulary
     for rule in material.rules:
         holders = dict(rule.read_values())
         asked: dict[str, list[tuple[str, float, str]]] = defaultdict(list)  # sign, number, how it is written
@@ -384,7 +383,5 @@ def findings_on_rule(
         measured: the quality attributes that the scenario measures.
     """
     files = [rule.file for rule in base.rules if rule.name == name]
-    subject = Subject(rules=files, reported=reported, measured=measured)
-    content = replace(base.content, triples=(*base.content.triples, *base.model.triples()))
-    material = Material(subject, base.sources, content, base.model, base.vocabulary)
+    material = Material(Subject(rules=files, reported=reported, measured=measured), base)
     return (each for each in run_checks(material, Scope.RULES, Scope.MISSIONS) if each.rule == name)

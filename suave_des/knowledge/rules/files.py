@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -117,17 +116,6 @@ def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
     """
     rule = rule_from_text(parse_rule(text, file), vocabulary, file)
     return _usable(first_error(rule, vocabulary) or rule)
-
-
-def hash_with_rules(digest: str, texts: Iterable[str], disabled: Collection[str]) -> str:
-    """Extend a content hash by rules as text, in their order, and by disabled rules."""
-    parts = [*(f"rules {text}" for text in texts), *(f"disabled {name}" for name in sorted(set(disabled)))]
-    if not parts:
-        return digest
-    total = hashlib.sha256(digest.encode())
-    for part in parts:
-        total.update(hashlib.sha256(part.encode()).digest())
-    return total.hexdigest()
 
 
 def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Rule:
