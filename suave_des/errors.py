@@ -117,6 +117,11 @@ def number_of(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def with_article(noun: str) -> str:
+    """Write a noun or the name of a class with its article: "an Objective", "a data property"."""
+    return f"{'an' if noun[0] in 'aeioAEIO' else 'a'} {noun}"
+
+
 def similar(word: object, known: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Find the known name that is most similar to a word, from `cutoff` on (1: the same); None if none is."""
     found = difflib.get_close_matches(str(word), sorted(known), n=1, cutoff=cutoff)

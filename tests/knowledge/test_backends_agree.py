@@ -16,6 +16,7 @@ from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, ObjectiveState
 from tests.helpers.generated_ontologies import write_ontology
 from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
+from tests.helpers.number_ontology import numbers_ontology
 
 THRESHOLDS = ("1.25", "2.25", "3.25")
 #: Just below, on and just above each threshold, and numbers that binary floats write with an exponent.
@@ -115,3 +116,13 @@ class TestSchemas:
     def test_all_that_axioms_conclude_is_read_in_200_ontologies(self, tmp_path: Path) -> None:
         found = self.compare(range(200), tmp_path)
         assert sum(isinstance(one, str) for one in found) >= 5  # contradictions are among them
+
+
+def test_numbers_that_a_rule_takes_for_the_same_are_those_of_stock_pellet(tmp_path: Path) -> None:
+    numbers = numbers_ontology(tmp_path)
+    terms = numbers.content.all_terms()
+    found = Reasoner(numbers, "pellet", terms=terms).analyze(KnowledgeState()).facts
+    assert found == Reasoner(numbers, "owlready2", TimeLimit(180.0), terms).analyze(KnowledgeState()).facts
+    matching = {(fact.subject, fact.value) for fact in found if fact.property == "is"}
+    assert {("integer", "int"), ("padded", "integer"), ("decimal", "whole_decimal"), ("half", "long_half")} <= matching
+    assert matching.isdisjoint({("integer", "decimal"), ("whole_decimal", "int"), ("double", "decimal")})

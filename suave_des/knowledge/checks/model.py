@@ -14,7 +14,7 @@ from typing import Final
 from rdflib import URIRef
 
 from suave_des.domain import DEFAULT_MODE, UNGROUND_MODE
-from suave_des.errors import KnowledgeError, nearest
+from suave_des.errors import KnowledgeError, nearest, with_article
 from suave_des.findings import Level
 from suave_des.knowledge.checks.registry import Found, Material, Scope, check
 from suave_des.knowledge.content import Content
@@ -90,15 +90,9 @@ def undefined_names(material: Material) -> Iterator[Found]:
             same = sorted(iri for iri in known if local_name(iri) == local_name(name))
             remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
             if remedy is None and wanted_kind is not None:
-                remedy = f"declare {with_article(wanted_kind)} of this name"
+                remedy = f"declare {with_article(local_name(wanted_kind))} of this name"
             problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
             yield local_name(subject), None, problem, remedy
-
-
-def with_article(iri: str) -> str:
-    """Write the name of a class with its article."""
-    name = local_name(iri)
-    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
 
 
 @check(Level.ERROR, Scope.MISSIONS)

@@ -9,7 +9,7 @@ from itertools import chain, pairwise
 from pathlib import Path
 from typing import Final
 
-from suave_des.errors import nearest, similar
+from suave_des.errors import nearest, similar, with_article
 from suave_des.findings import Finding, Level
 from suave_des.knowledge.checks.model import (
     Kinds,
@@ -18,7 +18,6 @@ from suave_des.knowledge.checks.model import (
     rules_of_2023,
     undeclared_differences,
     unmeasured_rules,
-    with_article,
 )
 from suave_des.knowledge.checks.registry import Found, Material, Scope, Subject, check, run_checks
 from suave_des.knowledge.ontology import Ontology
@@ -131,8 +130,13 @@ def things_of_two_kinds(material: Material) -> Iterator[Found]:
             if kind != before and term not in reported:
                 reported.add(term)
                 thing = f"?{term.name}" if isinstance(term, Variable) else local_name(getattr(term, "iri", ""))
-                first = with_article(before) + (f" in {by}" if by else "")
-                yield rule, atom.place(), f"{thing} is {first}, but {with_article(kind)} in {name}", _use(atom, kinds)
+                first = with_article(local_name(before)) + (f" in {by}" if by else "")
+                yield (
+                    rule,
+                    atom.place(),
+                    f"{thing} is {first}, but {with_article(local_name(kind))} in {name}",
+                    _use(atom, kinds),
+                )
 
 
 def _use(atom: Atom, kinds: Kinds) -> str | None:
@@ -142,8 +146,8 @@ def _use(atom: Atom, kinds: Kinds) -> str | None:
     if subject is None:
         return None
     if value is None:
-        return f"{name} is a property of {with_article(subject)}"
-    return f"{name} leads from {with_article(subject)} to {with_article(value)}"
+        return f"{name} is a property of {with_article(local_name(subject))}"
+    return f"{name} leads from {with_article(local_name(subject))} to {with_article(local_name(value))}"
 
 
 @check(Level.WARN, Scope.RULES)

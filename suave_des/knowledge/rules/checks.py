@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from suave_des.errors import KnowledgeError, nearest
+from suave_des.errors import KnowledgeError, nearest, with_article
 from suave_des.findings import Finding, Level
 from suave_des.knowledge.rdf import (
     LANGUAGE_NAMESPACES,
@@ -236,12 +236,8 @@ def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem
     if "class" in declared:
         return atom.place(), f"{name} is a class, but is used as a property", f"write {name}(?x)"
     found = next((kind for kind in ("object property", "data property") if kind in declared), None)
-    problem = f"{name} is {_a(found or min(declared))}, but is used as {_a(wanted)}"
+    problem = f"{name} is {with_article(found or min(declared))}, but is used as {with_article(wanted)}"
     return atom.place(), problem, _WRITTEN[atom.kind].format(name) if found else None
-
-
-def _a(kind: str) -> str:
-    return f"{'an' if kind[0] in 'aio' else 'a'} {kind}"
 
 
 def _argument_problems(
@@ -265,7 +261,7 @@ def _argument_problems(
         whole = term.datatype == XSD + "integer" and XSD + "decimal" in ranges  # matches no decimal, but is one
         if term.datatype not in ranges and not (whole and is_head):
             wanted = " or ".join(sorted(map(local_name, ranges)))
-            problem = f"{literal_text(term)} is not {_a(wanted)}, the range of {name}: it {consequence}"
+            problem = f"{literal_text(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
             yield place, problem, f"write {term.text}.0" if whole else f"a value of {wanted}"
         elif term.text not in values:
             problem = f"{literal_text(term)} is not among the values of {name}: it {consequence}"
