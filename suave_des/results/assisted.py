@@ -256,12 +256,13 @@ def _check(frames: Mapping[str, pandas.DataFrame], names: Sequence[str], metrics
                 raise InputError(f"there is no mission of {name}", place=place, remedy=remedy)
         for metric in metrics:
             values = frame[metric.name].to_numpy(float) if metric.name in frame else np.array([math.nan])
-            if np.isinf(values).any() or np.isnan(values).all() or (metric.half_width > 1.0 and np.isnan(values).any()):
+            may_lack = metric.name not in PAPER_METRICS
+            if np.isinf(values).any() or np.isnan(values).all() or not (may_lack or np.isfinite(values).all()):
                 problem = f"{metric.name} has a value that is no number, or no value at all"
                 raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
-        lost_s = frame.loc[frame[FOUND] == 0.0, SEARCH_TIME]
-        lasted_s = frame.get("mission_duration_s", frame[FOUND] * math.nan)  # real missions may not say it
-        limit_s = float(lost_s.max() if len(lost_s) else lasted_s.max())
+        # Real missions may not say how long they lasted, and simulated ones may all have found the pipeline.
+        ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
+        limit_s = float(ends_s.max())
         if abs(limit_s - min(limits_s, default=limit_s)) > missions.SAME_LIMIT_S:
             problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
             raise InputError(problem, place=place, remedy="give missions with one time limit")
@@ -374,7 +375,9 @@ def _conclusion(row: Mapping[str, Any], metric: Metric) -> str:
         claim = difference_claim(Difference(group, other, metric.name, True, "", 0, 0, found), metric)
         found = found if found.value > 0.0 else -found
     else:
-        claim = f"{metric.title} of {group}{other and f' - {other}'}: {metric.amount(found.value)}"
+        is_share = metric.name == FOUND and not other
+        amount = metric.number(found.value) if is_share else metric.amount(found.value)
+        claim = f"{metric.title} of {group}{other and f' - {other}'}: {amount}"
     claim += f" (95% interval {found.text(f'.{metric.interval_decimals}f', metric.scale) or 'not known'})"
     if not row["helps"]:
         return f"{claim} {missions_in}; the simulation does not help."

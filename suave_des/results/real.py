@@ -357,7 +357,7 @@ def matched(
     place = "real missions"
     if not names:
         remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
-        raise InputError("the missions are all of one condition", place="assisted by", remedy=remedy)
+        raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
     points = simulated[list(names)].drop_duplicates()
     conditions = Conditions(tuple(names), tuple(points.itertuples(index=False, name=None)))
     try:

@@ -145,6 +145,16 @@ def test_a_simulation_that_does_not_help_is_said_not_to() -> None:
     assert "the simulation does not help" in first["conclusion"]
 
 
+def test_shares_are_in_per_cent() -> None:
+    real = real_missions(2)
+    real.loc[::5, ["search_time_s", "pipeline_found"]] = [300.0, False]
+    found = compare_assisted(real, missions(2, POINTS, 5), population(), metrics=["pipeline_found"])
+    first = found.estimates.iloc[0]
+    assert first["assisted"] == pytest.approx(0.75, abs=0.1) and first["assisted_ci95_high"] <= 1.0
+    assert "share that found the pipeline of a: " in first["conclusion"] and "%" in first["conclusion"]
+    assert "points" in found.conclusions[2]
+
+
 def test_conditions_are_found_by_number_and_by_order() -> None:
     real = real_missions(2, 25.0)
     numbered = real.assign(condition=np.repeat([1, 2, 3, 4, 5, 6] * 2, 2)).drop(columns="start.y_m")
@@ -168,7 +178,7 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit() -> None:
     [
         ({"real": real_missions(2, points=POINTS + 9.0)}, "no condition of the campaign has start.y_m=10.1"),
         ({"same": missions(2, POINTS, 1)}, "there is 1 simulated mission"),
-        ({"same": missions(2, POINTS[:1], 5)}, "all of one condition"),
+        ({"same": missions(2, POINTS[:1], 5)}, "sweep no conditions"),
         ({"real": real_missions(2, points=POINTS[:2])}, "there are 2 conditions"),
         ({"population": population(draws=5)}, "there are 5 draws"),
         ({"population": missions(2, POINTS, 5)}, "it sweeps start.y_m"),
