@@ -13,9 +13,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from suave_des import InputError
-from suave_des.records.runs import read_runs
-from suave_des.results.paper import FILES, compare_with_paper, published_runs
+from suave_des import InputError, compare_with_paper, read_runs
+from suave_des.results.paper import FILES, published_runs
 
 
 def main() -> None:

@@ -33,10 +33,8 @@ import studies
 from matplotlib.figure import Figure
 from scipy.special import stdtrit
 
-from suave_des import InputError, run_campaign
-from suave_des.campaign.variation import ENSEMBLE_COLUMN, read_ensemble
-from suave_des.estimates import mean_of
-from suave_des.records.runs import read_runs
+from suave_des import InputError, mean_of, read_ensemble, read_runs, run_campaign
+from suave_des.campaign.variation import ENSEMBLE_COLUMN
 
 FOLDER = Path(__file__).with_name("predictions")
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

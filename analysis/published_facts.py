@@ -14,9 +14,7 @@ from pathlib import Path
 
 import pandas
 
-from suave_des import load_scenario, with_values
-from suave_des.resources import find
-from suave_des.simulation.simulator import Simulator
+from suave_des import Simulator, find, load_scenario, with_values
 
 SLOW_M_PER_S = 0.26
 """Missions without a dead thruster mostly follow at 0.27 to 0.28 m/s."""

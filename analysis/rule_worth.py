@@ -12,7 +12,7 @@ import pandas
 import studies
 from matplotlib.figure import Figure
 
-from suave_des.kb import KnowledgeBase
+from suave_des import KnowledgeBase
 
 SCENARIO = "seams2023"
 

@@ -23,9 +23,8 @@ from SALib.analyze import morris as analyze_morris
 from SALib.sample import morris as sample_morris
 
 from calibration.cases import read_cases, read_problem
-from suave_des import with_values
+from suave_des import Simulator, with_values
 from suave_des.results import style
-from suave_des.simulation.simulator import Simulator
 
 MANAGERS = ("none", "random", "metacontrol")
 METRICS = {"search_time_s": "mean search time (s)", "distance_inspected_m": "mean distance inspected (m)"}

@@ -16,10 +16,8 @@ import pandas
 
 from calibration.cases import fitted_scenario, read_cases, read_problem
 from calibration.fit import fit
-from suave_des import run_campaign
-from suave_des.estimates import mean_of, std_of
-from suave_des.records.runs import read_runs
-from suave_des.resources import find
+from suave_des import find, mean_of, read_runs, run_campaign
+from suave_des.estimates import std_of
 from suave_des.results.validation import sample
 
 METRICS = ("search_time_s", "distance_inspected_m")

@@ -1,6 +1,7 @@
 """SUAVE, the self-adaptive underwater vehicle exemplar, as a discrete-event simulation.
 
-Importing the package starts nothing: no Java, no pandas, no matplotlib until they are needed.
+What users need is here by name, see docs/reference/python-api.md; modules below may change without notice. Importing
+the package starts nothing: no Java, no pandas, no matplotlib until they are needed.
 """
 
 from importlib import import_module as _import_module
@@ -9,39 +10,71 @@ from typing import TYPE_CHECKING as _TYPE_CHECKING
 from suave_des import imports as _imports
 
 if _TYPE_CHECKING:
-    from suave_des.api import resume_campaign, run_campaign, stream_campaign
-    from suave_des.campaign.single import run_mission
-    from suave_des.errors import InputError, MissionError
+    from suave_des.api import RecordedMission, resume_campaign, run_campaign, run_mission
+    from suave_des.campaign.single import train
+    from suave_des.campaign.variation import read_ensemble
+    from suave_des.errors import InputError, MissionError, SuaveDesError
+    from suave_des.estimates import mean_of
+    from suave_des.interfaces.exec import messages_schema
+    from suave_des.interfaces.trees import PyTreesManager
+    from suave_des.kb.knowledge_base import KnowledgeBase
+    from suave_des.managed.node import CustomFunction
+    from suave_des.managing.base import ManagingSubsystem
+    from suave_des.managing.metacontrol import Metacontrol
+    from suave_des.managing.reference import Threshold
+    from suave_des.managing.simple import NoManager
+    from suave_des.monitor.diagnostics import FAILED, Kind
+    from suave_des.records.runs import read_runs
+    from suave_des.resources import find
+    from suave_des.results.compare import CampaignFrame, compare_folders
+    from suave_des.results.figures import draw_folder
+    from suave_des.results.paper import compare_with_paper
+    from suave_des.results.real import read_real
+    from suave_des.results.validation import validate
     from suave_des.scenario.loader import load_scenario, with_values
     from suave_des.simulation.mission import Mission
+    from suave_des.simulation.simulator import Simulator
 
 __version__ = "1.0.0"
 
-__all__ = [
-    "InputError",
-    "Mission",
-    "MissionError",
-    "load_scenario",
-    "resume_campaign",
-    "run_campaign",
-    "run_mission",
-    "stream_campaign",
-    "with_values",
-]
+__all__ = ["Mission", "RecordedMission", "Simulator", "load_scenario", "run_mission", "with_values"]
+__all__ += ["CampaignFrame", "read_ensemble", "resume_campaign", "run_campaign"]
+__all__ += ["CustomFunction", "ManagingSubsystem", "Metacontrol", "NoManager", "PyTreesManager", "Threshold"]
+__all__ += ["FAILED", "Kind", "train"]
+__all__ += ["compare_folders", "compare_with_paper", "draw_folder", "mean_of", "read_real", "read_runs", "validate"]
+__all__ += ["InputError", "KnowledgeBase", "MissionError", "SuaveDesError", "find", "messages_schema"]
 
 _HOMES = {
-    "InputError": "suave_des.errors",
-    "Mission": "suave_des.simulation.mission",
-    "MissionError": "suave_des.errors",
-    "load_scenario": "suave_des.scenario.loader",
-    "resume_campaign": "suave_des.api",
-    "run_campaign": "suave_des.api",
-    "run_mission": "suave_des.campaign.single",
-    "stream_campaign": "suave_des.api",
-    "with_values": "suave_des.scenario.loader",
+    name: module
+    for module, names in {
+        "api": ("RecordedMission", "resume_campaign", "run_campaign", "run_mission"),
+        "campaign.single": ("train",),
+        "campaign.variation": ("read_ensemble",),
+        "errors": ("InputError", "MissionError", "SuaveDesError"),
+        "estimates": ("mean_of",),
+        "interfaces.exec": ("messages_schema",),
+        "interfaces.trees": ("PyTreesManager",),
+        "kb.knowledge_base": ("KnowledgeBase",),
+        "managed.node": ("CustomFunction",),
+        "managing.base": ("ManagingSubsystem",),
+        "managing.metacontrol": ("Metacontrol",),
+        "managing.reference": ("Threshold",),
+        "managing.simple": ("NoManager",),
+        "monitor.diagnostics": ("FAILED", "Kind"),
+        "records.runs": ("read_runs",),
+        "resources": ("find",),
+        "results.compare": ("CampaignFrame", "compare_folders"),
+        "results.figures": ("draw_folder",),
+        "results.paper": ("compare_with_paper",),
+        "results.real": ("read_real",),
+        "results.validation": ("validate",),
+        "scenario.loader": ("load_scenario", "with_values"),
+        "simulation.mission": ("Mission",),
+        "simulation.simulator": ("Simulator",),
+    }.items()
+    for name in names
 }
-"""Where the names are that the package itself has; each module is imported when its name is first used."""
-
+"""Modules, each imported when a name that it has is first used."""
 
 _imports.when_imported("gymnasium", _imports.register_environments)
 
@@ -49,7 +82,7 @@ _imports.when_imported("gymnasium", _imports.register_environments)
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(_import_module(_HOMES[name]), name)
+    return getattr(_import_module(f"suave_des.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

@@ -1,26 +1,107 @@
-"""Campaigns for scripts and notebooks: their results as pandas data frames; see docs/reference/python-api.md."""
+"""Missions and campaigns for scripts and notebooks, whose results draw and compare themselves."""
 
 from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
+from suave_des.arguments import plain_arguments
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.progress import OnProgress
-from suave_des.errors import InputError
+from suave_des.campaign.spec import CampaignSpec
+from suave_des.metrics.result import MissionResult
 from suave_des.registry import ManagerLike
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.loader import LoadedScenario, Replacements
 
 if TYPE_CHECKING:
-    import pandas
+    from matplotlib.figure import Figure
 
     from suave_des.results.compare import CampaignFrame
 
 
+_CALLER = 4
+"""Stack level of who calls a function here, seen from `_frame_of`."""
+
+
+@dataclass(frozen=True, repr=False)
+class RecordedMission(MissionResult):
+    """A mission with its record, which can be drawn.
+
+    Attributes:
+        loaded: its scenario.
+
+    Example:
+        mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
+        mission.figure("timeline").savefig("timeline.pdf")
+    """
+
+    loaded: LoadedScenario = field(kw_only=True)
+
+    def figure(self, kind: str = "map") -> Figure:
+        """Draw the mission, as `suave-des figure` does.
+
+        Args:
+            kind: "map": the vehicle's way from above; "timeline": what was measured, and the modes.
+
+        Raises:
+            InputError: there is no such figure of a mission.
+        """
+        from suave_des.records.mission_folder import record_of
+        from suave_des.results.figures import draw_mission
+
+        return draw_mission(record_of(self, self.loaded.scenario, self.loaded.inputs), kind)
+
+
+@plain_arguments(lambda: Replacements.__annotations__)
+def run_mission(
+    scenario: str | Path | LoadedScenario,
+    manager: ManagerLike = "metacontrol",
+    run: int = 1,
+    seed: int = 1,
+    out: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    **replacements: Unpack[Replacements],
+) -> RecordedMission:
+    """Run one mission and keep its events and trajectory; it equals this run of a campaign with this seed.
+
+    Example:
+        mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
+        print(mission.metrics.search_time_s, len(mission.events))
+
+    Args:
+        scenario: path of a scenario file, name of a shipped one, or a loaded one.
+        manager: name of the managing subsystem, module:Class, or its class.
+        run: number of the run, from 1.
+        seed: of everything that is random.
+        out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons, knowledge.jsonl; it is
+            made if its parent exists. None: no files.
+        overwrite: whether results of the same kind in the folder are replaced.
+        replacements: ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options, as of
+            load_scenario.
+
+    Raises:
+        InputError: something given cannot be used; nothing is written then.
+        MissionError: the manager raised; nothing is written then.
+    """
+    from suave_des.campaign.single import run_recorded  # with the compiler, which campaigns load in their workers
+
+    loaded, result = run_recorded(scenario, manager, run, seed, out, overwrite=overwrite, **replacements)
+    return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
+
+
+def _options() -> Mapping[str, object]:
+    """Return what else a campaign may be given; its own model says what is wrong with the values."""
+    own = ("replacements", "command", "folder")
+    return {name: Any for name in CampaignSpec.model_fields if name not in own} | Replacements.__annotations__
+
+
+@plain_arguments(_options)
 def run_campaign(
     scenario: str | Path | LoadedScenario,
     managers: ManagerLike | Iterable[ManagerLike] | None = None,
@@ -70,42 +151,10 @@ def run_campaign(
         StoreError: the disk is full, or the folder was removed.
     """
     given = scenario, managers, runs, seed, workers, out
-    result, attrs = _with_progress(
-        scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options)
-    )
-    return _with_attrs(result.frame(), attrs)
+    return _frame_of(scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options))
 
 
-def stream_campaign(
-    scenario: str | Path | LoadedScenario,
-    managers: ManagerLike | Iterable[ManagerLike] | None = None,
-    runs: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    out: str | Path | None = None,
-    *,
-    chunk_rows: int = 10_000,
-    progress: bool | None = None,
-    **options: Any,
-) -> Iterator[CampaignFrame]:
-    """Yield the same in data frames of `chunk_rows` rows, in order, for more rows than fit into memory.
-
-    The campaign runs at once; its rows are kept on disk, in a temporary file without `out`, and read as they are
-    requested. Each piece has the types and attrs of the whole.
-
-    Raises:
-        InputError: chunk_rows is less than 1; and as run_campaign.
-        WorkerError, StoreError: as run_campaign.
-    """
-    if chunk_rows < 1:
-        raise InputError(f"chunk_rows: {chunk_rows} is out of range", remedy="give 1 or more")
-    given = scenario, managers, runs, seed, workers, out
-    result, attrs = _with_progress(
-        scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options)
-    )
-    return (_with_attrs(frame, attrs) for frame in result.frames(chunk_rows))
-
-
+@plain_arguments()
 def resume_campaign(
     folder: str | Path,
     workers: int = 1,
@@ -131,29 +180,20 @@ def resume_campaign(
         InputError: there is no campaign, or something that determines results has changed; the error names it.
         WorkerError, StoreError: as run_campaign.
     """
-    result, attrs = _with_progress(
-        folder,
-        progress,
-        lambda show: campaigns.resume_campaign(
-            folder,
-            workers,
-            runs=runs,
-            on_progress=show,
-            scheduler=scheduler,
-            managers=managers,
-            confirmed=confirmed,
-        ),
+    changed: dict[str, Any] = {"runs": runs, "scheduler": scheduler, "managers": managers, "confirmed": confirmed}
+    return _frame_of(
+        folder, progress, lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed)
     )
-    return _with_attrs(result.frame(), attrs)
 
 
-def _with_progress(
+def _frame_of(
     named: str | Path | LoadedScenario, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
-) -> tuple[CampaignResult, dict[str, Any]]:
-    """Run a campaign and show its progress; return its result, and the attrs of its frames."""
+) -> CampaignFrame:
+    """Run a campaign and show its progress; return its rows, with what else there is to know in attrs."""
     from rich.console import Console
 
     from suave_des.campaign.progress import shown
+    from suave_des.results.compare import CampaignFrame
 
     label = named.scenario.name if isinstance(named, LoadedScenario) else str(named)
     console = Console(stderr=True, highlight=False)
@@ -166,25 +206,16 @@ def _with_progress(
         if not hasattr(sys, "ps1"):  # neither a prompt nor a notebook
             raise
         result, interrupted = stopped.result, True
-        warnings.warn(str(stopped), stacklevel=3)
+        warnings.warn(str(stopped), stacklevel=_CALLER)
     for remark in result.remarks:
-        warnings.warn(remark, stacklevel=3)
+        warnings.warn(remark, stacklevel=_CALLER)
     if result.failures:
         problem = f"{len(result.failures)} of {result.planned} missions failed, see attrs['failures']: "
-        warnings.warn(f"{problem}{result.failures[0]}", stacklevel=3)
-    folder = None if result.folder is None else str(result.folder)
-    attrs = {
-        "runs_sharing_draw": result.variation.runs_sharing_draw,
-        "summary": list(result.summary),
-        "interrupted": interrupted,
-        "folder": folder,
-    }
-    return result, {**result.report(), **attrs}
-
-
-def _with_attrs(frame: pandas.DataFrame, attrs: dict[str, Any]) -> CampaignFrame:
-    from suave_des.results.compare import CampaignFrame
-
-    rows = CampaignFrame(frame)
-    rows.attrs.update(attrs)
-    return rows
+        warnings.warn(f"{problem}{result.failures[0]}", stacklevel=_CALLER)
+    frame = CampaignFrame(result.frame())
+    frame.attrs.update(result.report())
+    frame.attrs["runs_sharing_draw"] = result.variation.runs_sharing_draw
+    frame.attrs["summary"] = list(result.summary)
+    frame.attrs["interrupted"] = interrupted
+    frame.attrs["folder"] = None if result.folder is None else str(result.folder)
+    return frame

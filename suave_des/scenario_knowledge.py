@@ -16,6 +16,7 @@ from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.quantities import AnyDistribution
 
 if TYPE_CHECKING:
     from suave_des.knowledge.checks import Subject
@@ -79,22 +80,29 @@ def measured_attributes(scenario: Scenario) -> tuple[str, ...]:
     return tuple(sorted({*scenario.signals, *(() if scenario.battery is None else (BATTERY_LEVEL,))}))
 
 
+def measured_values(loaded: LoadedScenario, attribute: str) -> tuple[Sequence[AnyDistribution], AnyDistribution]:
+    """Return values between which all are that an attribute's monitor can measure, and the noise that is added."""
+    if attribute == BATTERY_LEVEL:
+        return (0.0, 1.0), 0.0
+    signal = loaded.scenario.signals[attribute]
+    match signal:
+        case SinusoidSignal():
+            return (signal.minimum, signal.maximum), signal.noise
+        case ConstantSignal():
+            return (signal.value,), signal.noise
+        case StepSignal():
+            return (signal.before, signal.after), signal.noise
+        case TableSignal():
+            return loaded.tables[attribute][1], signal.noise
+
+
 def measured_ranges(loaded: LoadedScenario) -> dict[str, tuple[float, float]]:
     """Return the smallest and the greatest value that each attribute's monitor can measure, where that is known."""
-    ranges = {} if loaded.scenario.battery is None else {BATTERY_LEVEL: (0.0, 1.0)}
-    for name, signal in loaded.scenario.signals.items():
-        values: Sequence[object]
-        match signal:
-            case SinusoidSignal():
-                values = signal.minimum, signal.maximum
-            case ConstantSignal():
-                values = (signal.value,)
-            case StepSignal():
-                values = signal.before, signal.after
-            case TableSignal():
-                values = loaded.tables[name][1]
+    ranges = {}
+    for name in measured_attributes(loaded.scenario):
+        values, noise = measured_values(loaded, name)
         numbers = [float(value) for value in values if isinstance(value, float | int)]
-        if signal.noise == 0.0 and len(numbers) == len(values):
+        if noise == 0.0 and len(numbers) == len(values):
             ranges[name] = min(numbers), max(numbers)
     return ranges
 

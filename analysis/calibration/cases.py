@@ -12,8 +12,8 @@ from typing import Any
 import pandas
 import yaml
 
-from suave_des import InputError, with_values
-from suave_des.resources import find, shipped_folder
+from suave_des import InputError, find, read_real, with_values
+from suave_des.resources import shipped_folder
 from suave_des.results.real import (
     CONDITION,
     PAPERS_RUNS,
@@ -21,7 +21,6 @@ from suave_des.results.real import (
     Share,
     count,
     published_for,
-    read_real,
     read_varied,
     targets_of,
 )

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from calibration.cases import Case, Problem
-from suave_des import with_values
+from suave_des import Simulator, with_values
 from suave_des.results.real import CONDITION, count
 from suave_des.results.validation import balanced, compare_conditions
-from suave_des.simulation.simulator import Simulator
 
 Vectors = NDArray[np.float64]
 """Missions as scaled vectors, shape (n, 2 or 3); unknown components are nan."""

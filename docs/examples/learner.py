@@ -1,6 +1,6 @@
 """A manager that learns by trying at which altitude to search: an epsilon-greedy bandit."""
 
-from suave_des.managing.reference import Threshold
+from suave_des import Threshold
 
 SEARCH = "f_generate_search_path"
 MODES = ("fd_spiral_low", "fd_spiral_medium", "fd_spiral_high")

@@ -85,8 +85,8 @@ def run_campaign(
         CampaignInterrupted: Ctrl-C; finished missions are kept.
     """
     if managers is not None:
-        managers = [managers] if isinstance(managers, str | type) else list(managers)
-        managers = list(map(name_of, managers))
+        several = managers if isinstance(managers, Iterable) and not isinstance(managers, str | type) else [managers]
+        managers = list(map(name_of, several))
     loaded = scenario if isinstance(scenario, LoadedScenario) else None
     named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
     given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}

@@ -12,6 +12,7 @@ import importlib.util
 import json
 import logging
 import platform
+import shlex
 import sys
 import sysconfig
 from collections import Counter
@@ -114,7 +115,7 @@ def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, c
     raise InputError(
         f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
         file=folder,
-        remedy=f"if you trust it, give --managers {','.join(unknown)} or --yes",
+        remedy=f"if you trust it, give --managers {shlex.quote(','.join(unknown))} or --yes",
     )
 
 

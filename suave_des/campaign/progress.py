@@ -199,7 +199,8 @@ class _View:
         self.label = label
         self.progress: Progress | None = None
         self._groups: tuple[GroupProgress, ...] = ()
-        self._due_s = self._began_s = self._first_s = self._last_s = time.monotonic()
+        self._due_s, self._began_s = 0.0, time.monotonic()
+        self._first_s = self._last_s = self._began_s
         self._before = 0
         """Missions that were done at the first look, as those of a campaign that is resumed."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby, islice
+from itertools import groupby
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -122,21 +122,12 @@ class CampaignResult:
         order; run, seed and adaptations int64; pipeline_found bool; other metrics float64. A parameter that a sweep
         varies has the type that pandas finds for it.
         """
-        return self._frame(self.stream())
-
-    def frames(self, size: int) -> Iterator[pandas.DataFrame]:
-        """Yield the same in chunks of `size` rows, read as they are requested."""
-        rows = self.stream()
-        while piece := tuple(islice(rows, size)):
-            yield self._frame(piece)
-
-    def _frame(self, rows: Iterable[Row]) -> pandas.DataFrame:
         import pandas
 
         types: dict[str, Any] = {name: _TYPES[kind] for name, kind in COLUMN_TYPES.items() if kind in _TYPES}
         types["scenario"] = pandas.CategoricalDtype([self.loaded.scenario.name])
         types["manager"] = pandas.CategoricalDtype(list(self.spec.managers))
-        return pandas.DataFrame.from_records(list(rows), columns=list(self.columns)).astype(types)
+        return pandas.DataFrame.from_records(self.rows, columns=list(self.columns)).astype(types)
 
     def differences(self) -> list[dict[str, Any]]:
         """Return how managers differ, over the members of the ensemble, as in ensemble.csv; empty without one."""

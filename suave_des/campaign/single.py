@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
+from suave_des.arguments import plain_arguments
 from suave_des.campaign.inputs import check_inputs, provenance
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.errors import InputError
@@ -19,7 +20,7 @@ from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenari
 from suave_des.simulation.simulator import Simulator
 
 
-def run_mission(
+def run_recorded(
     scenario: str | Path | LoadedScenario,
     manager: ManagerLike = "metacontrol",
     run: int = 1,
@@ -30,28 +31,16 @@ def run_mission(
     command: Sequence[str] = (),
     on_time: Callable[[float, float], None] | None = None,
     **replacements: Unpack[Replacements],
-) -> MissionResult:
-    """Run one mission and keep its events and trajectory; it equals this run of a campaign with this seed.
-
-    Example:
-        mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
-        print(mission.metrics.search_time_s, len(mission.events))
+) -> tuple[LoadedScenario, MissionResult]:
+    """Run one mission, as suave_des.run_mission does, whose arguments it has; return its scenario, too.
 
     Args:
-        scenario: path of a scenario file, name of a shipped one, or a loaded one.
-        manager: name of the managing subsystem, module:Class, or its class.
-        run: number of the run, from 1.
-        seed: of everything that is random.
-        out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
-            knowledge.jsonl; it is made if its parent exists. None: no files.
+        scenario, manager, run, seed, out, replacements: see suave_des.run_mission.
         overwrite, command: see CampaignSpec.
         on_time: called once per second of mission time with that time and the time limit, in s.
-        replacements: ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options, as of
-            load_scenario.
 
     Raises:
-        InputError: something given cannot be used; nothing is written then.
-        MissionError: the manager raised; nothing is written then.
+        InputError, MissionError: as suave_des.run_mission.
     """
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -67,7 +56,7 @@ def run_mission(
         make_output_folder(folder)
         files = mission_files(result, loaded.scenario, provenance(loaded, inputs, command))
         write_files(folder, files, stale=(KNOWLEDGE_FILE,))
-    return result
+    return loaded, result
 
 
 # Training: missions in one process, in the order of their runs, and a file at the end.
@@ -76,6 +65,7 @@ TRAINING_SEED = 0
 """Not that of campaigns, so that a campaign has missions that training has not seen."""
 
 
+@plain_arguments(lambda: Replacements.__annotations__)
 def train(
     scenario: str | Path,
     manager: str,

@@ -21,6 +21,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
+from suave_des.arguments import plain_arguments
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.draws import Streams
 from suave_des.errors import InputError, line_error, number_of, shown
@@ -371,6 +372,7 @@ def short_mission(loaded: LoadedScenario) -> MissionResult:
 # Ensembles.
 
 
+@plain_arguments()
 def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
     """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
 

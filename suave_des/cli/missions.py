@@ -53,11 +53,13 @@ def run(
     files: Files,
 ) -> None:
     """Run one mission and print its timeline."""
-    from suave_des.campaign.single import run_mission
+    from suave_des.campaign.single import run_recorded
 
     with mission_status(scenario, errors()) as show:
         replaced = files.with_options(manager_option, [manager])
-        result = run_mission(scenario, manager, run_number, command=command_line(), on_time=show, **options, **replaced)
+        _, result = run_recorded(
+            scenario, manager, run_number, command=command_line(), on_time=show, **options, **replaced
+        )
     for remark in result.remarks:
         errors().print(f"suave-des: manager {manager}: {remark}")
     console = output()

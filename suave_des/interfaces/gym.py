@@ -19,8 +19,8 @@ from suave_des.monitor.diagnostics import FAILED
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.modes import grounding_modes
-from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
 from suave_des.scenario.quantities import AnyDistribution, Exponential, Normal, support
+from suave_des.scenario_knowledge import measured_values
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
@@ -253,22 +253,10 @@ def _numbers(action: Any, count: int) -> list[int]:
 
 def _bounds(loaded: LoadedScenario, attribute: str) -> tuple[float, float]:
     """Return the least and the greatest value that can be observed of a quality attribute."""
-    values: Sequence[AnyDistribution]
-    described = loaded.scenario.battery if attribute == BATTERY_LEVEL else loaded.scenario.signals[attribute]
-    match described:
-        case SinusoidSignal():
-            values = described.minimum, described.maximum
-        case ConstantSignal():
-            values = (described.value,)
-        case StepSignal():
-            values = described.before, described.after
-        case TableSignal():
-            values = loaded.tables[attribute][1]
-        case _:
-            values = 0.0, 1.0  # a battery
-    noise = _span(0.0 if described is None else described.noise)
+    values, noise = measured_values(loaded, attribute)
     lows, highs = zip(*map(_span, values), strict=True)
-    return min(NOT_MEASURED, min(lows) + noise[0]), max(highs) + noise[1]
+    less, more = _span(noise)
+    return min(NOT_MEASURED, min(lows) + less), max(highs) + more
 
 
 def _span(distribution: AnyDistribution) -> tuple[float, float]:

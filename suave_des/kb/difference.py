@@ -279,7 +279,7 @@ def firing_states(
     Returns:
         how many states, and of how many.
     """
-    from suave_des.campaign.single import run_mission
+    from suave_des.campaign.single import run_recorded
 
     loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
     bases = list(map(open_base, loaded))
@@ -290,10 +290,9 @@ def firing_states(
     probes = Probes(bases[1], limit, changed)
     regions = regions_of(bases[1])
     fires: dict[Hashable, bool] = {}
-    states = 0
-    firing = 0
+    states = firing = 0
     for run in range(1, runs + 1):
-        for record in run_mission(loaded[0], _MANAGER, run, seed).knowledge:
+        for record in run_recorded(loaded[0], _MANAGER, run, seed)[1].knowledge:
             key = regions.key(record.state)
             if key not in fires:
                 fires[key] = bool(probes.holding(Situation(record.state)))

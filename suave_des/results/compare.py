@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
 import numpy as np
 import pandas
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import share_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
@@ -68,7 +69,8 @@ class Choices(TypedDict, total=False):
     unpaired: bool
 
 
-def compare_folders(paths: Sequence[Path], **choices: Unpack[Choices]) -> Comparison:
+@plain_arguments(lambda: Choices.__annotations__)
+def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> Comparison:
     """Compare the missions in folders or files of results.
 
     Args:
@@ -78,8 +80,7 @@ def compare_folders(paths: Sequence[Path], **choices: Unpack[Choices]) -> Compar
     Raises:
         InputError: results cannot be read, a name is not in them, or an extra is not installed.
     """
-    missions = read_missions(paths)
-    return compare(missions, **choices)
+    return compare(read_missions([Path(each) for each in paths]), **choices)
 
 
 def compare_frame(frame: pandas.DataFrame, **choices: Unpack[Choices]) -> Comparison:
@@ -112,6 +113,7 @@ class CampaignFrame(pandas.DataFrame):
             found.attrs[SHARING] = math.lcm(*known)
         return found
 
+    @plain_arguments(lambda: Choices.__annotations__)
     def compare(self, **choices: Unpack[Choices]) -> Comparison:  # type: ignore[override]
         """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
 
@@ -141,6 +143,7 @@ class CampaignFrame(pandas.DataFrame):
 
         return compare_assisted(real, self, population, managers=managers, metrics=metrics)
 
+    @plain_arguments()
     def figure(self, kind: str = "auto") -> Figure:
         """Draw the missions, as `suave-des figure` does.
 

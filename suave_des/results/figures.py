@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import pandas
 from matplotlib.figure import Figure
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.results import campaign_figures, style
@@ -51,9 +52,10 @@ KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, PATHS)
 """All figures by their names."""
 
 
-def draw_folder(folder: Path, out: Path) -> None:
+@plain_arguments()
+def draw_folder(folder: str | Path, out: str | Path) -> None:
     """Draw the contents of a results folder, and write the picture; see draw_results."""
-    draw_results([folder], out)
+    draw_results([Path(folder)], Path(out))
 
 
 def draw_results(
@@ -139,6 +141,23 @@ def _of_records(records: Sequence[MissionRecord], kind: str, rules_of: Callable[
         problem = f"the figure {kind} is of one mission, and {len(records)} are given"
         raise InputError(problem, remedy=f"give one of them, or --kind {PATHS}")
     return draw_timeline(records[0], rules_of(records[0])) if kind == TIMELINE else draw_map(records[0])
+
+
+def draw_mission(record: MissionRecord, kind: str = MAP) -> Figure:
+    """Draw a mission.
+
+    Args:
+        record: of the mission.
+        kind: MAP or TIMELINE.
+
+    Raises:
+        InputError: there is no such figure of a mission.
+    """
+    if kind not in (MAP, TIMELINE):
+        remedy = did_you_mean(kind, (MAP, TIMELINE))
+        raise InputError(f"there is no figure {shown(kind)} of a mission", place="kind", remedy=remedy)
+    with style.publication():
+        return _of_records([record], kind, lambda record: {})
 
 
 def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:

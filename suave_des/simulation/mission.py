@@ -12,6 +12,7 @@ from typing import ClassVar, Self, Unpack
 import simpy
 
 from suave_des import domain
+from suave_des.arguments import check_names
 from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
 from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
@@ -44,6 +45,7 @@ from suave_des.vehicle.kernel import POSITION
 from suave_des.vehicle.model import Pose
 from suave_des.vehicle.vehicle import row_at
 
+_ARGUMENTS = ("scenario", "manager", "run", "seed", "record")
 CALLER = "caller"
 """Name, in the metrics, of a managing subsystem that is the program which advances the mission."""
 
@@ -105,6 +107,8 @@ class Mission:
         for name, number in (("run", run), ("seed", seed)):
             if isinstance(number, bool) or not isinstance(number, int) or number < 0:
                 raise InputError(f"{name}: {shown(number)} is not a number of a {name}", remedy="give a whole number")
+        if replacements:
+            check_names("Mission", replacements, (*_ARGUMENTS, *Replacements.__annotations__))
         if not isinstance(scenario, PreparedScenario):
             scenario = PreparedScenario(load_scenario(scenario, **replacements))
         self._prepared = prepared = scenario

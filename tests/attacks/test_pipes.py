@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from suave_des import run_mission
 from suave_des.campaign.campaign import run_campaign
-from suave_des.campaign.single import run_mission
 from tests.helpers.command import command_here, ends_within
 
 STORE = "campaign.sqlite"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import re
@@ -16,15 +15,10 @@ from suave_des.campaign import workers
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
 from suave_des.campaign.missions import GIVEN_UP, MissionRunner, WorkerError
 from suave_des.errors import InputError
-from tests.helpers import AWKWARD
+from tests.helpers import AWKWARD, rows_of
 
 pytestmark = pytest.mark.usefixtures("quick_workers")
 RUNS = 12
-
-
-def rows_of(folder: Path) -> list[dict[str, str]]:
-    with (folder / "runs.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -127,11 +121,18 @@ def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: 
 
 
 LOOPS = """
+from pathlib import Path
 from suave_des.managing.simple import NoManager
 class Loops(NoManager):
     def diagnostic(self, diagnostic):
         while True:
             pass
+class LoopsLater(NoManager):
+    def mission_started(self):
+        while Path("there").exists():
+            pass
+    def mission_ended(self, metrics):
+        Path("there").touch()
 """
 
 
@@ -147,10 +148,12 @@ def test_a_manager_whose_missions_all_take_too_long_is_given_up(
     assert result.done == 200 and 3 <= len(result.failures) <= 3 * workers
     assert result.remarks == (f"manager loops:Loops: {GIVEN_UP}",)
     for failure in result.failures:
-        assert re.fullmatch(r"not done after 0.5 s \(time-out\), in diagnostic \(loops.py, line [56]\)", failure.cause)
+        assert re.fullmatch(r"not done after 0.5 s \(time-out\), in diagnostic \(loops.py, line [67]\)", failure.cause)
         assert 0.0 < failure.time_s < 2.0
     missions = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]
     assert missions["left_out"] == 200 - len(result.failures)
+    later = run_campaign("seams2023", ["loops:LoopsLater"], 6, 1, time_out_s=0.3)
+    assert (later.done, len(later.failures), later.remarks) == (1, 5, ())  # one could be done: it is tried again
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: pytest.MonkeyPatch) -> None:

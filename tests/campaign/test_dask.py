@@ -95,13 +95,6 @@ def small_cluster(_small_clusters: list[Cluster], tmp_path_factory: pytest.TempP
     return _small_clusters[-1]
 
 
-@pytest.fixture
-def short(tmp_path: Path) -> Path:
-    path = tmp_path / "short.yaml"
-    path.write_text(chaos.SHORT)
-    return path
-
-
 def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
     cluster: Cluster, users_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -154,7 +147,7 @@ def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(sm
     assert all(row[3:] == idle[row[2]] for row in result.rows)
 
 
-def test_ctrl_c_on_the_command_line(cluster: Cluster, short: Path, tmp_path: Path) -> None:
+def test_ctrl_c_on_the_command_line(cluster: Cluster, scenario: Path, tmp_path: Path) -> None:
     asked = ["short.yaml", "--managers", "none", "--runs", "100000", "--scheduler", cluster.address, "--out", "out"]
     process = chaos.start(asked, tmp_path)
     journal = tmp_path / "out" / f"{STORE_FILE}-wal"
@@ -168,11 +161,11 @@ def test_ctrl_c_on_the_command_line(cluster: Cluster, short: Path, tmp_path: Pat
     assert run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2  # workers are free for it
 
 
-def test_interrupted_there_and_resumed_here(cluster: Cluster, short: Path, tmp_path: Path) -> None:
+def test_interrupted_there_and_resumed_here(cluster: Cluster, scenario: Path, tmp_path: Path) -> None:
     def stop(progress: Progress) -> None:
         raise KeyboardInterrupt
 
-    asked = (short, ["none", "random"], 50, 1)
+    asked = (scenario, ["none", "random"], 50, 1)
     varied = {
         "sweep": {"visibility.period_s": [40, 80]},
         "perturbations": {"start.y_m": {"distribution": "normal", "mean": 0.0, "std": 1.0}},
@@ -195,7 +188,7 @@ def test_another_version_on_a_worker_is_named_and_nothing_is_written(
 
 
 def test_a_scheduler_that_is_lost_in_the_middle(
-    small_cluster: Cluster, short: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    small_cluster: Cluster, scenario: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     stopped_s = []
 
@@ -204,7 +197,7 @@ def test_a_scheduler_that_is_lost_in_the_middle(
             kill(small_cluster.scheduler)
             stopped_s.append(time.monotonic())
 
-    asked = (short, ["none", "random"], 200, 1)
+    asked = (scenario, ["none", "random"], 200, 1)
     with pytest.raises(WorkerError) as lost:
         run_campaign(*asked, out=tmp_path / "out", scheduler=small_cluster.address, on_progress=kill_scheduler)
     assert time.monotonic() < stopped_s[0] + 20.0  # Dask itself would go on for longer

@@ -115,12 +115,6 @@ def test_an_unknown_function_is_reported_with_the_nearest_one() -> None:
         run_campaign("seams2023", [f"{AWKWARD}:MisspellsFunction"], 1)
 
 
-def test_a_misspelt_measured_attribute_is_reported() -> None:
-    (remark,) = run_mission("seams2023", f"{AWKWARD}:ReadsNothing").remarks
-    assert "measured('visibility') is always None" in remark
-    assert "water_visibility" in remark
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.usefixtures("quick_workers")
 def test_a_name_that_nothing_measures_is_reported_once(workers: int, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import linecache
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -236,7 +237,7 @@ class TestReceivedFolder:
         command = "exec:sh -c 'touch ran'"
         (folder / "mine.yaml").write_text(f'campaign: 1\nscenario: seams2023\nmanagers: ["{command}"]\nruns: 1\n')
         done = command_here(*RESUME, cwd=folder)
-        assert done.returncode == 2 and f"give --managers {command}" in done.stderr
+        assert done.returncode == 2 and f"give --managers {shlex.quote(command)} or --yes" in done.stderr
         assert not (folder / "ran").exists()
 
 

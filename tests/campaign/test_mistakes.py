@@ -89,14 +89,6 @@ def test_shipped_files_are_not_even_checked(scenario: str, tmp_path: Path, monke
     campaign(tmp_path, scenario=scenario, managers="metacontrol")
 
 
-def test_scripts_are_told_once_of_the_same_files(
-    tmp_path: Path, wrong_rule: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    for _ in range(2):
-        run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])
-    assert [STATUS in message for message in caplog.messages] == [True, False]
-
-
 def test_the_same_files_are_checked_once_and_changed_ones_again(
     tmp_path: Path, wrong_rule: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -27,13 +27,6 @@ RUNS = 100_000
 FILES = [STORE_FILE, "manifest.json", "runs.csv", "summary.csv"]
 
 
-@pytest.fixture
-def scenario(tmp_path: Path) -> Path:
-    path = tmp_path / "short.yaml"
-    path.write_text(chaos.SHORT)
-    return path
-
-
 def wait_for(path: Path, size: int = 0) -> None:
     until = time.monotonic() + 60.0
     while not (path.exists() and path.stat().st_size >= size):

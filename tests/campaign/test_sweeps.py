@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from suave_des.errors import InputError
 from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
-from tests.helpers import AWKWARD
+from tests.helpers import AWKWARD, rows_of
 
 HEAD = "campaign: 1\nscenario: seams2023\nmanagers: [none, random]\nruns: 4\nseed: 7\n"
 UNIFORM = "{distribution: uniform, minimum: %s, maximum: %s}"
@@ -27,11 +26,6 @@ def write(folder: Path, text: str) -> Path:
     path = folder / "campaign.yaml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def rows_of(folder: Path) -> list[dict[str, str]]:
-    with (folder / "runs.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path: Path) -> None:

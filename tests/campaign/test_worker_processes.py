@@ -20,13 +20,6 @@ CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers=2)
 MINE = "from suave_des.managing.simple import RandomManager\nclass Mine(RandomManager):\n    pass\n"
 
 
-@pytest.fixture
-def scenario(tmp_path: Path) -> Path:
-    path = tmp_path / "short.yaml"
-    path.write_text(chaos.SHORT)
-    return path
-
-
 def run_script(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
     (folder / "script.py").write_text("from suave_des import run_campaign\n" + text)
     path = os.pathsep.join([str(Path(suave_des.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])

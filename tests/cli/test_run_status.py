@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 import suave_des
-from suave_des.campaign.single import run_mission
+from suave_des.campaign.single import run_recorded
 from suave_des.cli.console import mission_status
 from tests.helpers.command import command_here
 
@@ -34,10 +34,10 @@ class Slow(NoManager):
 
 def test_mission_time_is_told_second_by_second_and_changes_nothing() -> None:
     told: list[tuple[float, float]] = []
-    watched = run_mission("seams2023", "random", 1, 1, on_time=lambda t_s, limit_s: told.append((t_s, limit_s)))
+    _, watched = run_recorded("seams2023", "random", 1, 1, on_time=lambda t_s, limit_s: told.append((t_s, limit_s)))
     assert told[:2] == [(0.0, 300.0), (1.0, 300.0)]
     assert len(told) == 301
-    assert watched == run_mission("seams2023", "random", 1, 1)
+    assert watched == run_recorded("seams2023", "random", 1, 1)[1]
 
 
 def test_on_a_terminal_the_line_has_the_mission_time_reached(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,17 +1,17 @@
 """What reference pages and README say of files, names and links is so."""
 
-import importlib
+import inspect
 import re
 import tomllib
 
 import make_cli_reference
 import pytest
 import yaml
-from doc_blocks import ROOT
+from doc_blocks import ROOT, blocks_of
 
-from suave_des import __version__
+import suave_des
+from suave_des import __version__, run_mission
 from suave_des.campaign.results import SUMMARY_COLUMNS
-from suave_des.campaign.single import run_mission
 from suave_des.records.metrics import COLUMNS
 from suave_des.records.mission_folder import EVENT_COLUMNS, TRAJECTORY_COLUMNS
 from suave_des.records.runs import suave_pieces
@@ -98,11 +98,21 @@ def test_the_command_line_s_page_is_the_one_that_the_commands_give():
     assert page == make_cli_reference.page(), "run python docs/make_cli_reference.py"
 
 
-def test_python_names_exist():
-    rows = tables((ROOT / "docs" / "reference" / "python-api.md").read_text(encoding="utf-8"))[0]
-    for dotted, _ in rows:
-        module, _, name = dotted.strip("`").rpartition(".")
-        assert hasattr(importlib.import_module(module), name), dotted
+PYTHON_PAGE = ROOT / "docs" / "reference" / "python-api.md"
+
+
+def test_the_python_page_lists_the_names_of_the_package_each_with_an_example():
+    names = [row[0].strip("`") for row in tables(PYTHON_PAGE.read_text(encoding="utf-8"))[0]]
+    assert sorted(names) == sorted(suave_des.__all__) and len(names) <= 40
+    examples = "\n".join(block.text for block in blocks_of(PYTHON_PAGE) if block.language == "python")
+    assert not [name for name in names if not re.search(rf"\b{name}\b", examples)]
+
+
+@pytest.mark.parametrize("name", suave_des.__all__)
+def test_a_name_of_the_package_is_there_and_described(name):
+    found = getattr(suave_des, name)
+    assert name == "FAILED" or inspect.getdoc(found)
+    assert name == "FAILED" or found.__name__ == name
 
 
 def anchors(page):

@@ -5,16 +5,39 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 import suave_des
 from suave_des.cli.main import main
 
 _PACKAGE_PARENT = str(Path(suave_des.__file__).resolve().parents[1])
+
+
+EXAMPLES = ("perl", "node", "c")
+"""Languages of the managers in docs/examples/exec."""
+
+
+def example_program(language: str) -> str:
+    """The command that runs the example of a manager in a language; C is compiled into the current folder."""
+    folder = Path(__file__).resolve().parents[2] / "docs" / "examples" / "exec"
+    needed, command = {
+        "perl": ("perl", f"perl {shlex.quote(str(folder / 'manager.pl'))}"),
+        "node": ("node", f"node {shlex.quote(str(folder / 'manager.js'))}"),
+        "c": ("gcc", "./manager"),
+    }[language]
+    if shutil.which(needed) is None:
+        pytest.skip(f"there is no {needed}")
+    if language == "c":
+        subprocess.run(["gcc", "-O2", "-o", "manager", folder / "manager.c"], check=True)
+    return command
 
 
 def suave_des_command(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:

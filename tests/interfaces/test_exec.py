@@ -13,8 +13,8 @@ import pytest
 from suave_des import InputError, run_campaign, run_mission
 from suave_des.interfaces import exec as programs
 from suave_des.registry import manager_class
+from tests.helpers.command import EXAMPLES, example_program
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples" / "exec"
 HEAD = "import json, os, sys, time\nfor number, line in enumerate(sys.stdin):\n    message = json.loads(line)\n"
 
 
@@ -48,21 +48,10 @@ print(json.dumps(answer), flush=True)
 """
 
 
-def command(language: str, folder: Path) -> str:
-    if language == "perl":
-        return f"exec:perl {EXAMPLES / 'manager.pl'}"
-    if language == "node":
-        return f"exec:node {EXAMPLES / 'manager.js'}"
-    subprocess.run(["gcc", "-O2", "-o", folder / "manager", EXAMPLES / "manager.c"], check=True)
-    return f"exec:{folder / 'manager'}"
-
-
-@pytest.mark.parametrize(("language", "needs"), [("perl", "perl"), ("node", "node"), ("c", "gcc")])
-def test_the_examples_carry_out_the_same_missions(language: str, needs: str, tmp_path: Path) -> None:
-    if shutil.which(needs) is None:
-        pytest.skip(f"there is no {needs}")
+@pytest.mark.parametrize("language", EXAMPLES)
+def test_the_examples_carry_out_the_same_missions(language: str, tmp_path: Path) -> None:
     (tmp_path / "same.py").write_text(SAME)
-    frame = run_campaign("seams2023", ["same:Same", command(language, tmp_path)], runs=5)
+    frame = run_campaign("seams2023", ["same:Same", f"exec:{example_program(language)}"], runs=5)
     one, other = (part.reset_index(drop=True) for _, part in frame.groupby("manager", observed=True))
     assert (one["search_time_s"] == other["search_time_s"]).all()
     assert (one["distance_inspected_m"] == other["distance_inspected_m"]).all()

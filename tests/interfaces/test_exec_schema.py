@@ -2,9 +2,6 @@
 
 import dataclasses
 import json
-import shlex
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,8 +12,7 @@ import pytest
 from suave_des import run_mission
 from suave_des.interfaces import exec as programs
 from suave_des.metrics.result import MissionMetrics
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples" / "exec"
+from tests.helpers.command import EXAMPLES, example_program
 
 RELAY = """
 import subprocess, sys
@@ -78,20 +74,9 @@ def assert_exchange_fits(command: str, scenario: str, schema: dict[str, Any]) ->
     return messages
 
 
-def command_of(language: str) -> str:
-    if language == "perl":
-        return f"perl {shlex.quote(str(EXAMPLES / 'manager.pl'))}"
-    if language == "node":
-        return f"node {shlex.quote(str(EXAMPLES / 'manager.js'))}"
-    subprocess.run(["gcc", "-O2", "-o", "manager", EXAMPLES / "manager.c"], check=True)
-    return "./manager"
-
-
-@pytest.mark.parametrize(("language", "needs"), [("perl", "perl"), ("node", "node"), ("c", "gcc")])
-def test_every_line_of_a_mission_of_the_examples_fits(language: str, needs: str, schema: dict[str, Any]) -> None:
-    if shutil.which(needs) is None:
-        pytest.skip(f"there is no {needs}")
-    messages = assert_exchange_fits(command_of(language), "seams2023", schema)
+@pytest.mark.parametrize("language", EXAMPLES)
+def test_every_line_of_a_mission_of_the_examples_fits(language: str, schema: dict[str, Any]) -> None:
+    messages = assert_exchange_fits(example_program(language), "seams2023", schema)
     assert {"task_requested", "task_cancelled", "adapt"} <= {each["type"] for each in messages}
 
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from suave_des.campaign.single import run_mission
+from suave_des import run_mission
 from suave_des.errors import InputError
 from suave_des.kb.replay import RuleChange, try_rules
 from suave_des.records.knowledge import (

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.single import run_mission
+from suave_des import run_mission
 from suave_des.kb import KnowledgeBase
 from suave_des.kb.coverage import FIRES, Goal, least_cover, measure_coverage
 from suave_des.kb.mutation import (

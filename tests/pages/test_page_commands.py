@@ -6,8 +6,8 @@ from importlib.resources import files
 
 import pytest
 
+from suave_des import run_mission
 from suave_des.campaign.campaign import run_campaign
-from suave_des.campaign.single import run_mission
 from suave_des.cli.main import main
 from suave_des.pages.recorded import MissionSelection, missions_in, recorded
 from suave_des.pages.replay import mission_on_page

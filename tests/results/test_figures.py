@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from suave_des import run_mission
 from suave_des.campaign.campaign import run_campaign
-from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
 from suave_des.estimates import mean_of
 from suave_des.records.mission_folder import MissionRecord, read_mission

@@ -1,6 +1,6 @@
 """A manager for suave-des that trusts the measured visibility less than it might."""
 
-from suave_des.managing.reference import Threshold
+from suave_des import Threshold
 
 
 class Cautious(Threshold):
