@@ -74,9 +74,9 @@ from suave_des.managing.simple import NoManager
 class Learner(NoManager):
     """Counts its missions."""
 
-    def mission_ended(self, metrics):
-        if self.system.training:
-            self.system.learned["missions"] = self.system.learned.get("missions", 0) + 1
+    def recall(self, learned, training):
+        if training:
+            learned["missions"] = learned.get("missions", 0) + 1
 '''
 SAMPLE_S = 0.05
 

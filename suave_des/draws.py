@@ -6,13 +6,10 @@ import hashlib
 import math
 import random
 from collections.abc import Callable, Mapping
-from functools import cache
 from operator import attrgetter
 
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.quantities import Distribution, Drawn, draw
-
-_entry = cache(attrgetter)
 
 
 class Streams:
@@ -44,18 +41,22 @@ class Draws(Streams):
         seed: the campaign's.
         run: number of the run, from 1.
         runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
+        numbers: keeps the plain numbers by key path, for other runs of the same scenario.
 
     Attributes:
         drawn: values that hold for the whole run, by key path.
 
     Example:
-        >>> draws = Draws(load_scenario("seams2023").scenario, seed=1, run=7)
+        >>> draws = Draws(load_scenario("seams2023").scenario, seed=1, run=7, runs_per_draw={}, numbers={})
         >>> draws.value("calibration.altitude_error_m") == draws.drawn["calibration.altitude_error_m"]
         True
     """
 
-    def __init__(self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int] = {}) -> None:
+    def __init__(
+        self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int], numbers: dict[str, float]
+    ) -> None:
         super().__init__(seed, run)
+        self._numbers = numbers
         self._scenario, self._seed, self._run, self._runs_per_draw = scenario, seed, run, runs_per_draw
         self.drawn: dict[str, float] = {}
 
@@ -63,22 +64,21 @@ class Draws(Streams):
         """Draw the run's value for a key of the scenario.
 
         Args:
-            key: key path, which names the stream.
+            key: key path, which names the stream; after a slash, whose value it is, if several have one.
             distribution: None: the scenario's entry at that path.
             least: values below count as this.
         """
-        found = self.entry(key) if distribution is None else distribution
-        if not isinstance(found, float):
-            shared_by = self._runs_per_draw.get(key, 1)
-            first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
-            found = found.draw(Streams(self._seed, first).stream(_stream_name(key, found)))
-        value = self.drawn[key] = max(least, found)
+        value = self._numbers.get(key)
+        if value is None:
+            found = attrgetter(key.partition("/")[0])(self._scenario) if distribution is None else distribution
+            if isinstance(found, float):
+                value = self._numbers[key] = max(least, found)
+            else:
+                shared_by = self._runs_per_draw.get(key, 1)
+                first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
+                value = max(least, found.draw(Streams(self._seed, first).stream(_stream_name(key, found))))
+        self.drawn[key] = value
         return value
-
-    def entry(self, key: str) -> Distribution:
-        """Return the scenario's entry at a key path."""
-        found: Distribution = _entry(key)(self._scenario)
-        return found
 
     def each_time(self, key: str, distribution: Distribution) -> Callable[[], float]:
         """Make a function that draws a new value at each call."""

@@ -116,18 +116,25 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     Raises:
         InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem.
     """
+    if name in _BUILT_IN:
+        return _built_in(name)
     family, _, argument = name.partition(":")
     if family in _FAMILIES:
         return _member(family, argument)
-    target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
+    target = name if ":" in name else _registered().get(name)
     if target is None:
         hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     found = _load(f"manager {name!r}", target, ManagingSubsystem)
-    if not is_built_in(name) and found not in _checked:
+    if found not in _checked:
         check_manager(f"manager {name!r}", found)
         _checked.add(found)
     return found
+
+
+@cache
+def _built_in(name: str) -> type[ManagingSubsystem]:
+    return _load(f"manager {name!r}", _BUILT_IN[name], ManagingSubsystem)
 
 
 def _member(family: str, argument: str) -> type[ManagingSubsystem]:

@@ -85,10 +85,6 @@ class MissionCoordinator:
         if not self.ended.triggered:
             self._tasks.interrupt()
 
-    def end_at_battery_level(self, battery: BatteryMeasurements, least_level: float) -> None:
-        """End the mission at the first measurement of the battery that is at or below a level."""
-        self.env.process(self._watch_battery(battery, least_level))
-
     def _carry_out_tasks(self) -> Process:
         try:
             yield from self._search_and_inspect()
@@ -126,7 +122,8 @@ class MissionCoordinator:
         yield until(self.env, tick_at_or_after(self.time_limit_s, self._limit_phase_s, period_s))
         self._finish("time limit")
 
-    def _watch_battery(self, battery: BatteryMeasurements, least_level: float) -> Process:
+    def watch_battery(self, battery: BatteryMeasurements, least_level: float) -> Process:
+        """End the mission at the first measurement of the battery that is at or below a level."""
         yield until(self.env, battery.timing.phase_s)
         while battery.level(self.env.now) > least_level:
             yield self.env.timeout(battery.timing.period_s)

@@ -12,7 +12,7 @@ from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _MIN_ROWS_AHEAD = 22
-"""Minimum look-ahead; beyond it, as far as guidance has computed. There the set-point usually changes."""
+"""Minimum look-ahead after a change of control, doubled while there is no other; or as far as guidance has computed."""
 _AFTER_CONTROL_S = 0.6 * STEP_S
 """Delay past the last checked row before more are checked: a control change that rounds to that row comes first."""
 
@@ -42,6 +42,7 @@ class PipelineDetector:
     first_point: int | None = None
     detected_s: float = math.inf
     _row: int = 0  # of the alarm
+    _rows_ahead: int = _MIN_ROWS_AHEAD
     _seen: int = -1
 
     def __post_init__(self) -> None:
@@ -51,11 +52,12 @@ class PipelineDetector:
         self._look_ahead(0)
 
     def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
+        self._rows_ahead = _MIN_ROWS_AHEAD
         self._look_ahead(row)
 
     def _look_ahead(self, row: int) -> None:
         """Check the rows from one on; set the alarm to the first sight, or to the last row that was checked."""
-        last = min(max(row + _MIN_ROWS_AHEAD, self.vehicle.computed_row), self.vehicle.last_row)
+        last = min(max(row + self._rows_ahead, self.vehicle.computed_row), self.vehicle.last_row)
         if row >= last:
             self._alarm.cancel()
             return
@@ -71,6 +73,7 @@ class PipelineDetector:
 
     def _ring(self) -> None:
         if self._seen < 0:
+            self._rows_ahead *= 2
             self._look_ahead(self._row)
             return
         self.vehicle.control_listeners.remove(self._control_changed)

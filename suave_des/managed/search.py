@@ -77,9 +77,8 @@ class GenerateSearchPath(WaypointFunction):
 
     def _restart(self) -> None:
         self._step = 0
-        self._radius_m = 0.0
         self._last_altitude_m: float | None = None  # at the tick before
-        self._present: Array | None = None  # current way-point, None before the first
+        self._ahead: Array | None = None  # the current way-point and some that follow it; None before the first
 
     def configure(self, mode: Mode) -> None:
         """Apply the mode's spiral_altitude; the spiral itself continues."""
@@ -95,7 +94,7 @@ class GenerateSearchPath(WaypointFunction):
             self._restart()
         if self.revision.workaround_cleared_on_activation:
             self._below_m = 0.0
-        is_first = self._present is None
+        is_first = self._ahead is None
         if self.revision.centre == "activation" or (self.revision.centre == "first_activation" and is_first):
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
         if self._ready_s is None:
@@ -115,12 +114,16 @@ class GenerateSearchPath(WaypointFunction):
 
     def waypoints(self, count: int) -> Array:
         """Return the current way-point and those that follow it at the current altitude."""
-        if self._present is None:
-            self.reached(1)
-        waypoints = np.empty((count, 4))
-        waypoints[0] = self._present
-        self._spiral(waypoints[1:])
-        return waypoints
+        waypoints = np.empty((count + 1, 4))  # the last one is current when all others are reached
+        form = self.revision.angle_step_rad, self.view_tangent
+        if self._ahead is None:
+            spiral(self._step, 0.0, self.altitude_m, form, self.centre_m, waypoints)
+            self._step += 1
+        else:
+            waypoints[0] = self._ahead[0]
+            spiral(self._step, waypoints.item(0, 3), self.altitude_m, form, self.centre_m, waypoints[1:])
+        self._ahead = waypoints
+        return waypoints[:count]
 
     def set_point_z_m(self) -> float:
         """Return the z of the altitude, lowered by the work-around; arrival is checked at the way-point's own z."""
@@ -128,8 +131,8 @@ class GenerateSearchPath(WaypointFunction):
 
     def reached(self, count: int) -> None:
         """Advance to the next way-point."""
-        self._present = self._spiral(np.empty((count, 4)))[-1]
-        self._radius_m = self._present.item(3)
+        assert self._ahead is not None  # it was one of the way-points
+        self._ahead = self._ahead[count:]
         self._step += count
 
     def not_reached(self) -> None:
@@ -141,11 +144,6 @@ class GenerateSearchPath(WaypointFunction):
         waypoint = self.waypoints(1)
         if max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1))) <= self.revision.acceptance_m:
             self._below_m += self.revision.workaround_step_m
-
-    def _spiral(self, waypoints: Array) -> Array:
-        form = self.revision.angle_step_rad, self.view_tangent
-        spiral(self._step, self._radius_m, self.altitude_m, form, self.centre_m, waypoints)
-        return waypoints
 
     def arrival_check(self, start_s: float) -> ArrivalCheck:
         """Check at each tick, from the one after the way-point's on."""

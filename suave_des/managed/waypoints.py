@@ -105,17 +105,17 @@ class WaypointFunction(FunctionNode):
         check, self._check = self._check, None
         if check is not None:
             self.sender.vehicle.cancel_waypoints(self.env.now, check)
-            self._sent -= self._last_tick(check) + 1  # on resumption the first tick is 0 again
+            self._sent -= check.last_tick_until(self.env.now) + 1  # on resumption the first tick is 0 again
 
     def catch_up(self) -> None:
         """Count the way-points that have been reached by now."""
         if self._check is not None:
-            self._count_arrivals(self._last_tick(self._check))
+            self._count_arrivals(self._check.last_tick_until(self.env.now))
 
     def waypoints_changed(self) -> None:
         """Look ahead again at the next tick after the way-points change (call `catch_up` before they do)."""
         check = self._check
-        if check is not None and self._act_at > (tick := self._last_tick(check)):
+        if check is not None and self._act_at > (tick := check.last_tick_until(self.env.now)):
             self.sender.vehicle.cancel_waypoints(self.env.now, check)
             self._looking_again.cancel()
             self._arrivals, self._due = [], Due.LOOK
@@ -161,7 +161,7 @@ class WaypointFunction(FunctionNode):
 
     def _look_again(self) -> None:
         check = self._check
-        if check is not None and self._act_at > (tick := self._last_tick(check)):
+        if check is not None and self._act_at > (tick := check.last_tick_until(self.env.now)):
             self._count_arrivals(tick)
             self._due = Due.LOOK
             self._look_ahead(check, tick, first=tick + 1)
@@ -175,9 +175,6 @@ class WaypointFunction(FunctionNode):
             self.sender.queued_were_sent(reached - is_sent_separately)
             self._is_sent_again = False
             self.reached(reached)
-
-    def _last_tick(self, check: ArrivalCheck) -> int:
-        return check.last_tick_until(self.env.now)
 
     def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
         self._act_at = tick

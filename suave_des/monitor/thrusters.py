@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 import simpy
 
 from suave_des.clock import Process, tick_at_or_after, until
@@ -64,7 +65,7 @@ class Thrusters:
 
     def _set_health(self, thruster: int, health: float) -> None:
         self.vehicle.set_thruster_health(self.env.now, thruster, health)
-        self.working.append((self.env.now, self.vehicle.working_thrusters))
+        self.working.append((self.env.now, int(np.count_nonzero(self.vehicle.health))))
 
     def _has_no_effect(self) -> bool:
         """Decide whether the mission's first failure, which happens now, has no effect on the vehicle."""
@@ -74,21 +75,16 @@ class Thrusters:
         return probability > 0.0 and self.draws.stream("thruster_failures").random() < probability
 
 
-Schedule = Sequence[tuple[ThrusterEvent, float]]
-"""A scenario's thruster events, each with its time in a run, as the revision counts it, s."""
-
-
-def draw_schedule(scenario: Scenario, draws: Draws) -> Schedule:
-    """Draw the times of the thruster events for a run."""
-    keys = [f"thruster_events.{number}.time_s" for number in range(len(scenario.thruster_events))]
-    events = zip(scenario.thruster_events, keys, strict=True)
-    return [(event, draws.value(key, event.time_s, least=0.0)) for event, key in events]
+def draw_schedule(scenario: Scenario, draws: Draws) -> list[tuple[ThrusterEvent, float]]:
+    """Draw the times of the thruster events for a run, each as the revision counts it, s."""
+    keys = (f"thruster_events.{number}.time_s" for number in range(len(scenario.thruster_events)))
+    return [(each, draws.value(next(keys), each.time_s, least=0.0)) for each in scenario.thruster_events]
 
 
 def thruster_monitor(
     thrusters: Thrusters,
     bus: DiagnosticsBus,
-    schedule: Schedule,
+    schedule: Sequence[tuple[ThrusterEvent, float]],
     timing: Timing,
     after_previous: bool,
     is_lost: Callable[[float], bool] | None = None,

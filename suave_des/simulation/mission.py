@@ -32,7 +32,7 @@ from suave_des.metrics.further import FurtherMetrics
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
-from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measurements, Timing, message_loss
 from suave_des.monitor.monitors import leak_monitor, measure_battery, measure_signals, start_monitors
 from suave_des.monitor.thrusters import Thrusters, draw_schedule, thruster_monitor
@@ -120,7 +120,7 @@ class Mission:
         revision, loaded = described.revision, prepared.loaded
         self.env = env = simpy.Environment()
         self.bus = DiagnosticsBus()
-        self._draws = draws = Draws(described, seed, run, prepared.runs_per_draw)
+        self._draws = draws = Draws(described, seed, run, prepared.runs_per_draw, prepared.numbers)
         self._recorder = recorder = Recorder(env, record, described.reaction_metric)
 
         # The vehicle, and what is measured.
@@ -131,8 +131,8 @@ class Mission:
         signals = {each.key: each for each in measure_signals(loaded, draws, prepared.duration_s)}
         self._visibility = signals[WATER_VISIBILITY]
         self._battery = measure_battery(described, draws, self._vehicle)
-        battery = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
-        self._measurements: Mapping[str, Measurements] = {**signals, **battery}
+        self._battery_only: Mapping[str, Measurements] = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
+        self._measurements: Mapping[str, Measurements] = {**signals, **self._battery_only}
 
         # The managed subsystem.
         visible = self._visibility.arrays, prepared.detection_points, prepared.view_tangent
@@ -164,8 +164,7 @@ class Mission:
             _files=files,
             _open_knowledge=lambda: prepared.knowledge,
         )
-        is_training = prepared.training is not None
-        self._host = ManagerHost(manager_type, system, self.bus, self._error_of, learned, is_training)
+        self._host = ManagerHost(manager_type, system, self.bus, self._error_of, learned, prepared.training is not None)
         self.manager = self._host.manager
         self._start_processes()
 
@@ -333,8 +332,8 @@ class Mission:
         revision, loss_probability = described.revision, draws.value("revision.set_points.loss_probability")
 
         def sender(function: str) -> SetPointSender:
-            keys = [f"revision.set_points.node_frame_offset_{axis}_m" for axis in "xyz"]
-            x_m, y_m, z_m = (draws.value(f"{key}/{function}", draws.entry(key)) for key in keys)
+            keys = [f"revision.set_points.node_frame_offset_{axis}_m/{function}" for axis in "xyz"]
+            x_m, y_m, z_m = map(draws.value, keys)
             stream = draws.stream(f"set_points/{function}") if loss_probability else None
             return SetPointSender(self._vehicle, env, (x_m, y_m, z_m), loss_probability, stream)
 
@@ -392,7 +391,7 @@ class Mission:
         )
         level = None if described.battery is None else described.battery.mission_ends_at_level
         if self._battery is not None and level is not None:
-            coordinator.end_at_battery_level(self._battery, level)
+            self.env.process(coordinator.watch_battery(self._battery, level))
         if described.leak is not None:
             self.env.process(leak_monitor(self.env, self.bus, draws.value("leak.time_s"), coordinator.give_up))
         return coordinator
@@ -400,8 +399,8 @@ class Mission:
     def _observe(self) -> None:
         """Have metrics and record told what they are made of."""
         modes, bus = self.mode_manager, self.bus
-        self.components: dict[str, str] = {}
-        bus.subscribe(self._component_reported, (Kind.COMPONENT_STATUS,))
+        self.components = components = dict[str, str]()
+        bus.subscribe(lambda report: components.update({report.key: str(report.value)}), (Kind.COMPONENT_STATUS,))
         bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
         modes.listeners.append(self._reactions.mode_effect)
         if self._scenario.further_columns:
@@ -410,9 +409,6 @@ class Mission:
         if self._recorder.enabled:
             bus.subscribe(self._recorder.diagnostic)
             modes.listeners.append(self._recorder.mode_effect)
-
-    def _component_reported(self, diagnostic: Diagnostic) -> None:
-        self.components[diagnostic.key] = str(diagnostic.value)
 
     def _start_processes(self) -> None:
         """Start the coordinator, the monitors and the manager."""
@@ -447,11 +443,10 @@ class Mission:
             if self._surface is not None and self._surface.surfaced_s is not None:
                 self._further.surfacing_time_s = self._surface.surfaced_s - self._draws.drawn["leak.time_s"]
             further = self._further.columns(metrics)
-        battery = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
         return MissionResult(
             metrics,
             tuple(recorder.events),
-            recorder.trajectory(self._vehicle, self._visibility, battery),
+            recorder.trajectory(self._vehicle, self._visibility, self._battery_only),
             tuple(recorder.knowledge),
             self._draws.drawn,
             refusals(self.mode_manager),

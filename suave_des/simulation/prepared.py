@@ -55,8 +55,11 @@ class PreparedScenario:
         self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         self.custom_functions = custom_functions(loaded)
-        self.vehicle_model, self.autopilot = vehicle_model(scenario.vehicle), autopilot_of(scenario.calibration)
+        calibrated = [name for name in Autopilot._fields if name in Calibration.model_fields]
+        self.autopilot = Autopilot(**{name: getattr(scenario.calibration, name) for name in calibrated})
+        self.vehicle_model = vehicle_model(scenario.vehicle)
         self.view_tangent = scenario.vehicle.camera.tangent
+        self.numbers: dict[str, float] = {}
         self._spare_tracks: list[Array] = []
         self._manager_inputs: dict[str, tuple[Mapping[str, Path], Mapping[str, Any]]] = {}
 
@@ -126,12 +129,6 @@ def vehicle_model(description: VehicleDescription) -> VehicleModel:
     return VehicleModel(
         **values | {"thrusters": tuple(Thruster(t.position_m, t.direction) for t in values["thrusters"])}
     )
-
-
-def autopilot_of(calibration: Calibration) -> Autopilot:
-    """Return the autopilot's settings, those that are calibrated and the others."""
-    given = {name: getattr(calibration, name) for name in Autopilot._fields if name in Calibration.model_fields}
-    return Autopilot(**given)
 
 
 def _draw_current(wave: CurrentWaveDescription | None, draws: Draws) -> tuple[Point, tuple[float, float, float, float]]:

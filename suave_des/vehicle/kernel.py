@@ -52,6 +52,8 @@ WAVE_RATE, WAVE_PHASE = 34, 35  # its angle per row and at row 0, rad
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
 
+UNCHECKED = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 1.0), -1
+"""A box, a timer and a tick before row 0, for `advance` without checks."""
 Dynamics = tuple[float, Array, Array, Array, Array]
 """What moves the vehicle, besides its state:
 
@@ -102,15 +104,44 @@ def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, 
 
 
 @compiled
-def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
+def row_of(tick: int, timer: tuple[float, float, float]) -> int:
+    """Find the row nearest to a tick of a timer: time of tick 0, time between ticks, and time between rows, s."""
+    start_s, period_s, grid_s = timer
+    return int(np.rint((start_s + tick * period_s) / grid_s))
+
+
+@compiled
+def is_in_box(track: Array, row: int, box: tuple[float, float, float, float, float]) -> bool:
+    """Say whether a row's position is in a box: x, y and z of its centre, half its width and half its height, m."""
+    x, y, z, half_width, half_height = box
+    off_x, off_y, off_z = abs(track[row, 0] - x), abs(track[row, 1] - y), abs(track[row, 2] - z)
+    return bool(off_x <= half_width and off_y <= half_width and off_z <= half_height)
+
+
+@compiled
+def advance(
+    track: Array,
+    first: int,
+    last: int,
+    dynamics: Dynamics,
+    box: tuple[float, float, float, float, float],
+    timer: tuple[float, float, float],
+    tick: int,
+) -> int:
     """Fill rows first + 1 .. last of the track from row `first`, with one set-point and thruster health throughout.
 
     Args:
         track: shape (rows, COLUMNS); written in place.
         first: row to start from.
-        last: last row to fill.
+        last: last row to fill; or the first row at a tick that finds the vehicle in the box.
         dynamics: time step, set-point and constants.
+        box, timer, tick: see `is_in_box` and `row_of`; the first tick that is checked. A call for each tick would take
+            an eighth more time.
+
+    Returns:
+        The tick that finds the vehicle in the box; -1 if none does.
     """
+    check_row = row_of(tick, timer)
     h, set_point, prm, allocation, effectiveness = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
     heading_w, heading_z, number = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN], set_point[NUMBER]
@@ -267,6 +298,12 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         track[row, 17], track[row, 18], track[row, 19] = from_x, from_y, from_z
         track[row, 20], track[row, 21], track[row, 22] = to_x, to_y, to_z
         track[row, LEG_TIME], track[row, LEG_QUARTER], track[row, SET_POINT_NUMBER] = leg_time, quarter, number
+        while row == check_row:
+            if is_in_box(track, row, box):
+                return tick
+            tick += 1
+            check_row = row_of(tick, timer)
+    return -1
 
 
 @compiled
@@ -276,7 +313,7 @@ def fly_waypoints(
     dynamics: Dynamics,
     waypoints: Array,
     sent_as: tuple[float, float, float],
-    box: tuple[float, float],
+    half_box: tuple[float, float],
     timer: tuple[float, float, float],
     window: tuple[int, int, int, int],
     arrivals: IntArray,
@@ -290,7 +327,7 @@ def fly_waypoints(
         waypoints: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
             already.
         sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.
-        box: half the width and half the height of the box around a way-point in which it counts as reached, m.
+        half_box: half the width and half the height of the box around a way-point in which it counts as reached, m.
         timer: time of tick 0, time between ticks, and time between rows, s.
         window: first tick to check, last one for the first way-point, and fewest and most ticks from one to the next.
         arrivals: shape (n,); receives the ticks that find way-points reached.
@@ -298,22 +335,18 @@ def fly_waypoints(
     Returns:
         The number of way-points reached, and the last row that is now filled. Ticks beyond the track do not count.
     """
-    half_width, half_height = box
-    start_s, period_s, grid_s = timer
     tick, last, fewest, most = window
-    set_point, reached = dynamics[1], 0
-    while tick <= last:
-        row = int(np.rint((start_s + tick * period_s) / grid_s))
-        if row >= track.shape[0]:
-            break
+    set_point, reached, last_row = dynamics[1], 0, track.shape[0] - 1
+    while tick <= last and row_of(tick, timer) <= last_row:
+        row, box = row_of(tick, timer), (waypoints[reached, 0], waypoints[reached, 1], waypoints[reached, 2], *half_box)
         if row > computed:
-            advance(track, computed, row, dynamics)
-            computed = row
-        if (
-            abs(track[row, 0] - waypoints[reached, 0]) > half_width
-            or abs(track[row, 1] - waypoints[reached, 1]) > half_width
-            or abs(track[row, 2] - waypoints[reached, 2]) > half_height
-        ):
+            end = min(row_of(last, timer), last_row)
+            tick = advance(track, computed, end, dynamics, box, timer, tick)
+            if not 0 <= tick <= last:
+                computed = end
+                break
+            row = computed = row_of(tick, timer)
+        elif not is_in_box(track, row, box):
             tick += 1
             continue
         arrivals[reached] = tick

@@ -76,16 +76,6 @@ class VehicleModel:
     thrust_limit_n: float
     thrusters: tuple[Thruster, ...]
 
-    @property
-    def buoyancy_n(self) -> float:
-        """Buoyancy of the submerged body."""
-        return self.water_density_kg_per_m3 * self.displaced_volume_m3 * GRAVITY_M_PER_S2
-
-    @property
-    def weight_n(self) -> float:
-        """Weight of the body."""
-        return self.mass_kg * GRAVITY_M_PER_S2
-
     @cached_property
     def wrenches(self) -> Array:
         """B in tau = B u, shape (6, number of thrusters); column i: thruster i's wrench at 1 N (Handbook, 12.3)."""
@@ -141,7 +131,9 @@ def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tup
     integral_limit = 4.0 * model.thrust_limit_n * sqrt(0.5) / model.mass_kg
     inertia = (model.mass_kg,) * 3 + model.inertia_kg_m2
     drag = [coefficient / inert for coefficient, inert in zip(model.quadratic_drag, inertia, strict=True)]
-    forces = model.buoyancy_n - model.weight_n, model.buoyancy_n * model.centre_of_buoyancy_m, *drag
+    buoyancy_n = model.water_density_kg_per_m3 * model.displaced_volume_m3 * GRAVITY_M_PER_S2
+    net_n = buoyancy_n - model.mass_kg * GRAVITY_M_PER_S2
+    forces = net_n, buoyancy_n * model.centre_of_buoyancy_m, *drag
     legs = model.thrust_limit_n, ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
     horizontal = ap.velocity_gain_per_s, ap.velocity_integral_gain_per_s2
     vertical = ap.vertical_velocity_gain_per_s, ap.vertical_velocity_integral_gain_per_s2

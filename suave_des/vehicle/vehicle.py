@@ -89,6 +89,7 @@ class Vehicle:
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
         control_listeners: each is called after a change of control.
         computed_row: last row of the track that is filled.
+        health: of each thruster, from 1 (works) to 0 (dead), shape (thrusters,).
 
     Example:
         >>> vehicle = Vehicle(model, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
@@ -118,7 +119,7 @@ class Vehicle:
         self.track[0] = 0.0
         self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
-        self._health = np.array([1.0] * len(model.thrusters))
+        self.health = np.array([1.0] * len(model.thrusters))
         self._effectiveness = model.wrenches.copy()
         self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
         parameters = kernel_parameters(model, self.autopilot, self.z_limits_m).copy()
@@ -136,16 +137,11 @@ class Vehicle:
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
         """Set the health of thrusters 1 .. n, from 1 (works) to 0 (dead). The autopilot is not informed."""
-        if self._health[thruster - 1] != health:
+        if self.health[thruster - 1] != health:
             self._cancel_after(t_s)
-            self._health[thruster - 1] = health
-            self._effectiveness[:] = self.model.wrenches * self._health
+            self.health[thruster - 1] = health
+            self._effectiveness[:] = self.model.wrenches * self.health
             self._notify(t_s)
-
-    @property
-    def working_thrusters(self) -> int:
-        """Number of thrusters that give thrust."""
-        return int(np.count_nonzero(self._health))
 
     def queue_waypoints(
         self, t_s: float, waypoints: Array, sent_as_m: Point, check: ArrivalCheck, *, first: int, last: int, send: bool
@@ -215,7 +211,7 @@ class Vehicle:
             return
         if row > self.last_row:  # compiled code would write past the track
             raise ValueError(f"the vehicle's track ends at {self.last_row * STEP_S:g} s, before {row * STEP_S:g} s")
-        kernel.advance(self.track, self.computed_row, row, self._dynamics)
+        kernel.advance(self.track, self.computed_row, row, self._dynamics, *kernel.UNCHECKED)
         self.computed_row = row
 
     def _row(self, t_s: float) -> int:

@@ -53,7 +53,7 @@ def tick(self: WaypointFunction) -> None:
 
 def catch_up(self: WaypointFunction) -> None:
     """A tick that is due at this very time comes first."""
-    while self._check is not None and self._act_at <= self._last_tick(self._check):
+    while self._check is not None and self._act_at <= self._check.last_tick_until(self.env.now):
         self._act()
 
 

@@ -3,10 +3,13 @@
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle import kernel
+from suave_des.vehicle.model import GRAVITY_M_PER_S2
 from suave_des.vehicle.vehicle import Vehicle, row_at
 
 VEHICLE = load_scenario("seams2023").scenario.vehicle
 BLUEROV2 = vehicle_model(VEHICLE)
+DISPLACED_KG = BLUEROV2.water_density_kg_per_m3 * BLUEROV2.displaced_volume_m3
+NET_BUOYANCY_N = (DISPLACED_KG - BLUEROV2.mass_kg) * GRAVITY_M_PER_S2
 VIEW_TANGENT = VEHICLE.camera.tangent
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from suave_des.vehicle import kernel
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
-from tests.helpers.vehicles import BLUEROV2
+from tests.helpers.vehicles import BLUEROV2, NET_BUOYANCY_N
 
 B = BLUEROV2.wrenches
 S = np.sqrt(0.5)
@@ -68,7 +68,7 @@ def test_autopilot_commands_a_lost_thruster_as_if_it_worked(make_vehicle, lost: 
     healthy, failed = make_vehicle(), make_vehicle(lost=(lost,))
     for vehicle in (healthy, failed):
         vehicle.command(0.0, 0.3, -0.2, -17.8)
-    net_buoyancy = np.array([0, 0, BLUEROV2.buoyancy_n - BLUEROV2.weight_n, 0, 0, 0])
+    net_buoyancy = np.array([0, 0, NET_BUOYANCY_N, 0, 0, 0])
     commanded = BLUEROV2.allocation @ (first_wrench(healthy) - net_buoyancy)
     commanded[lost - 1] = 0.0
     assert first_wrench(failed) == pytest.approx(B @ commanded + net_buoyancy, abs=1e-9)

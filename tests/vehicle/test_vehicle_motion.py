@@ -8,7 +8,7 @@ import pytest
 from suave_des.vehicle import kernel
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
-from tests.helpers.vehicles import BLUEROV2, nu
+from tests.helpers.vehicles import BLUEROV2, NET_BUOYANCY_N, nu
 
 DIRECTIONS = pytest.mark.parametrize("direction_deg", [0, 45, 90, 180, 270])
 PLACE_M = (0.0, 0.0, -18.0)
@@ -145,7 +145,7 @@ ALL = (1, 2, 3, 4, 5, 6)
 
 
 def test_net_buoyancy_lets_it_rise_slowly(make_vehicle) -> None:
-    terminal_m_per_s = math.sqrt((BLUEROV2.buoyancy_n - BLUEROV2.weight_n) / BLUEROV2.quadratic_drag[2])
+    terminal_m_per_s = math.sqrt(NET_BUOYANCY_N / BLUEROV2.quadratic_drag[2])
     assert nu(make_vehicle(lost=ALL), 100.0)[2] == pytest.approx(terminal_m_per_s, rel=0.01)
 
 
@@ -216,7 +216,7 @@ def test_moving_while_turning_feels_the_coriolis_force(make_vehicle) -> None:
     vehicle, v, omega = make_vehicle(lost=ALL), np.array([0.3, 0.2, -0.1]), np.array([0.5, -0.4, 1.0])
     vehicle.track[0, kernel.VELOCITY] = (*v, *omega)
     mass, drag = BLUEROV2.mass_kg, np.array(BLUEROV2.quadratic_drag[:3])
-    net_buoyancy = np.array([0.0, 0.0, BLUEROV2.buoyancy_n - BLUEROV2.weight_n])
+    net_buoyancy = np.array([0.0, 0.0, NET_BUOYANCY_N])
     pushed = v + STEP_S * (net_buoyancy / mass - np.cross(omega, v))
     assert nu(vehicle, STEP_S)[:3] == pytest.approx(pushed / (1.0 + STEP_S * drag * np.abs(v) / mass))
 
