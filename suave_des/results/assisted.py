@@ -226,18 +226,21 @@ def compare_assisted(
     names = [group.name for group in groups]
     frames = [pandas.concat([group.frame for group in groups]), theirs.frame, many.frame]
     horizon_s = _check(dict(zip(("real missions", "assisted by", "population"), frames, strict=True)), names, chosen)
-    in_real, in_same = matched(frames[0], theirs.frame, theirs.swept)
+    in_real, in_same, drawn = (
+        each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=horizon_s)})
+        for each in (*matched(frames[0], theirs.frame, theirs.swept), _with_draws(many))
+    )
     notes += [*missions.caveats(groups, chosen), *_unlike(theirs, many.frame)]
-    drawn, rows, parts = _with_draws(many), [], []
+    rows, parts = [], []
     for metric in chosen:
-        tables = _tables({"real": in_real, "same": in_same, "draw": drawn}, metric.name, horizon_s)
+        tables = _tables({"real": in_real, "same": in_same, "draw": drawn}, metric.name)
         of_conditions = {name: table.stack() for name, table in tables.items() if not name.startswith("draw")}
         parts.append(pandas.DataFrame(of_conditions).dropna(subset=["real", "same"]).assign(metric=metric.name))
-        shared = _shared(in_same, metric.name, horizon_s)
+        shared = _shared(in_same, metric.name)
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
             rows.append(_estimate(both, metric, tables, shared))
     conditions, estimates = pandas.concat(parts).reset_index(), pandas.DataFrame(rows)
-    plan = pandas.DataFrame(_plan(drawn, wanted, deviations(conditions), names, horizon_s) if wanted else ())
+    plan = pandas.DataFrame(_plan(drawn, wanted, deviations(conditions), names) if wanted else ())
     all_notes = (*ours.notes, *theirs.notes, *many.notes, *notes)
     return AssistedComparison(estimates, plan, all_notes, chosen, conditions)
 
@@ -299,31 +302,22 @@ def _unlike(same: Missions, population: pandas.DataFrame) -> Iterator[str]:
 # Estimates
 
 
-def _values(frame: pandas.DataFrame, metric: str, horizon_s: float) -> pandas.Series[float]:
-    """Return the values of a metric; search times up to the horizon."""
-    values = frame[metric].astype(float)
-    return values.clip(upper=horizon_s) if metric == SEARCH_TIME else values
-
-
-def _tables(frames: Mapping[str, pandas.DataFrame], metric: str, horizon_s: float) -> dict[str, pandas.DataFrame]:
+def _tables(frames: Mapping[str, pandas.DataFrame], metric: str) -> dict[str, pandas.DataFrame]:
     """Return mean (side), variance (side_var) and number (side_n) of missions: conditions or draws by managers."""
     found: dict[str, pandas.DataFrame] = {}
     for side, frame in frames.items():
-        by = frame.assign(value=_values(frame, metric, horizon_s)).groupby(
-            ["draw" if side == "draw" else CONDITION, "manager"], observed=True
-        )["value"]
+        by = frame.groupby(["draw" if side == "draw" else CONDITION, "manager"], observed=True)[metric]
         found |= {side: by.mean().unstack(), f"{side}_var": by.var().unstack(), f"{side}_n": by.count().unstack()}
     return found
 
 
-def _shared(same: pandas.DataFrame, metric: str, horizon_s: float) -> pandas.DataFrame:
+def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
     """Return by run and manager how far simulated missions are on average from the mean of their condition.
 
     Points of a sweep share a run's random numbers, so that the means of all conditions may be off by the same chance.
     """
-    known = same.assign(off=_values(same, metric, horizon_s))
-    known["off"] -= known.groupby(["manager", CONDITION], observed=True)["off"].transform("mean")
-    return known.groupby(["seed", "run", "manager"], observed=True)["off"].mean().unstack("manager")
+    off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform("mean")
+    return same.assign(off=off).groupby(["seed", "run", "manager"], observed=True)["off"].mean().unstack("manager")
 
 
 def _estimate(
@@ -437,19 +431,15 @@ def planned(
     lacking = [f"{metric} of {name}" for metric in wanted for name in names if (name, metric) not in known]
     if lacking:
         notes.append(f"how far real missions are from simulated ones is not known for {missions.listed(lacking)}")
-    rows = pandas.DataFrame(_plan(_with_draws(many), wanted, seen, names, missions.time_limit_s(groups)))
+    rows = pandas.DataFrame(_plan(_with_draws(many), wanted, seen, names))
     return AssistedComparison(pandas.DataFrame(), rows, (*many.notes, *notes), metrics)
 
 
 def _plan(
-    drawn: pandas.DataFrame,
-    wanted: Mapping[str, float],
-    seen: pandas.DataFrame,
-    managers: Sequence[str],
-    horizon_s: float,
+    drawn: pandas.DataFrame, wanted: Mapping[str, float], seen: pandas.DataFrame, managers: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
     for row in seen[seen["metric"].isin(list(wanted)) & seen["manager"].isin(managers)].to_dict("records"):
-        tables = _tables({"draw": drawn[drawn["manager"] == row["manager"]]}, row["metric"], horizon_s)
+        tables = _tables({"draw": drawn[drawn["manager"] == row["manager"]]}, row["metric"])
         means, half_width, chance = tables["draw"].iloc[:, 0], wanted[row["metric"]], row["chance_std"] ** 2
         between = max(0.0, float(means.var()) - chance / float(tables["draw_n"].mean().iloc[0]))
         for each in _RUNS_EACH:
