@@ -44,7 +44,10 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         InputError: a file cannot be read at all.
     """
     sources = collect(subject.given)
-    findings = [*static_findings(subject, sources), *check_shapes(sources, subject.shapes)]
+    findings = static_findings(subject, sources)
+    told = {(each.file, each.line) for each in findings if each.level is Level.ERROR}
+    # A wrong value is told once, in the words of the one who cannot use it.
+    findings += [each for each in check_shapes(sources, subject.shapes) if (each.file, each.line) not in told]
     return ordered([*findings, *_ask_pellet(subject, findings)])
 
 

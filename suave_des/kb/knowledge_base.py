@@ -228,23 +228,21 @@ class KnowledgeBase:
         self,
         max_failed: int = 2,
         on_count: OnCount = lambda done, total: None,
-        on_start: OnCount = lambda kinds, different: None,
         space: PolicySpace | None = None,
     ) -> Policy:
         """Decide every state, with at most `max_failed` components that report a status.
 
         Args:
             max_failed: that many components at most.
-            on_count: called with the number of kinds of states that have been inferred so far, and how many have to be.
-            on_start: called before any is, with the number of kinds of states, and how many of them have to be
-                inferred.
+            on_count: called with the number of kinds of states that have been inferred so far, first 0, and how many
+                have to be.
             space: what to tell apart; None: what can have an effect.
 
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        return make_policy(self.base, self.settings, self.outcome, max_failed, space, on_count, on_start)
+        return make_policy(self.base, self.settings, self.outcome, max_failed, space, on_count)
 
     @cached_property
     def space(self) -> PolicySpace:
@@ -256,22 +254,21 @@ class KnowledgeBase:
         other: KnowledgeBase,
         max_failed: int = 2,
         on_count: OnCount = lambda done, total: None,
-        on_start: OnCount = lambda kinds, different: None,
     ) -> PolicyDifference:
         """Find the states that another knowledge base decides differently, over all states that either distinguishes.
 
-        `on_count` is called as by `policy`, for this one and then for the other; `on_start` for this one.
+        `on_count` is called as by `policy`, for this one and then for the other.
 
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
         space = self.space.common(other.space)
-        one = self.policy(max_failed, on_count, on_start, space)
+        one = self.policy(max_failed, on_count, space)
         # Java has Python search for cycles while it infers: without the first policy's cases that takes half the time.
         gc.freeze()
         try:
-            return compare_policies(one, other.policy(max_failed, on_count, space=space))
+            return compare_policies(one, other.policy(max_failed, on_count, space))
         finally:
             gc.unfreeze()
 

@@ -127,7 +127,6 @@ def make_policy(
     max_failed: int,
     space: PolicySpace | None = None,
     on_count: OnCount = lambda done, total: None,
-    on_start: OnCount = lambda kinds, different: None,
 ) -> Policy:
     """Decide every kind of state; those that differ in nothing on which a decision can depend, once.
 
@@ -137,8 +136,8 @@ def make_policy(
         decide: concludes what follows and is decided in a situation.
         max_failed: maximum number of components that report a status.
         space: what to tell apart; None: what can have an effect.
-        on_count: called with the number of kinds of states that have been inferred so far, and how many have to be.
-        on_start: called before any is, with the number of kinds of states, and how many of them have to be inferred.
+        on_count: called with the number of kinds of states that have been inferred so far, first 0, and how many have
+            to be.
 
     Raises:
         InputError: max_failed is negative, or there would be too many states.
@@ -159,7 +158,7 @@ def make_policy(
     different: dict[Hashable, KnowledgeState] = {}
     for case in chain.from_iterable(kinds()):
         different.setdefault(key(case), case.state)
-    on_start(_number_of_kinds(base, settings, max_failed, space), len(different))
+    on_count(0, len(different))
     decided: dict[Hashable, Outcome] = {}
     for each, state in different.items():
         decided[each] = decide(Situation(state))

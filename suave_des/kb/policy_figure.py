@@ -15,6 +15,8 @@ from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, STAYS
 from suave_des.results.figures import check_picture, write_picture
 from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publication
 
+#: Units of measured values; those of a user's own attributes are not known.
+_UNITS: Final = {"water_visibility": "m", "battery_level": "share of a full battery"}
 _FIXED: Final = {INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", NO_GROUNDING: "#FFFFFF"}
 _LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
 #: Width of the cell of a single value; a range has 1.
@@ -75,11 +77,11 @@ def draw_policy(policy: Policy, path: Path) -> None:
         for axes, panel in zip(grid.flat, panels, strict=False):
             _draw(axes, panel, colours)
             axes.set_title(panel.title, loc="left", fontsize=None if is_flat else 7.5)
-            axes.set_xlabel(f"measured {policy.attributes[0].replace('_', ' ')}")
+            axes.set_xlabel(_measured(policy.attributes[0]))
             if is_flat:
                 axes.invert_yaxis()
             else:
-                axes.set_ylabel(f"measured {policy.attributes[1].replace('_', ' ')}")
+                axes.set_ylabel(_measured(policy.attributes[1]))
         handles = [
             Patch(facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name))
             for name, colour in colours.items()
@@ -91,6 +93,16 @@ def draw_policy(policy: Policy, path: Path) -> None:
             plt.close(figure)
 
 
+def _measured(attribute: str) -> str:
+    return ", ".join(filter(None, (f"measured {attribute.replace('_', ' ')}", _UNITS.get(attribute))))
+
+
+def _low_to_high(design: str) -> tuple[int, str]:
+    """Order designs as their colours are: none, the shipped ones from low to high, then others by name."""
+    known = [NO_GROUNDING, *MODE_COLOURS]
+    return known.index(design) if design in known else len(known), design
+
+
 def _has_choice(table: FunctionTable) -> bool:
     return len({outcome for row in table.rows for outcome in row.outcomes} - {STAYS}) > 1
 
@@ -99,9 +111,8 @@ def _rows_of(table: FunctionTable) -> _Panel:
     """A function's table: measured values across, all else that has an effect down."""
     title = f"{table.function}: what is grounded now (left), and then (colour)"
     columns = [column[0] if column else None for column in table.columns]
-    return _Panel(
-        title, columns, [_label(table, row) for row in table.rows], [_designs(table, row) for row in table.rows]
-    )
+    rows = sorted(table.rows, key=lambda row: _low_to_high(row.groundings.get(table.function, "")))
+    return _Panel(title, columns, [_label(table, row) for row in rows], [_designs(table, row) for row in rows])
 
 
 def _map_of(policy: Policy, table: FunctionTable, row: TableRow) -> _Panel:
@@ -169,7 +180,7 @@ def _colours(names: set[str]) -> dict[str, str]:
     fixed = {**MODE_COLOURS, **_FIXED}
     more = (to_hex(colormaps["Set2"](number)) for number in range(8))
     others = itertools.cycle(dict.fromkeys((*OTHER_MODES, *more)))
-    return {name: fixed[name] if name in fixed else next(others) for name in sorted(names)}
+    return {name: fixed[name] if name in fixed else next(others) for name in sorted(names, key=_low_to_high)}
 
 
 def _label(table: FunctionTable, row: TableRow) -> str:

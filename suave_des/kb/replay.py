@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from itertools import chain
@@ -24,7 +24,6 @@ from suave_des.knowledge.checks.rules import findings_on_rule
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.state import NONE_LEFT, Fact, KnowledgeState, Value
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
@@ -121,33 +120,6 @@ def _times(cycles: Sequence[ReplayedCycle]) -> str:
     return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(cycles)} states"
 
 
-@dataclass(frozen=True)
-class RuleChange:
-    """The rules to try, and the knowledge base to try them on.
-
-    Attributes:
-        rule: a rule as text, or a file of rules; they replace those of the same name. None: no rule is added.
-        disabled: alternatively, the name of a rule to disable.
-        ontologies: in place of those of the missions' scenario.
-        scenario: file or name of a scenario in place of that of the missions.
-        rules: files of rules as text, in addition to the scenario's.
-        disabled_rules: names of rules to switch off with and without the change.
-        reasoner: in place of the scenario's.
-        limit_s: of the reasoner, for one state.
-        values: of that scenario, by key path.
-    """
-
-    rule: str | None = None
-    disabled: str | None = None
-    ontologies: Sequence[Path] = ()
-    scenario: str | None = None
-    rules: Sequence[Path] = ()
-    disabled_rules: Sequence[str] = ()
-    reasoner: str | None = None
-    limit_s: float = TIME_LIMIT_S
-    values: Mapping[str, Any] = field(default_factory=dict)
-
-
 class _RecordedMission(NamedTuple):
     folder: Path
     mission: str
@@ -155,31 +127,57 @@ class _RecordedMission(NamedTuple):
     records: tuple[KnowledgeRecord, ...]
 
 
-def try_rules(folder: Path, change: RuleChange) -> Iterator[MissionReplay]:
+def try_rules(
+    folder: Path,
+    rule: str | None = None,
+    *,
+    disabled: str | None = None,
+    scenario: str | None = None,
+    values: Mapping[str, Any] = {},
+    ontologies: Sequence[Path] = (),
+    rules: Sequence[Path] = (),
+    disabled_rules: Sequence[str] = (),
+    reasoner: str | None = None,
+    limit_s: float = TIME_LIMIT_S,
+) -> Iterator[MissionReplay]:
     """Try adding or disabling rules on recorded missions, one after the other.
 
     Only the recorded states are evaluated: the consequences of different decisions are not simulated.
 
     Args:
         folder: output folder of a mission or of a campaign that recorded its knowledge, or a folder of such folders.
-        change: what to try.
+        rule: a rule as text, or a file of rules; they replace those of the same name.
+        disabled: alternatively, the name of a rule to disable.
+        scenario: file or name of a scenario in place of that of the missions.
+        values: of that scenario, by key path.
+        ontologies, reasoner: in place of the scenario's.
+        rules: files of rules as text, in addition to the scenario's.
+        disabled_rules: names of rules to switch off with and without the change.
+        limit_s: of the reasoner, for one state.
 
     Raises:
         InputError: there is no recorded mission, or the rule cannot be used.
         KnowledgeError: the ontologies cannot be reasoned with.
     """
-    if (change.rule is None) == (change.disabled is None):
+    if (rule is None) == (disabled is None):
         raise InputError("give a rule, or --disable NAME", remedy="one of the two")
+    if values and scenario is None:
+        raise InputError("the recorded scenario cannot be changed", place="--set", remedy="name one with --scenario")
+    given = None if scenario is None else load_scenario(scenario, values=values)
+    limit = TimeLimit(limit_s, "--time-limit")
     trial: _Trial | None = None
     for mission in _recorded_missions(folder):
-        if trial is None or trial.scenario != mission.scenario:
+        used = given.scenario if given else mission.scenario
+        if trial is None or trial.scenario != used:
+            named, texts = (given.ontologies, given.rules) if given else (None, None)
+            base = read_base(used, ontologies or named, texts, more_rules=rules, disabled_rules=disabled_rules)
+            settings, name = ManagingSettings.of(used), reasoner or used.knowledge.reasoner
             is_first = trial is None
-            trial = _Trial(mission.scenario, change)
-            if is_first and change.rule is not None:
+            trial = _Trial(used, KnowledgeBase.of(base, settings, name, limit), rule, disabled)
+            if is_first and rule is not None:
                 trial.warn()
-        cycles = (trial.replay(record) for record in mission.records)
-        replayed = tuple(each for each in cycles if each is not None)
-        yield MissionReplay(mission.folder, mission.mission, len(mission.records), replayed)
+        cycles = tuple(each for each in map(trial.replay, mission.records) if each is not None)
+        yield MissionReplay(mission.folder, mission.mission, len(mission.records), cycles)
 
 
 def _recorded_missions(folder: Path) -> Iterator[_RecordedMission]:
@@ -222,30 +220,17 @@ def _scenario(path: Path) -> Scenario:
 class _Trial:
     """The knowledge base of a scenario, without the change and with it."""
 
-    def __init__(self, scenario: Scenario, change: RuleChange) -> None:
-        self.scenario = used = scenario
-        ontologies, texts = change.ontologies or None, None
-        if change.scenario is not None:
-            loaded = load_scenario(change.scenario, values=change.values)
-            used, texts, ontologies = loaded.scenario, loaded.rules, change.ontologies or loaded.ontologies
-        elif change.values:
-            problem = "the recorded scenario cannot be changed"
-            raise InputError(problem, place="--set", remedy="name one with --scenario")
-        base = read_base(used, ontologies, texts, more_rules=change.rules, disabled_rules=change.disabled_rules)
-        tried = () if change.rule is None else read_rules(change.rule, base.vocabulary)
-        disabled = [] if change.disabled is None else [change.disabled]
+    def __init__(self, scenario: Scenario, before: KnowledgeBase, rule: str | None, disabled: str | None) -> None:
+        tried = () if rule is None else read_rules(rule, before.base.vocabulary)
         try:
-            content = with_rules(base.content, [tried], disabled)
+            content = with_rules(before.base.content, [tried], () if disabled is None else (disabled,))
         except KnowledgeError as error:
             raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
-        limit, reasoner = TimeLimit(change.limit_s, "--time-limit"), change.reasoner or used.knowledge.reasoner
-        self.before = KnowledgeBase.of(base, ManagingSettings.of(used), reasoner, limit)
-        self.after = self.before.changed(replace(base, content=content))
-        self.with_rule, self.without_rule = self.after, self.before
-        if disabled:
-            self.with_rule, self.without_rule = self.before, self.after
-        names = {*disabled, *(rule.name for rule in tried)}
-        self.rules: list[Rule] = [each for each in self.with_rule.base.content.enabled_rules if each.name in names]
+        self.scenario, self.before, self.after = scenario, before, before.changed(replace(before.base, content=content))
+        both = self.after, self.before
+        self.with_rule, self.without_rule = both if disabled is None else both[::-1]
+        names = {disabled, *(each.name for each in tried)}
+        self.rules = [each for each in self.with_rule.base.content.enabled_rules if each.name in names]
 
     def warn(self) -> None:
         """Log the errors and warnings that `kb check` would have about the rules that are tried."""

@@ -19,6 +19,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.resources import shipped_folder
 from tests.helpers.checks import SUAVE, TOMASYS, errors, findings_of, found_by_pellet, only, subject
+from tests.helpers.owl_text import individual
 
 
 def test_the_shipped_ontology_has_one_note(tmp_path: Path) -> None:
@@ -56,6 +57,29 @@ def test_pellet_is_asked_for_fewer_states_that_contain_all_simple_ones() -> None
     asked = [set(base.assertions(state)) for state in combined(simple)]
     assert len(asked) < len(simple) / 3
     assert all(any(every >= set(base.assertions(state)) for every in asked) for state in simple)
+
+
+@pytest.mark.parametrize(
+    ("datatype", "values"), [("decimal", 0), ("integer", 0), ("nonNegativeInteger", 0), ("double", 2), ("string", 2)]
+)
+def test_a_whole_number_is_a_decimal_and_of_each_other_value_the_datatype_is_told_once(
+    edited, datatype: str, values: int
+) -> None:
+    ontology = edited("")
+    text = ontology.read_text(encoding="utf-8")
+    for value in ("2.25", "3.25"):
+        text = text.replace(f'decimal">{value}<', f'{datatype}">3<')
+    ontology.write_text(text, encoding="utf-8")
+    found = errors(check(Subject([ontology])))
+    assert len(found) == len({each.line for each in found}) == values
+    assert all(f"of datatype {datatype}" in each.message and "xsd:decimal" in each.message for each in found)
+
+
+def test_an_attribute_that_is_declared_again_is_a_warning(edited) -> None:
+    again = individual("water_visibility", "QualityAttributeType", ("qa_comparison_operator", "<"))
+    (found,) = (each for each in check(Subject([edited(again)])) if each.level is not Level.INFO)
+    assert found.level is Level.WARN
+    assert found.message.endswith("it is declared several times (keep one of the declarations)")
 
 
 def test_contradictions_come_from_pellet(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from suave_des import run_mission
 from suave_des.errors import InputError
-from suave_des.kb.replay import RuleChange, try_rules
+from suave_des.kb.replay import try_rules
 from suave_des.records.knowledge import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
@@ -60,7 +60,7 @@ def test_adaptations_tell_why_the_other_designs_were_left_out(mission):
 
 def test_a_rule_fires_exactly_where_its_body_holds(mission):
     folder, result = mission
-    (trial,) = try_rules(folder, RuleChange(NEAR))
+    (trial,) = try_rules(folder, NEAR)
     expected = [
         record.t_s
         for record in result.knowledge
@@ -76,7 +76,7 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
 
 def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     folder, result = mission
-    (trial,) = try_rules(folder, RuleChange(disabled="QAWaterVisibility"))
+    (trial,) = try_rules(folder, disabled="QAWaterVisibility")
     lost = [each for cycle in trial.cycles for each in cycle.decisions]
     adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
     assert len(lost) == len(adapted) > 0
@@ -87,7 +87,7 @@ def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
 def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     folder, _ = mission
     clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
-    (trial,) = try_rules(folder, RuleChange(clash))
+    (trial,) = try_rules(folder, clash)
     problems = [cycle for cycle in trial.cycles if cycle.contradiction]
     assert problems
     assert all("by the rules QAWaterVisibility (" in moment.contradiction for moment in problems)
@@ -130,8 +130,8 @@ def test_a_campaign_keeps_the_same_states_in_less_room(mission, campaign):
 
 
 def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission, campaign, command):
-    alone = next(try_rules(mission[0], RuleChange(disabled="QAWaterVisibility")))
-    first, second = try_rules(campaign, RuleChange(disabled="QAWaterVisibility"))
+    alone = next(try_rules(mission[0], disabled="QAWaterVisibility"))
+    first, second = try_rules(campaign, disabled="QAWaterVisibility")
     assert (first.mission, second.mission) == ("metacontrol, run 1", "metacontrol, run 1, point 1")
     assert first.cycles == alone.cycles
     assert second.cycles != first.cycles
@@ -189,22 +189,22 @@ def test_what_cannot_be_tried_is_reported(mission, command, words, said):
 
 def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):
     with pytest.raises(InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"):
-        list(try_rules(tmp_path, RuleChange(NEAR)))
+        list(try_rules(tmp_path, NEAR))
     (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
     with pytest.raises(InputError, match=r"mission\.json: no such file"):
-        list(try_rules(tmp_path, RuleChange(NEAR)))
+        list(try_rules(tmp_path, NEAR))
     (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
     with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
-        list(try_rules(tmp_path, RuleChange(NEAR)))
+        list(try_rules(tmp_path, NEAR))
 
 
 def test_mistakes_in_the_rule_are_reported(mission, caplog):
     folder = mission[0]
-    list(try_rules(folder, RuleChange('x: c_status(?c, "False") -> fd_realisability(fd_all_thrusters, false)')))
+    list(try_rules(folder, 'x: c_status(?c, "False") -> fd_realisability(fd_all_thrusters, false)'))
     message = 'rule x, column 17: nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
     assert caplog.messages == [f"WARN   the rule: line 1, {message}"]
 
 
 def test_nothing_is_told_of_a_rule_without_mistakes(mission, caplog):
-    list(try_rules(mission[0], RuleChange(NEAR)))
+    list(try_rules(mission[0], NEAR))
     assert not caplog.messages

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.console import counted, errors
+from suave_des.cli.console import errors
 from suave_des.cli.kb.options import (
     AsFormat,
     At,
@@ -19,7 +19,7 @@ from suave_des.cli.kb.options import (
     MaxFailed,
     ReasonerOptions,
     TimeLimitS,
-    announce,
+    counting_states,
     emit,
     shown,
     state_at,
@@ -111,8 +111,8 @@ def policy(
     if csv is not None and csv.is_dir():
         raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
     knowledge = options.knowledge()
-    with counted("states", errors()) as on_count:
-        found = knowledge.policy(max_failed, on_count, partial(announce, knowledge, 1))
+    with counting_states(knowledge) as on_count:
+        found = knowledge.policy(max_failed, on_count)
     if png is not None:
         from suave_des.kb.policy_figure import draw_policy
 

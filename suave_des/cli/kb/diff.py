@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.console import counted, errors, progress
-from suave_des.cli.kb.options import AsFormat, Format, MaxFailed, ReasonerOptions, announce, emit, shown
+from suave_des.cli.console import progress
+from suave_des.cli.kb.options import AsFormat, Format, MaxFailed, ReasonerOptions, counting_states, emit, shown
 from suave_des.cli.options import Modes, Quiet, Seed, Workers
 from suave_des.estimates import interval_text
 from suave_des.records.metrics import Metric, metric_of
@@ -59,8 +58,8 @@ def diff(
     both = [options.with_file(file) for file in (one, other)]
     before, after = (each.knowledge() for each in both)
     axioms = compare_axioms(before.base, after.base)
-    with counted("states", errors()) as on_count:
-        difference = before.diff(after, max_failed, on_count, partial(announce, before, 2))
+    with counting_states(before) as on_count:
+        difference = before.diff(after, max_failed, on_count)
     missions = None if mission_options.missions is None else _missions(both, mission_options)
     content = {"axioms": axioms, **_decisions(difference), "missions": missions}
 

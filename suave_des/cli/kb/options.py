@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.console import errors, output
+from suave_des.cli.console import counted, errors, output
 from suave_des.cli.options import KnowledgeFiles, Reasoner
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
@@ -122,21 +123,19 @@ def state_at(at: Iterable[str] | None, knowledge: KnowledgeBase) -> KnowledgeSta
     return builder.state()
 
 
-def announce(knowledge: KnowledgeBase, times: int, kinds: int, different: int) -> None:
-    """Say on standard error, before states are inferred, how long that will take, unless it is short.
+@contextmanager
+def counting_states(knowledge: KnowledgeBase) -> Iterator[Callable[[int, int], None]]:
+    """Show how many states are inferred; before that, how long it will take, unless it is short."""
+    with counted("states", errors()) as show:
 
-    Args:
-        knowledge: the knowledge base.
-        times: how many knowledge bases infer as many states.
-        kinds: number of kinds of states.
-        different: how many of them have to be inferred.
-    """
-    duration_s = times * different * _SECONDS_EACH.get(knowledge.reasoner, 0.007)
-    if duration_s >= _LONG_S:
-        each = f"{different} of {kinds} kinds of states have to be inferred"
-        errors().print(
-            f"suave-des: {each}{', twice' * (times == 2)}: about {duration_s:.0f} s, less if they are cached"
-        )
+        def on_count(done: int, total: int) -> None:
+            duration_s = total * _SECONDS_EACH.get(knowledge.reasoner, 0.007)
+            if not done and duration_s >= _LONG_S:
+                about = f"{total} kinds of states have to be inferred: about {duration_s:.0f} s"
+                errors().print(f"suave-des: {about}, less if they are cached")
+            show(done, total)
+
+        yield on_count
 
 
 def shown(table: Table) -> str:

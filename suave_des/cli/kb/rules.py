@@ -181,20 +181,21 @@ def try_(
     No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
     the consequences of a different decision.
     """
-    from suave_des.kb.replay import RuleChange, try_rules
+    from suave_des.kb.replay import try_rules
 
-    change = RuleChange(
+    replayed = try_rules(
+        on,
         rule,
-        disable,
-        options.ontology or (),
-        options.scenario,
-        options.rules or (),
-        options.disable_rule or (),
-        options.reasoner,
-        options.time_limit,
-        options.values,
+        disabled=disable,
+        scenario=options.scenario,
+        values=options.values,
+        ontologies=options.ontology or (),
+        rules=options.rules or (),
+        disabled_rules=options.disable_rule or (),
+        reasoner=options.reasoner,
+        limit_s=options.time_limit,
     )
-    missions = list(try_rules(on, change))
+    missions = list(replayed)
     emit(missions, form, lambda: _replay_lines(missions))
 
 
