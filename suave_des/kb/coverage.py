@@ -87,12 +87,6 @@ class _Asked:
         holding = {(), *(self.bodies[number] for number in self.probes.holding(situation))}
         return frozenset(goal for goal, holds, fails in self.questions if holds in holding and fails not in holding)
 
-    def may_cover(self, states: Sequence[KnowledgeState]) -> Iterable[KnowledgeState]:
-        """Leave out states that cover no goal."""
-        needed = {each.holds for each in self.questions}
-        wanted = frozenset(number for number, body in enumerate(self.bodies) if body in needed)
-        return states if () in needed else self.probes.may_hold(states, wanted)
-
 
 class RuleCoverage(NamedTuple):
     """What tests cover of one rule.
@@ -171,8 +165,8 @@ def _reached(
     number = 0
     for kinds in kinds_of_states(knowledge.base, knowledge.settings, max_failed, knowledge.space):
         number += len(kinds)
-        for state in asked.may_cover([case.state for case in kinds]):
-            found.setdefault(asked.covered(Situation(state)), state)
+        for case in kinds:
+            found.setdefault(asked.covered(Situation(case.state)), case.state)
     return {state: goals for goals, state in found.items() if goals}, number
 
 

@@ -352,7 +352,7 @@ class _Original:
             self.mutants.append(_Changed(self, mutant, probes))
         self._probes = Probes(knowledge.base, knowledge.limit, tuple(numbers))
         self._outcomes: dict[Situation, Outcome] = {}
-        self._holding: dict[Situation, frozenset[int]] = {}
+        self._holding: dict[Situation, frozenset[int] | None] = {}
 
     def outcome(self, situation: Situation) -> Outcome:
         """What follows and is decided."""
@@ -360,21 +360,11 @@ class _Original:
             self._outcomes[situation] = self.knowledge.outcome(situation)
         return self._outcomes[situation]
 
-    def holding(self, situation: Situation) -> frozenset[int]:
-        """Numbers of the probes that hold."""
+    def holding(self, situation: Situation) -> frozenset[int] | None:
+        """Numbers of the probes that hold; None for a situation that contradicts itself."""
         if situation not in self._holding:
-            self._holding[situation] = self._probes.holding(situation)
+            self._holding[situation] = self._probes.asked(situation)
         return self._holding[situation]
-
-    def find_touched(self, states: Sequence[KnowledgeState], mutants: Iterable[_Changed]) -> frozenset[KnowledgeState]:
-        """States in which some mutants may make a difference to what is inferred; of the others that is remembered."""
-        probes = [mutant.probes for mutant in mutants]
-        if not self.is_horn or None in probes:
-            return frozenset(states)
-        wanted = frozenset[int]().union(*filter(None, probes))
-        touched = frozenset(self._probes.may_hold(states, wanted))
-        self._holding |= {Situation(state): frozenset() for state in states if state not in touched}
-        return touched
 
 
 def _planning_facts(base: Ontology) -> frozenset[Fact]:
@@ -412,9 +402,10 @@ class _Changed:
 
     def touches(self, situation: Situation) -> bool:
         """Whether the change can make a difference to what is inferred in a situation."""
-        original = self.original
-        is_open = not original.is_horn or self.probes is None or original.outcome(situation).reasoning is None
-        return is_open or not original.holding(situation).isdisjoint(self.probes or ())
+        if self.probes is None or not self.original.is_horn:
+            return True
+        holding = self.original.holding(situation)
+        return holding is None or not holding.isdisjoint(self.probes)
 
     def is_same(self, situation: Situation) -> bool:
         """Whether it is plain that the change makes no difference in a situation."""
@@ -509,12 +500,7 @@ def _compared(original: _Original, situations: Iterable[Situation], max_failed: 
     number = 0
     for kinds in kinds_of_states(knowledge.base, knowledge.settings, max_failed, space):
         number += len(kinds)
-        if left:
-            states = [case.state for case in kinds]
-            touched = original.find_touched(states, left)
-            are_planned_alike = all(changed.planned_on == original.planned_on for changed in left)
-            for state in states:
-                if state in touched or not are_planned_alike:
-                    look(Situation(state))
+        for case in kinds if left else ():
+            look(Situation(case.state))
     reason = f"nothing differs in {number} kinds of states"
     return [*results, *(MutantResult(changed.mutant, EQUIVALENT, reason) for changed in left)], number

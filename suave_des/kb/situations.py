@@ -162,49 +162,20 @@ class Probes:
         self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
 
     def holding(self, situation: Situation) -> frozenset[int]:
-        """Return the numbers of the conjunctions that hold; none in a situation that contradicts itself.
+        """Return the numbers of the conjunctions that hold; none in a situation that contradicts itself."""
+        return self.asked(situation) or frozenset()
+
+    def asked(self, situation: Situation) -> frozenset[int] | None:
+        """Return the numbers of the conjunctions that hold; None for a situation that contradicts itself.
 
         Raises:
             KnowledgeError: Pellet takes too long.
         """
+        asserted = (*self._base.assertions(situation.state), *situation.facts)
         try:
-            return self._ask((*self._base.assertions(situation.state), *situation.facts), situation.state)
+            found = self._limit.run(lambda: self._pellet.infer(asserted), reasoning_on(situation.state))
         except ContradictionError:
-            return frozenset()
-
-    def may_hold(self, states: Sequence[KnowledgeState], wanted: frozenset[int]) -> Iterator[KnowledgeState]:
-        """Remove states in which none of the wanted conjunctions can hold.
-
-        What several states assert is taken together: what does not follow from all of it follows from no part of it.
-        Where they contradict one another, they are divided; states in which different functions are grounded would, as
-        the status of one without a grounding contradicts that of one with it.
-
-        Raises:
-            KnowledgeError: Pellet takes too long.
-        """
-        groups: dict[tuple[str, ...], list[KnowledgeState]] = {}
-        for state in states if wanted else ():
-            ungrounded = (each.function for each in state.objectives if state.grounded(each.function) is None)
-            groups.setdefault(tuple(ungrounded), []).append(state)
-        for group in groups.values():
-            yield from self._may_hold(group, wanted)
-
-    def _may_hold(self, states: Sequence[KnowledgeState], wanted: frozenset[int]) -> Iterator[KnowledgeState]:
-        together = dict.fromkeys(triple for state in states for triple in self._base.assertions(state))
-        try:
-            found = self._ask(tuple(together), states[0])
-        except ContradictionError:
-            if len(states) > 1:
-                middle = len(states) // 2
-                yield from self._may_hold(states[:middle], wanted)
-                yield from self._may_hold(states[middle:], wanted)
-                return
-            found = wanted
-        if not found.isdisjoint(wanted):
-            yield from states
-
-    def _ask(self, assertions: tuple[Triple, ...], state: KnowledgeState) -> frozenset[int]:
-        found = self._limit.run(lambda: self._pellet.infer(assertions), reasoning_on(state))
+            return None
         return frozenset(int(value.text) for _, name, value in found if name == _HOLDS and isinstance(value, Lit))
 
 

@@ -13,9 +13,9 @@ import typer
 from suave_des.cli.kb.options import AsFormat, Format, KnowledgeOptions, OtherScenario, TimeLimitS, emit
 from suave_des.cli.options import KnowledgeFiles, Modes, Reasoner
 from suave_des.errors import number_of
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.findings import Finding
     from suave_des.kb.replay import MissionReplay
     from suave_des.knowledge.ontology import Ontology
 
@@ -68,18 +68,14 @@ def check(
     useless = (Finding(Level.WARN, words, shown_name(loaded.path)) for words in loaded.scenario.without_effect())
     findings = ordered([*findings, *useless])
     if form is FindingsFormat.MARKDOWN:
-        print(*_markdown(findings), "", summary(findings), sep="\n")
+        rows = [(each.level, each.where, each.message, each.remedy or "") for each in findings]
+        print(
+            Table(("level", "where", "what", "remedy"), rows, align="llll").markdown(), "", summary(findings), sep="\n"
+        )
     else:
         emit(findings, Format(form), lambda: (*map(str, findings), summary(findings)))
     if has_level(findings, Level(fail_on.upper())):
         raise typer.Exit(FOUND)
-
-
-def _markdown(findings: Sequence[Finding]) -> Iterator[str]:
-    yield "| level | where | what | remedy |\n| --- | --- | --- | --- |"
-    for finding in findings:
-        cells = (finding.level, finding.where, finding.message, finding.remedy or "")
-        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 
 def rules(options: KnowledgeOptions, form: AsFormat = Format.TEXT) -> None:

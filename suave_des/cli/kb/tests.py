@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -179,7 +180,7 @@ def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
 
 
 def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[TestResult]:
-    """Run tests, with a line of dots for each file, as pytest prints it."""
+    """Run tests, with a line of dots for each file."""
     from suave_des.kb.rule_tests import run_test
 
     chosen = [
@@ -190,29 +191,15 @@ def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[
     ]
     if not chosen:
         raise InputError(f"no test name contains {quoted(select)}", place="-k", remedy="see the names in the files")
-    width = min(console.width, _WIDTH)
     results: list[TestResult] = []
-    column, file = 0, None
-    for knowledge, test in chosen:
-        if test.file != file or column >= width - 8:
-            if results:
-                _end_line(console, column, len(results) / len(chosen))
-            column = 0
-            if test.file != file:
-                file, name = test.file, _place(test.file)
-                console.print(f"{name} ", end="")
-                column = len(name) + 1
-        results.append(run_test(knowledge, test))
-        passed = results[-1].passed
-        console.print(Text("." if passed else "F", "green" if passed else "red"), end="")
-        column += 1
-    _end_line(console, column, 1.0)
+    for file, group in groupby(chosen, key=lambda each: each[1].file):
+        console.print(f"{_place(file)} ", end="")
+        for knowledge, test in group:
+            results.append(run_test(knowledge, test))
+            passed = results[-1].passed
+            console.print(Text("." if passed else "F", "green" if passed else "red"), end="")
+        console.print()
     return results
-
-
-def _end_line(console: Console, column: int, share: float) -> None:
-    """Print how much is done at the end of a line."""
-    console.print(Text(f"[{share:4.0%}]".rjust(max(7, min(console.width, _WIDTH) - column)), "cyan"))
 
 
 def _place(file: Path, line: int | None = None) -> str:
