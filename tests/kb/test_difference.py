@@ -11,11 +11,20 @@ import pandas
 import pytest
 
 from suave_des.kb import KnowledgeBase
-from suave_des.kb.difference import METRICS, _joined, compare_axioms, compare_missions, compare_policies, paired
+from suave_des.kb.difference import (
+    METRICS,
+    _joined,
+    compare_axioms,
+    compare_missions,
+    compare_policies,
+    firing_states,
+    paired,
+)
 from suave_des.kb.policy import PolicyCase
 from suave_des.kb.situations import Outcome
 from suave_des.kb.space import ComponentReports, PolicySpace, ranges_between
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.state import Decision, Fact, Inference, KnowledgeState, Plan, Reasoning
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import FEWER_NUMBERS
@@ -74,6 +83,17 @@ def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other
     assert search.other <= 21 < search.one and search.difference.value == search.other - search.one
     ((run, *values),) = search.extremes
     assert (run, values) == (1, [search.one, search.other])
+
+
+@pytest.mark.parametrize("number", [0, 9])
+def test_states_are_counted_in_which_a_rule_fires_that_only_one_of_two_has(tmp_path: Path, number: int) -> None:
+    """Visibility is above 0 in every mission, and never above 9 m, whichever of the two has the rule."""
+    body = f"isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ greaterThan(?v, {number})"
+    more = {"rules": [rules_file(tmp_path, f"own: {body} -> fd_realisability(fd_spiral_high, false)")]}
+    short = {"values": {"mission.time_limit_s": 20}}
+    for one, other in ((more, {}), ({}, more)):
+        firing, states = firing_states("seams2023", 1, {**short, **one}, {**short, **other}, seed=1, limit=TimeLimit())
+        assert states > 0 and firing == (states if number == 0 else 0)
 
 
 def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):
