@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from suave_des.findings import Finding, Level, ordered
-from suave_des.kb.check import check
-from suave_des.kb.shapes import check_shapes
+from suave_des.kb.check import check, check_shapes
 from suave_des.knowledge.checks import Subject, static_findings
 from suave_des.knowledge.ontology_file import collect
 from suave_des.resources import shipped_folder
