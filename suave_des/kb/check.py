@@ -13,7 +13,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from rdflib import RDF, Graph, Literal, Namespace, URIRef
+from rdflib import RDF, Graph, Namespace, URIRef
 from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
@@ -62,10 +62,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         InputError: a file cannot be read at all.
     """
     sources = collect(subject.given)
-    findings = static_findings(subject, sources)
-    told = {(each.file, each.line) for each in findings if each.level is Level.ERROR}
-    # A wrong value is told once, in the words of the one who cannot use it.
-    findings += [each for each in check_shapes(sources, subject.shapes) if (each.file, each.line) not in told]
+    findings = [*static_findings(subject, sources), *check_shapes(sources, subject.shapes)]
     return ordered([*findings, *_ask_pellet(subject, findings)])
 
 
@@ -250,11 +247,7 @@ def _read_shapes(path: Path, text: str) -> Graph:
 def _finding(report: Graph, result: Node, thing: Node | None, sources: Sequence[OntologyFile]) -> Finding:
     name, path = local_name(str(thing)), report.value(result, _SH.resultPath)
     level = _LEVELS.get(URIRef(str(report.value(result, _SH.resultSeverity))), Level.ERROR)
-    words = [name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or "")]
-    value = report.value(result, _SH.value)
-    if isinstance(value, Literal):
-        datatype = local_name(str(value.datatype)) if value.datatype else "text"
-        words[-1] += f", and {str(value)!r} is of datatype {datatype}"
+    words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or ""))
     message = ": ".join(filter(None, words))
     has_value = any((thing, URIRef(HAS_VALUE), None) in source.graph for source in sources)
     if path == URIRef(HAS_VALUE) and name.startswith(measurement_name("")) and not has_value:

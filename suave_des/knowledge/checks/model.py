@@ -142,7 +142,7 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Found]:
     model, measured = material.base.model, material.subject.measured
     for name in sorted({*(measured or ())} - model.attributes.keys()):
         problem = f"missions measure {name}, but no ontology has a quality attribute type of this name"
-        yield name, None, problem, nearest(name, model.attributes)
+        yield name, None, problem, nearest(name, model.attributes) or "declare a QualityAttributeType of this name"
     for name in () if rules_of_2023(material.content) else without_operator(material.content, model, measured or ()):
         designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
         problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
