@@ -45,13 +45,10 @@ class FixedMode(NoManager):
 
     def task_requested(self, task: Task) -> None:
         """Set the modes of the task's functions."""
-        others = []
-        for function in task.functions:
-            if self.mode in self.system.modes.available_modes(function):
-                self.system.change_mode(function, self.mode)
-            else:
-                others.append(function)
-        super().task_requested(Task(task.name, tuple(others)))
+        fixed = [each for each in task.functions if self.mode in self.system.modes.available_modes(each)]
+        for function in fixed:
+            self.system.change_mode(function, self.mode)
+        super().task_requested(Task(task.name, tuple(each for each in task.functions if each not in fixed)))
 
 
 @cache

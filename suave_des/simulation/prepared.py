@@ -126,9 +126,8 @@ class PreparedScenario:
 def vehicle_model(description: VehicleDescription) -> VehicleModel:
     """Return a vehicle's constants; equal descriptions give the same object, which is the key of cached results."""
     values = {each.name: getattr(description, each.name) for each in fields(VehicleModel)}
-    return VehicleModel(
-        **values | {"thrusters": tuple(Thruster(t.position_m, t.direction) for t in values["thrusters"])}
-    )
+    thrusters = tuple(Thruster(each.position_m, each.direction) for each in description.thrusters)
+    return VehicleModel(**values | {"thrusters": thrusters})
 
 
 def _draw_current(wave: CurrentWaveDescription | None, draws: Draws) -> tuple[Point, tuple[float, float, float, float]]:

@@ -167,8 +167,6 @@ def advance(
     top_speed = prm[JERK] * quarter * quarter
     # A multiplication takes a fraction of the time of a division.
     inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = 1.0 / mass, 1.0 / ixx, 1.0 / iyy, 1.0 / izz
-    drag_u, drag_v, drag_w = prm[DRAG], prm[DRAG + 1], prm[DRAG + 2]
-    drag_p, drag_q, drag_r = prm[DRAG + 3], prm[DRAG + 4], prm[DRAG + 5]
     for row in range(first + 1, last + 1):
         # Rotation matrix R, body to world (Handbook, 2.69).
         r00 = 1.0 - 2.0 * (qy * qy + qz * qz)
@@ -259,12 +257,12 @@ def advance(
         ap = (t3 - (izz - iyy) * q * r) * inverse_ixx
         aq = (t4 - (ixx - izz) * r * p) * inverse_iyy
         ar = (t5 - (iyy - ixx) * p * q) * inverse_izz
-        u = cu + (u + h * au - cu) / (1.0 + h * drag_u * abs(u - cu))
-        v = cv + (v + h * av - cv) / (1.0 + h * drag_v * abs(v - cv))
-        w = cw + (w + h * aw - cw) / (1.0 + h * drag_w * abs(w - cw))
-        p = (p + h * ap) / (1.0 + h * drag_p * abs(p))
-        q = (q + h * aq) / (1.0 + h * drag_q * abs(q))
-        r = (r + h * ar) / (1.0 + h * drag_r * abs(r))
+        u = cu + (u + h * au - cu) / (1.0 + h * prm[DRAG] * abs(u - cu))
+        v = cv + (v + h * av - cv) / (1.0 + h * prm[DRAG + 1] * abs(v - cv))
+        w = cw + (w + h * aw - cw) / (1.0 + h * prm[DRAG + 2] * abs(w - cw))
+        p = (p + h * ap) / (1.0 + h * prm[DRAG + 3] * abs(p))
+        q = (q + h * aq) / (1.0 + h * prm[DRAG + 4] * abs(q))
+        r = (r + h * ar) / (1.0 + h * prm[DRAG + 5] * abs(r))
 
         # Kinematics with the new velocity (semi-implicit Euler): p' = R v, q' = T_q(q) omega (Handbook, 2.86).
         x += h * (r00 * u + r01 * v + r02 * w)
