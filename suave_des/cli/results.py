@@ -40,6 +40,16 @@ class CompareFormat(StrEnum):
     LATEX = "latex"
 
 
+AssistedBy = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="DIR... are real missions, and this a campaign under the same conditions."),
+]
+Population = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many conditions drawn as theirs were."),
+]
+
+
 def compare(
     results: Results,
     managers: Annotated[
@@ -70,14 +80,8 @@ def compare(
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
     ] = False,
-    assisted_by: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="DIR... are real missions, and this a campaign under the same conditions."),
-    ] = None,
-    population: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many conditions drawn as theirs were."),
-    ] = None,
+    assisted_by: AssistedBy = None,
+    population: Population = None,
     plan: Annotated[
         list[str] | None,
         typer.Option(
@@ -145,13 +149,25 @@ def _assisted(
     """Compare real missions, assisted by simulated ones, or plan them."""
     from suave_des.results.assisted import compare_assisted, planned
 
+    both = _both(same, population)
+    if both is not None:
+        return compare_assisted(results, *both, managers=managers, metrics=metrics, half_widths=plan)
+    check_no_use({"--metrics": metrics or None}, "with --plan, which names its own")
+    return planned(results, plan, managers=managers)
+
+
+def _both(same: Path | None, population: Path | None) -> tuple[Path, Path] | None:
+    """Return the two campaigns that assist real missions; None without.
+
+    Raises:
+        InputError: only one of them is given.
+    """
     if same is not None and population is not None:
-        return compare_assisted(results, same, population, managers=managers, metrics=metrics, half_widths=plan)
+        return same, population
     if same is not None or population is not None:
         given, lacking = ("--assisted-by", "--population") if population is None else ("--population", "--assisted-by")
         raise InputError(f"{given} is given without {lacking}", remedy="give both: suave-des campaign makes them")
-    check_no_use({"--metrics": metrics or None}, "with --plan, which names its own")
-    return planned(results, plan, managers=managers)
+    return None
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:
@@ -303,6 +319,8 @@ def report(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR")
     ] = None,
+    assisted_by: AssistedBy = None,
+    population: Population = None,
     show: Open = False,
 ) -> None:
     """Make a page about a campaign: its conclusion, tables, interactive charts, and how it was made.
@@ -316,9 +334,9 @@ def report(
     runs = _PATHS if paths is None else paths
     if not 0 <= runs <= _MOST_PATHS:
         raise InputError(f"--paths: {runs} is out of range", remedy=f"give 0 to {_MOST_PATHS}")
-    first = results[0]
+    assisting, first = _both(assisted_by, population), results[0]
     page_file = out or (first if first.is_dir() else first.parent) / "report.html"
     if out is not None:
         check_output_file(page_file, overwrite=True)
-    write_page(page_file, report_page(results, runs), show=show)
+    write_page(page_file, report_page(results, runs, assisting), show=show)
     print(f"the report is {page_file}")

@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -20,6 +20,7 @@ from suave_des.pages.page import compressed, page
 from suave_des.pages.paths import Paths, paths_of
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.store import read_manifest
+from suave_des.results.assisted import compare_assisted
 from suave_des.results.compare import compare
 from suave_des.results.comparison import capital
 from suave_des.results.missions import Missions, grouped, read_missions
@@ -123,12 +124,13 @@ class ReportContent:
     drawn: ChartColumns
 
 
-def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
+def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[Path, Path] | None = None) -> str:
     """Make the report of campaigns, or of other results that `compare` reads.
 
     Args:
         folders: of campaigns, or with the exemplar's own CSV files; or single files.
         runs: how many runs of each manager to run again for their ways and timelines; 0: none.
+        assisted_by: campaigns that assist real missions: under their conditions, and under many others.
 
     Raises:
         InputError: results cannot be read or compared, or an extra is not installed.
@@ -136,6 +138,8 @@ def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
     library = plotly_script()
     missions = read_missions(folders)
     results = results_of(missions)
+    if assisted_by is not None:
+        results = replace(results, sections=[*_assisted(folders, *assisted_by), *results.sections])
     ways = Paths(note="Paths and timelines are in the report of one campaign's folder only")
     if len(folders) == 1 and folders[0].is_dir() and missions.frame["run"].notna().all():
         managers = list(dict.fromkeys(missions.frame["manager"]))
@@ -196,6 +200,15 @@ def results_of(missions: Missions) -> ReportContent:
         for title, tables, conclusions in found.sections()
     ]
     return ReportContent(found.conclusion, found.notes, sections, needed, found.remarks(), chart_columns(missions))
+
+
+def _assisted(real: Sequence[Path], same: Path, population: Path) -> Iterator[Section]:
+    """Yield a section for each metric of real missions that simulated ones assist."""
+    found = compare_assisted(real, same, population)
+    for metric, table in zip(found.metrics, found.tables(), strict=True):
+        own = found.estimates[found.estimates["metric"] == metric.name]
+        title = f"{table.title}, real missions assisted by simulated ones"
+        yield Section(title, [("", _plain_table(table))], [*own["conclusion"], *found.remarks()])
 
 
 def _plain_table(table: Table) -> PlainTable:

@@ -282,3 +282,18 @@ def test_a_frame_assists_as_the_folder_does(campaigns: Path) -> None:
     found = frame.assist(*given)
     expected = compare_assisted(given[0], campaigns / "same", given[1], managers=given[2])
     pandas.testing.assert_frame_equal(found.estimates, expected.estimates)
+
+
+def test_the_report_has_the_assisted_means(campaigns: Path) -> None:
+    rows = pandas.read_csv(REAL)
+    rows[rows["manager"].isin(["none", "bt"])].to_csv(campaigns / "real.csv", index=False)
+    both = "--assisted-by", "same", "--population", "population"
+    made = command_here("report", "real.csv", *both, "--out", "page.html", cwd=campaigns)
+    assert made.returncode == 0, made.stderr
+    page = (campaigns / "page.html").read_text(encoding="utf-8")
+    sentences = compare_assisted(campaigns / "real.csv", campaigns / "same", campaigns / "population").conclusions
+    assert page.count("real missions assisted by simulated ones") == 2
+    assert all(sentence in page for sentence in sentences)
+    half = command_here("report", "real.csv", "--population", "population", "--out", "no.html", cwd=campaigns)
+    assert half.returncode == 2 and "without --assisted-by" in half.stderr
+    assert not (campaigns / "no.html").exists()
