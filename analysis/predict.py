@@ -12,7 +12,7 @@ ensemble of parameter sets that fit the known runs (those of experiment 1 and of
 experiment, manager or pair ("bt - none" is the first less the second), condition and metric: `mean`; `median`; `std` of
 single runs within a condition; and `low90` to `high90`, in which the mean of the real runs should be in nine of ten
 cases. That interval has two parts: what is not known of vehicle and software (members differ), and the chance of the
-real runs. `inputs` is the beginning of the SHA-256 of all files that decide.
+real runs. `inputs` is the beginning of the SHA-256 of scenario, campaign, revision and ensemble; not of the code.
 
 `--score` reads real runs of one experiment in any layout that `suave-des compare` reads, in the order in which they
 were made, and says how near the predictions are. A run without a reaction has no reaction time, on both sides.
