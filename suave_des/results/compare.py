@@ -186,17 +186,20 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
 def _conclusions(
     groups: Sequence[Group], metric: Metric, differences: Sequence[Difference], means: Mapping[str, float]
 ) -> Iterator[str]:
-    """Yield the conclusion; of several points of a sweep at which managers are compared, one for each."""
+    """Yield the conclusion; of several points of a sweep at which managers are compared, one for each that differs."""
     points = dict.fromkeys(group.point for group in groups)
     if len(points) == 1 or len(points) == len(groups):
         points = {"": None}
+    at: dict[str, list[str]] = {}
     for point in points:
         own = [group for group in groups if not point or group.point == point]
         names = [group.name for group in own]
         text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
         if metric.name == SEARCH_TIME:
             text = mostly_lost(own) + text
-        yield f"{point.removeprefix(', ')}: {text.replace(point, '')}" if point else text
+        at.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
+    for text, where in at.items():
+        yield f"{'; '.join(where)}: {text}" if where[0] else text
 
 
 def _worse_paired(differences: Sequence[Difference]) -> Iterator[str]:

@@ -249,6 +249,12 @@ class TestSweep:
         assert first.startswith("period_s 60: bt ") or "bt, which has" in first
         assert "bt" in second and "period_s" not in second
 
+    def test_points_of_which_the_same_is_concluded_share_a_sentence(self, tmp_path: Path) -> None:
+        values = {"thruster_events.0.time_s": [400.0, 500.0]}  # after the time limit
+        run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
+        found = compare_folders([tmp_path / "out"], by=["thruster_events.0.time_s"])
+        assert found.conclusion.startswith("time_s 400; time_s 500: ")
+
 
 class TestHeadlines:
     """What a headline says beside the difference: of how many tests, and what the test does not show."""
