@@ -85,7 +85,7 @@ class MissionSettings(Strict):
     time_limit_s: Annotated[Real, Field(gt=0, le=_LONGEST_MISSION_S)] = 300.0
     """Time at which the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
-    """Functions that are needed in addition to the exemplar's."""
+    """Functions needed in addition to the exemplar's."""
 
 
 class Latencies(Strict):
@@ -94,7 +94,7 @@ class Latencies(Strict):
     task_start_s: DelayDistribution = 0.0
     """From guided mode to the request of the first task."""
     search_start_s: DelayDistribution = 0.0
-    """From the first activation of the search, in guided mode, to its first set-point; drawn once per run."""
+    """From the first activation of the search to its first set-point; drawn once per run."""
     mode_change_s: DelayDistribution = 0.0
     """From the mode manager's answer until the mode takes effect."""
     inference_s: DelayDistribution = 1.0
@@ -117,36 +117,32 @@ class Calibration(Strict):
     heading_integral_gain_per_s3: Annotated[Real, Field(ge=0, le=100)] = 0.0
     """Angular acceleration demanded for each rad s of the integrated heading error."""
     altitude_error_m: OffsetDistribution = 0.0
-    """Steady, unexplained error of the held altitude, drawn once per run: the held altitude is the set-point plus
-    this."""
+    """Steady error, of unknown cause, that is added to the set-point of the altitude."""
     drift_x_m: CoordinateDistribution = 0.0
-    """Offset to the east from the start to where guided mode begins, drawn once per run."""
+    """Offset to the east from the start to where guided mode begins."""
     drift_y_m: CoordinateDistribution = 0.0
     """The same, north."""
     origin_x_m: OffsetDistribution = 0.0
-    """Offset to the east from where guided mode begins to the local frame's origin, the spiral's centre; drawn
-    once per run."""
+    """Offset to the east from there to the local frame's origin, the spiral's centre."""
     origin_y_m: OffsetDistribution = 0.0
     """The same, north."""
     real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
-    """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once per run."""
+    """The simulated world runs 1 / (1 + loss) as fast as the software's clock."""
     reasoning_slowdown: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
-    """Additional loss while the reasoner runs beside the simulator; drawn once per run, and spread over the
-    mission by the share of time that an inference takes of metacontrol's period.
-    """
+    """Additional loss while the reasoner runs, spread over the mission by its share of metacontrol's period."""
 
 
 class ReactionMetric(Strict):
     """Definition of a reaction in revision 1.5 (its metrics node)."""
 
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """Visibilities in descending order; the first that is reached decides which altitude fits."""
+    """In descending order; the first that is reached decides which altitude fits."""
     expected_altitudes_m: tuple[Number, ...] = (3.0, 2.0, 1.0)
     """Fitting altitude for each threshold."""
     battery_limit: Number = 0.25
     """Battery level below which the recharge path is expected to become active."""
     undone_within_s: Duration = 4.0
-    """An adaptation that is reverted within this time counts as undone; two cycles of metacontrol in revision 2023."""
+    """An adaptation that is reverted within this time counts as undone."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -206,7 +202,7 @@ class BehaviourTreeSettings(Strict):
     battery_limit: Number = 0.25
     """Battery level below which the extended tree goes to recharge."""
     records_ticks: bool = False
-    """Whether the timeline of a recorded mission has each tick whose outcome differs from the previous one's."""
+    """Whether the timeline has each tick whose outcome differs from the previous one's."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -275,20 +271,19 @@ class Requirement(Strict):
     """A requirement that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15, 2010).
 
     Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required, and falls
-    linearly to 0 when it is off by the tolerance. Without tolerance it is RELAX's SHALL; with one, at_least is
-    AS MANY AS POSSIBLE, at_most AS FEW (or AS EARLY) AS POSSIBLE, close_to AS CLOSE AS POSSIBLE TO.
+    linearly to 0 when it is off by the tolerance.
     """
 
     metric: Metric | None = None
-    """A metric of the mission."""
+    """The metric that it is about."""
     attribute: str | None = None
-    """A measured quality attribute; its satisfaction is the mean over mission time, from the first measurement on."""
+    """Instead of that, a measured quality attribute; satisfaction is the mean over mission time."""
     relation: Literal["at_least", "at_most", "close_to"]
-    """Required relation of the value to the required one."""
+    """RELAX's AS MANY, AS FEW (or EARLY), AS CLOSE AS POSSIBLE; SHALL without tolerance."""
     value: Number
     """The required value."""
     tolerance: NotNegative = 0.0
-    """Tolerated deviation from the required value; 0: none."""
+    """Tolerated deviation from it."""
 
     @model_validator(mode="after")
     def _is_about_one_thing(self) -> Self:
@@ -314,7 +309,7 @@ class Scenario(Strict):
     """One mission's world, vehicle, software and knowledge."""
 
     name: Name
-    """Name in result files; in a YAML file by default the file's name without its extension."""
+    """Name in result files; by default that of the file without its extension."""
     description: str = ""
     """For people."""
     revision: Revision
@@ -328,37 +323,39 @@ class Scenario(Strict):
     pipeline: Pipeline = Pipeline()
     """The pipeline on the sea bed."""
     current: Current = Current()
-    """Velocity of the water."""
+    """Velocity of the water in the world frame, drawn once per run."""
     signals: dict[Name, SignalDescription]
-    """Measured signals, by the name of their quality attribute; water_visibility (m) is required."""
+    """Measured signals, by quality attribute; water_visibility (m) is required."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
-    """Failures and recoveries, in order."""
+    """Failures and recoveries, in order; also as the exemplar writes them: "(1,failure,35)"."""
     thruster_monitor: Monitor = Monitor()
-    """Faults of the thruster monitor."""
+    """Faults of the thruster monitor; the battery and each signal have the same keys."""
     battery: Battery | None = None
-    """The battery, if there is one."""
+    """The battery: falls linearly from 1.0, and is recharged at once near the station."""
     leak: Leak | None = None
-    """A leak, if there is one. It needs a function f_surface in the modes file, and designs for it."""
+    """A leak: the vehicle abandons its tasks and surfaces. Needs f_surface in the modes file, and designs for it."""
     latencies: Latencies = Latencies()
-    """Times that the software takes."""
+    """Mission time that the software takes, drawn at every occurrence."""
     calibration: Calibration = Calibration()
-    """Parameters that the sources do not give."""
+    """Parameters that the sources do not give, the same for every manager; drawn once per run."""
     modes_file: FileName = "suave_modes.yaml"
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
-    """Mode that the manager none sets for each function; functions that are not listed keep their default."""
+    """Mode that the manager none sets, by function; functions that are not listed keep their default."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
     """User-defined functions, by their name in the modes file."""
     knowledge: KnowledgeSettings = KnowledgeSettings()
     """The knowledge base."""
     managers: ManagerSettings = ManagerSettings()
-    """Settings of managing subsystems, by name, including those of managers that are not built in."""
+    """Settings of managing subsystems, by name."""
     reaction_metric: ReactionMetric = ReactionMetric()
-    """Definition of a reaction."""
+    """Definition of a reaction, as in revision 1.5."""
     metrics: Metrics = ()
-    """Further metrics, each with a column of its own; see [further metrics](csv.md#further-metrics)."""
+    """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
-    """Requirements by name; the degree to which each is satisfied is a column, requirement_NAME."""
+    """Requirements that may be partially satisfied, by name, as in RELAX (Whittle et al., Requirements Engineering 15,
+    2010). The column requirement_NAME is 1 if the value is as required, and falls linearly to 0 when it is off by the
+    tolerance."""
 
     @field_validator("signals", mode="after")
     @classmethod

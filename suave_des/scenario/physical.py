@@ -49,7 +49,7 @@ class Monitor(Strict):
     """Faults that any monitor can have."""
 
     dropout_probability: Share = 0.0
-    """Probability that a message is lost, independently for each message."""
+    """Probability that a message is lost, for each message."""
     outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
     """Intervals of mission time, [from, to], in which every message is lost."""
 
@@ -69,9 +69,9 @@ class Monitor(Strict):
 
 class _Signal(Monitor):
     publishing_period_s: Period | None = None
-    """Period of the monitor that measures it; by default the revision's visibility_publishing_period_s."""
+    """Period of its monitor; by default the revision's `monitors.visibility_publishing_period_s`."""
     time_step_s: NotNegative = 1.0
-    """Time is first truncated to a multiple of this (whole seconds in the exemplar); 0: not truncated."""
+    """Time is truncated to a multiple of this (whole seconds in the exemplar); 0: not truncated."""
     noise: ValueDistribution = 0.0
     """Added to each measurement, drawn each time."""
 
@@ -139,7 +139,7 @@ class Camera(Strict):
     """The camera, which looks straight down."""
 
     field_of_view_deg: Annotated[Real, Field(gt=0, lt=180)]
-    """Full angle of view, the same in x and y; it also determines the spacing of the search spiral's turns."""
+    """Full angle of view in x and y; it also determines the spacing of the search spiral's turns."""
 
     @property
     def tangent(self) -> float:
@@ -193,15 +193,15 @@ class CurrentWaveDescription(Strict):
     """A current whose speed oscillates: mean + amplitude sin(2 pi (t + shift) / period), in one direction."""
 
     mean_m_per_s: CurrentDistribution = 0.0
-    """Mean speed, drawn once per run."""
+    """Mean speed."""
     amplitude_m_per_s: CurrentDistribution = 0.0
-    """Amplitude of the oscillation, drawn once per run."""
+    """Amplitude of the oscillation."""
     period_s: Annotated[Real, Field(ge=1, le=LONGEST_S)] = 120.0
     """Time from one maximum of the speed to the next."""
     shift_s: ShiftDistribution = 0.0
-    """Added to mission time, drawn once per run."""
+    """Added to mission time."""
     direction_rad: HeadingDistribution = 0.0
-    """Direction in which the water flows, from east towards north, drawn once per run."""
+    """Direction in which the water flows, from east towards north."""
 
 
 class Current(Strict):
@@ -214,7 +214,7 @@ class Current(Strict):
     z_m_per_s: CurrentDistribution = 0.0
     """Upwards."""
     wave: CurrentWaveDescription | None = None
-    """The part that varies over time, if any."""
+    """A part that oscillates in one direction: mean + amplitude sin(2 pi (t + shift) / period)."""
 
 
 class Leak(Strict):
@@ -232,7 +232,7 @@ class Start(Strict):
     y_m: CoordinateDistribution = 2.57
     """North."""
     z_m: Annotated[Distribution, Within(SEA_BED_Z_M + 0.01, SURFACE_Z_M)] = -18.5
-    """Up; the sea bed is at -20, the surface at 0."""
+    """Up."""
     heading_rad: HeadingDistribution = 0.0
     """Yaw, from east towards north."""
 
@@ -250,9 +250,9 @@ class Pipeline(Strict):
         (-44.49, -8.07, -20.0),
         (-51.56, -15.14, -20.0),
     )
-    """Vertices [x, y, z] in order. The default is the exemplar's pipeline (kas-lab/suave)."""
+    """Vertices [x, y, z] in order; by default those of the exemplar."""
     points_per_piece: Annotated[int, Field(strict=True, ge=1, le=1000)] = 20
-    """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
+    """Evenly spaced points on each straight piece, without its first vertex."""
 
 
 _TIME = r"[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|inf)|nan"
@@ -269,8 +269,7 @@ class ThrusterEvent(Strict):
     recoverable: bool = True
     """Whether f_maintain_motion can recover the thruster after this failure."""
     time_s: TimeDistribution
-    """Time, drawn once per run; the revision decides whether it counts from the start or from the previous event.
-    A draw below 0 is 0."""
+    """Drawn once per run; the revision says whether from the start or from the previous event. Below 0 it is 0."""
 
     @model_validator(mode="before")
     @classmethod
@@ -296,15 +295,15 @@ class Battery(Monitor):
     station_y_m: Coordinate = -2.0
     """Recharge station, north."""
     station_radius_m: Length = 0.5
-    """Half-width of the box in x and y within which the vehicle counts as docked."""
+    """Half-width of the square within which the vehicle counts as docked."""
     noise: ValueDistribution = 0.0
     """Added to each measurement of the level, drawn each time."""
     approach_altitude_m: Length = 1.25
     """Altitude above the sea bed at which the station is approached."""
     mission_ends_at_level: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    """Level at or below which the mission ends; by default it continues with an empty battery."""
+    """Level at which the mission ends; by default it continues with an empty battery."""
     resend_period_s: Period = 10.0
-    """Period at which the station is sent to the autopilot again as a set-point."""
+    """Period at which the station is sent to the autopilot again."""
 
 
 # Tables of signals.

@@ -43,12 +43,11 @@ class SpiralRevision(Strict):
     """The search function's spiral and its altitude work-around."""
 
     centre: Literal["origin", "activation", "first_activation"]
-    """Where the spiral is centred: the local frame's origin, the position at each activation, or at the first."""
+    """Centre: the local frame's origin, the position at each activation, or at the first."""
     restarts_on_activation: bool
-    """Whether each activation restarts the spiral (otherwise it continues from the same counter)."""
+    """Whether each activation restarts the spiral."""
     resends_on_activation: bool = False
-    """Whether a spiral that continues sends its way-point at once (otherwise only when ticks_before_resending have
-    passed)."""
+    """Whether a spiral that continues sends its way-point at once, not after ticks_before_resending only."""
     tick_period_s: Period
     """Period of its timer; at most one way-point is reached per tick."""
     angle_step_rad: Annotated[Real, Field(gt=0, le=6.3)]
@@ -60,7 +59,7 @@ class SpiralRevision(Strict):
     initial_altitude_m: Length
     """Altitude above the sea bed before any mode is set."""
     workaround_step_m: Length
-    """Amount by which the commanded altitude is lowered each time that only z is not reached."""
+    """By this the commanded altitude is lowered each time that only z is not reached."""
     workaround_cleared_on_activation: bool
     """Whether each activation discards earlier lowering."""
 
@@ -77,22 +76,20 @@ class FollowRevision(Strict):
     polls_before_resending: Count
     """A point that is not reached is sent again after this many polls."""
     restarts_on_activation: bool
-    """Whether the path restarts from its first point (otherwise it continues with those not yet reached)."""
+    """Whether an activation restarts the path from its first point."""
     keeps_distance_on_activation: bool = False
-    """Whether the distance keeps accumulating after an activation (otherwise it restarts at zero); an interrupted
-    piece does not count."""
+    """Whether the distance keeps accumulating over activations, without an interrupted piece."""
     counts_interrupted_piece: bool
-    """Whether a deactivation adds the stretch from the last point to the current position to the distance."""
+    """Whether a deactivation adds the stretch from the last point to the current position."""
     resends_at_each_poll: bool
-    """Whether a point that is not reached after the tenth poll is sent again at each poll (otherwise after ten
-    more)."""
+    """Whether such a point is then sent again at each poll, instead of after as many more."""
 
 
 class RecoveryRevision(Strict):
     """Thruster recovery in maintain_motion."""
 
     delay_s: DelayDistribution
-    """Time from the activation to the recovery of the first thruster, drawn each time."""
+    """From the activation to the recovery of the first thruster, drawn each time."""
     thruster_period_s: Period
     """Time from one thruster to the next."""
     survives_deactivation: bool
@@ -103,31 +100,31 @@ class MonitorsRevision(Strict):
     """Monitors and detection mock-up."""
 
     thruster_event_times: Literal["after_previous", "after_start"]
-    """Reference of a thruster event's time: the previous event, or the start of the mission."""
+    """From what a thruster event's time counts."""
     thruster_check_period_s: Period
-    """Period at which the monitor checks whether a thruster event is due; at most one happens at a time."""
+    """Period at which the monitor lets at most one thruster event happen that is due."""
     visibility_publishing_period_s: Period
-    """Period at which signals are measured that do not give their own."""
+    """Period of signals that do not give their own."""
     detected_point_height_m: Annotated[Real, Field(ge=0, le=FARTHEST_M)]
-    """Height above the pipeline's points at which the detection mock-up looks for them."""
+    """Height above the pipeline's points at which detection looks for them."""
 
 
 class ThrusterFailureRevision(Strict):
     """Whether a mission's first thruster failure, published in any case, affects the vehicle. Later ones always do."""
 
     effective_from_s: NotNegative = 0.0
-    """Before this mission time, the first failure has no effect."""
+    """Before this mission time it has no effect."""
     loss_probability: Share = 0.0
-    """Probability that the first failure has no effect after that time."""
+    """Probability that it has no effect after that time."""
 
 
 class SetPointRevision(Strict):
     """How functions send set-points to the autopilot."""
 
     loss_probability: Annotated[Distribution, Within(0.0, 1.0, is_floor=True)]
-    """Probability that a set-point is lost, drawn once per run: a new publisher may publish before it is discovered."""
+    """Probability that a set-point is lost, drawn once per run."""
     node_frame_offset_x_m: OffsetDistribution
-    """Steady offset of a node's frame from the simulator's, east; drawn once per node and run."""
+    """Offset of a node's frame from the simulator's, east; drawn once per node and run."""
     node_frame_offset_y_m: OffsetDistribution
     """The same, north."""
     node_frame_offset_z_m: OffsetDistribution
@@ -147,8 +144,7 @@ class RandomRevision(Strict):
     on_task_request: bool
     """Whether it also picks a mode on each task request."""
     ungrounds_search_at_detection: bool
-    """Whether it sets the search to fd_unground when the pipeline is detected (otherwise when the task is
-    cancelled)."""
+    """Whether it sets the search to fd_unground already when the pipeline is detected."""
 
 
 class MetacontrolRevision(Strict):
@@ -178,7 +174,7 @@ class Revision(Strict):
     name: str
     """Name in result files."""
     timers_in_step: tuple[Timer, ...]
-    """Timers that are started by the message that guided mode has begun; every other timer has its own phase."""
+    """Timers that start with guided mode; every other one has a random phase."""
     coordinator: CoordinatorRevision
     """The mission node."""
     spiral: SpiralRevision
@@ -190,13 +186,12 @@ class Revision(Strict):
     monitors: MonitorsRevision
     """Monitors and detection."""
     thruster_failures: ThrusterFailureRevision = ThrusterFailureRevision()
-    """Whether thruster failures affect the vehicle."""
+    """Whether a mission's first thruster failure, which is published in any case, affects the vehicle."""
     set_points: SetPointRevision
     """How set-points reach the autopilot."""
     random: RandomRevision
     """The random manager."""
     comparison_operators: dict[str, Literal["<", "<=", ">", ">="]]
-    """Operator with which a measured value is worse than an expected one, for attributes to which the ontology
-    gives none."""
+    """By attribute to which the ontology gives none: when a measured value is worse than an expected one."""
     metacontrol: MetacontrolRevision
     """The metacontrol manager."""
