@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
 import simpy
 
 from suave_des.clock import Process, tick_at_or_after, until
@@ -16,7 +15,7 @@ from suave_des.monitor.measurements import Timing
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.physical import ThrusterEvent
 from suave_des.scenario.revision import ThrusterFailureRevision
-from suave_des.vehicle.vehicle import Vehicle
+from suave_des.vehicle.vehicle import ThrusterState, Vehicle
 
 
 @dataclass(eq=False)
@@ -26,7 +25,7 @@ class Thrusters:
     Attributes:
         env: the mission's clock.
         vehicle: the vehicle.
-        revision: says whether a mission's first failure may have no effect.
+        revision: says how they fail, and whether a mission's first failure may have no effect.
         draws: of the run.
         log: adds an event to the mission's record.
         unrecoverable: thrusters that f_maintain_motion cannot recover at present.
@@ -54,18 +53,18 @@ class Thrusters:
             self.unrecoverable.add(event.thruster)
         else:
             self.unrecoverable.discard(event.thruster)
-        self._set_health(event.thruster, 0.0 if fails else 1.0)
+        self._set(event.thruster, (event.failure_mode or self.revision.failure_mode) if fails else "works")
 
     def recover(self, thruster: int) -> bool:
         """Recover a thruster; return whether it can be recovered."""
         if thruster in self.unrecoverable:
             return False
-        self._set_health(thruster, 1.0)
+        self._set(thruster, "works")
         return True
 
-    def _set_health(self, thruster: int, health: float) -> None:
-        self.vehicle.set_thruster_health(self.env.now, thruster, health)
-        self.working.append((self.env.now, int(np.count_nonzero(self.vehicle.health))))
+    def _set(self, thruster: int, state: ThrusterState) -> None:
+        self.vehicle.set_thruster(self.env.now, thruster, state)
+        self.working.append((self.env.now, self.vehicle.thrusters.count("works")))
 
     def _has_no_effect(self) -> bool:
         """Decide whether the mission's first failure, which happens now, has no effect on the vehicle."""

@@ -268,6 +268,8 @@ class ThrusterEvent(Strict):
     """What happens to it."""
     recoverable: bool = True
     """Whether f_maintain_motion can recover the thruster after this failure."""
+    failure_mode: Literal["frozen", "dead"] | None = None
+    """What the failed thruster does: `frozen` keeps its last thrust, `dead` gives none; by default the revision's."""
     time_s: TimeDistribution
     """Drawn once per run; the revision says whether from the start or from the previous event. Below 0 it is 0."""
 

@@ -110,12 +110,14 @@ class MonitorsRevision(Strict):
 
 
 class ThrusterFailureRevision(Strict):
-    """Whether a mission's first thruster failure, published in any case, affects the vehicle. Later ones always do."""
+    """How thrusters fail; and whether a mission's first failure affects the vehicle. Later ones always do."""
 
+    failure_mode: Literal["frozen", "dead"] = "dead"
+    """What a failed thruster does, unless its event says so: `frozen` keeps its last thrust, `dead` gives none."""
     effective_from_s: NotNegative = 0.0
-    """Before this mission time it has no effect."""
+    """Before this mission time, the first failure has no effect."""
     loss_probability: Share = 0.0
-    """Probability that it has no effect after that time."""
+    """Probability that the first failure has no effect after that time."""
 
 
 class SetPointRevision(Strict):
@@ -186,7 +188,7 @@ class Revision(Strict):
     monitors: MonitorsRevision
     """Monitors and detection."""
     thruster_failures: ThrusterFailureRevision = ThrusterFailureRevision()
-    """Whether a mission's first thruster failure, which is published in any case, affects the vehicle."""
+    """How thrusters fail; and whether a mission's first failure, published in any case, affects the vehicle."""
     set_points: SetPointRevision
     """How set-points reach the autopilot."""
     random: RandomRevision

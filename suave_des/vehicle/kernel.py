@@ -34,34 +34,38 @@ IXX, IYY, IZZ = 1, 2, 3  # principal moments of inertia, kg m^2
 NET_BUOYANCY = 4  # buoyancy less weight, N
 RIGHTING = 5  # buoyancy times its height above the centre of mass, N m
 DRAG = 6  # six coefficients of -c |nu| nu, each divided by its mass or moment of inertia, 1/m and 1/rad
-THRUST_LIMIT = 12  # of each thruster, N
-POSITION_GAIN, POSITION_GAIN_Z = 13, 14  # velocity for a position error, 1/s
-JERK = 15  # of a leg, m/s^3
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = 16, 17  # acceleration for a horizontal velocity error, 1/s; its integral, 1/s^2
-VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z = 18, 19  # the same for a vertical one
-INTEGRAL_LIMIT = 20  # of each velocity integral, m/s^2
-ROLL_GAIN, ROLL_RATE_GAIN = 21, 22  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
-HEADING_GAIN, HEADING_RATE_GAIN = 23, 24  # the same for the heading
-HEADING_INTEGRAL_GAIN = 25  # 1/s^3
-HEADING_INTEGRAL_LIMIT = 26  # rad/s^2
-CURRENT = 27  # constant velocity of the water, world frame, three components, m/s
-FLOOR, CEILING = 30, 31  # z of sea bed and surface, m
-WAVE_X, WAVE_Y = 32, 33  # amplitude of the varying part of the current, east and north, m/s
-WAVE_RATE, WAVE_PHASE = 34, 35  # its angle per row and at row 0, rad
+POSITION_GAIN, POSITION_GAIN_Z = 12, 13  # velocity for a position error, 1/s
+JERK = 14  # of a leg, m/s^3
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = 15, 16  # acceleration for a horizontal velocity error, 1/s; its integral, 1/s^2
+VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z = 17, 18  # the same for a vertical one
+INTEGRAL_LIMIT = 19  # of each velocity integral, m/s^2
+ROLL_GAIN, ROLL_RATE_GAIN = 20, 21  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
+HEADING_GAIN, HEADING_RATE_GAIN = 22, 23  # the same for the heading
+HEADING_INTEGRAL_GAIN = 24  # 1/s^3
+HEADING_INTEGRAL_LIMIT = 25  # rad/s^2
+CURRENT = 26  # constant velocity of the water, world frame, three components, m/s
+FLOOR, CEILING = 29, 30  # z of sea bed and surface, m
+WAVE_X, WAVE_Y = 31, 32  # amplitude of the varying part of the current, east and north, m/s
+WAVE_RATE, WAVE_PHASE = 33, 34  # its angle per row and at row 0, rad
+
+# Columns of the thrusters' array, a row for each, N.
+LEAST, GREATEST = 0, 1  # thrust that it can give; equal for one that has failed
+LAST = 2  # its thrust in the last step
 
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
 
 UNCHECKED = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 1.0), -1
 """A box, a timer and a tick before row 0, for `advance` without checks."""
-Dynamics = tuple[float, Array, Array, Array, Array]
+Dynamics = tuple[float, Array, Array, Array, Array, Array]
 """What moves the vehicle, besides its state:
 
 - the time between rows, as the simulated world counts it, s;
 - set-point: position, heading and number, shape (6,);
-- parameters: constants, shape (36,);
+- parameters: constants, shape (35,);
 - allocation: thrusts for a demanded wrench, shape (6 thrusters, 6);
-- effectiveness: wrench for thrusts, each thruster's health included, shape (6, 6 thrusters).
+- wrenches: wrench for thrusts, shape (6, 6 thrusters);
+- thrusters: what each can give and gave last, shape (6 thrusters, 3).
 """
 
 
@@ -128,7 +132,7 @@ def advance(
     timer: tuple[float, float, float],
     tick: int,
 ) -> int:
-    """Fill rows first + 1 .. last of the track from row `first`, with one set-point and thruster health throughout.
+    """Fill rows first + 1 .. last of the track from row `first`, with one set-point, and no thruster failing.
 
     Args:
         track: shape (rows, COLUMNS); written in place.
@@ -142,7 +146,7 @@ def advance(
         The tick that finds the vehicle in the box; -1 if none does.
     """
     check_row = row_of(tick, timer)
-    h, set_point, prm, allocation, effectiveness = dynamics
+    h, set_point, prm, allocation, wrenches, thrusters = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
     heading_w, heading_z, number = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN], set_point[NUMBER]
     # Read number by number: unpacking a slice would create an array, which takes as long as a step.
@@ -222,19 +226,19 @@ def advance(
         d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
         d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
 
-        # Thrusters: allocate as if all worked, limit each, and get what the working ones give.
+        # Thrusters: allocate as if all worked, and limit each to what it can give.
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
-        limit = prm[THRUST_LIMIT]
         for i in range(6):
             thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
             thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
-            thrust = clamp(thrust, limit)
-            t0 += effectiveness[0, i] * thrust
-            t1 += effectiveness[1, i] * thrust
-            t2 += effectiveness[2, i] * thrust
-            t3 += effectiveness[3, i] * thrust
-            t4 += effectiveness[4, i] * thrust
-            t5 += effectiveness[5, i] * thrust
+            thrust = min(max(thrust, thrusters[i, LEAST]), thrusters[i, GREATEST])
+            thrusters[i, LAST] = thrust
+            t0 += wrenches[0, i] * thrust
+            t1 += wrenches[1, i] * thrust
+            t2 += wrenches[2, i] * thrust
+            t3 += wrenches[3, i] * thrust
+            t4 += wrenches[4, i] * thrust
+            t5 += wrenches[5, i] * thrust
 
         # Buoyancy above the centre of mass: a net force, and a moment that rights roll and pitch (Handbook, 4.1).
         t0 += prm[NET_BUOYANCY] * r20

@@ -134,7 +134,7 @@ def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tup
     buoyancy_n = model.water_density_kg_per_m3 * model.displaced_volume_m3 * GRAVITY_M_PER_S2
     net_n = buoyancy_n - model.mass_kg * GRAVITY_M_PER_S2
     forces = net_n, buoyancy_n * model.centre_of_buoyancy_m, *drag
-    legs = model.thrust_limit_n, ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
+    legs = ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
     horizontal = ap.velocity_gain_per_s, ap.velocity_integral_gain_per_s2
     vertical = ap.vertical_velocity_gain_per_s, ap.vertical_velocity_integral_gain_per_s2
     roll, heading = ap.roll_frequency_rad_per_s, ap.heading_frequency_rad_per_s

@@ -4,7 +4,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import KW_ONLY, InitVar, dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from suave_des.vehicle.model import Autopilot, Pose, VehicleModel, euler_angles,
 
 STEP_S = 0.05
 Point = tuple[float, float, float]
+ThrusterState = Literal["works", "frozen", "dead"]
+"""A frozen thruster keeps the thrust that it had when it failed; a dead one gives none."""
 ControlListener = Callable[[int, "ArrivalCheck | None"], None]
 """Called after a change of control with the first row that it affects; and with the arrival check of the way-points
 that were sent or cancelled, unless something else has changed control.
@@ -89,7 +91,7 @@ class Vehicle:
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
         control_listeners: each is called after a change of control.
         computed_row: last row of the track that is filled.
-        health: of each thruster, from 1 (works) to 0 (dead), shape (thrusters,).
+        thrusters: the state of each.
 
     Example:
         >>> vehicle = Vehicle(model, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
@@ -119,14 +121,15 @@ class Vehicle:
         self.track[0] = 0.0
         self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
-        self.health = np.array([1.0] * len(model.thrusters))
-        self._effectiveness = model.wrenches.copy()
+        self.thrusters: list[ThrusterState] = ["works"] * len(model.thrusters)
+        limit_n = model.thrust_limit_n
+        self._thrust_n = np.array([[-limit_n, limit_n, 0.0]] * len(model.thrusters))
         self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
         parameters = kernel_parameters(model, self.autopilot, self.z_limits_m).copy()
         parameters[kernel.CURRENT : kernel.FLOOR] = self.current_m_per_s
         parameters[kernel.WAVE_X :] = self.current_wave
         step_s = STEP_S * self.time_scale
-        self._dynamics = step_s, self._set_point, parameters, model.allocation, self._effectiveness
+        self._dynamics = step_s, self._set_point, parameters, model.allocation, model.wrenches, self._thrust_n
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point, which replaces the previous one."""
@@ -135,13 +138,16 @@ class Vehicle:
         self._set_point[kernel.NUMBER] += 1.0
         self._notify(t_s)
 
-    def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
-        """Set the health of thrusters 1 .. n, from 1 (works) to 0 (dead). The autopilot is not informed."""
-        if self.health[thruster - 1] != health:
-            self._cancel_after(t_s)
-            self.health[thruster - 1] = health
-            self._effectiveness[:] = self.model.wrenches * self.health
-            self._notify(t_s)
+    def set_thruster(self, t_s: float, thruster: int, state: ThrusterState) -> None:
+        """Let one of thrusters 1 .. n fail, or work again. The autopilot is not informed."""
+        if self.thrusters[thruster - 1] == state:
+            return
+        self._cancel_after(t_s)
+        limit_n = self.model.thrust_limit_n if state == "works" else 0.0
+        thrust_n = self._thrust(thruster) if state == "frozen" else 0.0
+        self.thrusters[thruster - 1] = state
+        self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
+        self._notify(t_s)
 
     def queue_waypoints(
         self, t_s: float, waypoints: Array, sent_as_m: Point, check: ArrivalCheck, *, first: int, last: int, send: bool
@@ -218,6 +224,12 @@ class Vehicle:
         row = row_at(t_s)
         self.look_ahead(row)
         return row
+
+    def _thrust(self, thruster: int) -> float:
+        """Find the thrust that a thruster gives from the last row on that is filled, N."""
+        rows = np.repeat(self.track[self.computed_row : self.computed_row + 1], 2, axis=0)
+        kernel.advance(rows, 0, 1, self._dynamics, *kernel.UNCHECKED)
+        return self._thrust_n.item(thruster - 1, kernel.LAST)
 
     def _replace_set_point(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
         set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m

@@ -297,7 +297,7 @@ def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, 
     def disturb(t_s: float, what: int):
         yield env.timeout(t_s + 0.013)  # never at the very time of a poll
         if what < 6:
-            vehicle.set_thruster_health(env.now, what + 1, 0.0)
+            vehicle.set_thruster(env.now, what + 1, "dead")
         else:
             vehicle.command(env.now, 3.0, 1.0, -18.0)
 
@@ -356,7 +356,7 @@ def test_the_distance_can_be_asked_for_at_any_time(env: simpy.Environment, name:
 def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[float]]:
     """When a real vehicle has followed the line, the distance, and the times at which the node means to act.
 
-    A thruster gets hardly any weaker at one time: scheduled before any poll, too little to reach a point at another.
+    A thruster fails at one time, and works again at once.
     """
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(1.0, 0.3, -18.75, 0.0, 0.0, 0.0), 120.0)
@@ -370,7 +370,8 @@ def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[flo
 
     vehicle.queue_waypoints = queue
     if changed_s is not None:
-        env.timeout(changed_s).callbacks.append(lambda _: vehicle.set_thruster_health(env.now, 1, 0.999999))
+        for state in ("dead", "works"):
+            env.timeout(changed_s).callbacks.append(lambda _, state=state: vehicle.set_thruster(env.now, 1, state))
     follow.apply(ACTIVE)
     env.run(until=follow.finished)
     return env.now, follow.distance_m, acting_s

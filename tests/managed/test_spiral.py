@@ -279,7 +279,7 @@ class PlainSpiral:
 
 
 def real_search(happenings: list, *, plainly: bool) -> list:
-    """Way of a vehicle whose search mode, health and set-point change meanwhile; by the node or tick by tick."""
+    """Way of a vehicle whose search mode, thrusters and set-point change meanwhile; by the node or tick by tick."""
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0, altitude_error_m=0.45)
     plain = PlainSpiral(env, vehicle) if plainly else None
@@ -294,7 +294,7 @@ def real_search(happenings: list, *, plainly: bool) -> list:
             else:
                 plain.set_mode(altitude_m)
         elif what < 7:
-            vehicle.set_thruster_health(env.now, what - 3, 0.5)
+            vehicle.set_thruster(env.now, what - 3, "frozen")
         else:
             vehicle.command(env.now, -15.0, 3.0, -18.0)
 

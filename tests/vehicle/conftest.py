@@ -23,7 +23,7 @@ def make_vehicle() -> MakeVehicle:
     ) -> Vehicle:
         vehicle = Vehicle(BLUEROV2, Autopilot(), start, duration_s, **options)  # type: ignore[arg-type]
         for thruster in lost:
-            vehicle.set_thruster_health(0.0, thruster, 0.0)
+            vehicle.set_thruster(0.0, thruster, "dead")
         return vehicle
 
     return make

@@ -14,7 +14,7 @@ DURATION_S = 40.0
 times = st.floats(0.0, DURATION_S)
 places = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-19, -15))
 commands = st.tuples(times, places)
-faults = st.tuples(times, st.integers(1, 6), st.sampled_from([0.0, 1.0]))
+faults = st.tuples(times, st.integers(1, 6), st.sampled_from(["works", "frozen", "dead"]))
 
 
 def carry_out(vehicle: Vehicle, plan: list[tuple], readings: list[float]) -> np.ndarray:
@@ -27,7 +27,7 @@ def carry_out(vehicle: Vehicle, plan: list[tuple], readings: list[float]) -> np.
         elif len(entry) == 2:
             vehicle.command(t_s, *entry[1])
         else:
-            vehicle.set_thruster_health(*entry)
+            vehicle.set_thruster(*entry)
     vehicle.look_ahead(vehicle.last_row)
     return vehicle.track
 
@@ -49,9 +49,9 @@ def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan: list, ahead:
 def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
     vehicle.control_listeners.append(lambda row, _: rows.append(row))
-    vehicle.set_thruster_health(1.0, 2, 1.0)
-    vehicle.set_thruster_health(2.0, 2, 0.0)
-    vehicle.set_thruster_health(3.0, 2, 0.0)
+    vehicle.set_thruster(1.0, 2, "works")
+    vehicle.set_thruster(2.0, 2, "frozen")
+    vehicle.set_thruster(3.0, 2, "frozen")
     assert rows == [row_at(2.0)]
 
 
@@ -59,7 +59,7 @@ def test_listeners_get_the_row_of_a_change_of_control(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
     vehicle.control_listeners.append(lambda row, _: rows.append(row))
     vehicle.command(3.0, 1.0, 0.0, -18.0)
-    vehicle.set_thruster_health(4.5, 2, 0.0)
+    vehicle.set_thruster(4.5, 2, "dead")
     assert rows == [row_at(3.0), row_at(4.5)]
 
 

@@ -121,17 +121,28 @@ def test_without_vertical_thrusters_depth_is_not_controlled(make_vehicle) -> Non
 
 def test_a_recovered_thruster_works_again(make_vehicle) -> None:
     vehicle = make_vehicle(lost=(5, 6))
-    vehicle.set_thruster_health(1.0, 5, 1.0)
-    vehicle.set_thruster_health(1.0, 6, 1.0)
+    vehicle.set_thruster(1.0, 5, "works")
+    vehicle.set_thruster(1.0, 6, "works")
     vehicle.command(1.0, 0.0, 0.0, -19.0)
     assert vehicle.position(60.0)[2] == pytest.approx(-19.0, abs=0.01)
+
+
+def test_a_frozen_thruster_keeps_the_thrust_that_it_had(make_vehicle) -> None:
+    vehicle = make_vehicle(lost=(1, 2, 4, 5, 6))
+    vehicle.command(0.0, 10.0, 0.0, -18.0)
+    vehicle.set_thruster(2.0, 3, "frozen")
+    vehicle.set_thruster(2.0, 3, "frozen")
+    vehicle.command(3.0, -10.0, 0.0, -18.0)  # which thruster 3 can do nothing about
+    assert math.hypot(*nu(vehicle, 40.0)[:2]) > 0.1
+    vehicle.set_thruster(40.0, 3, "dead")
+    assert math.hypot(*nu(vehicle, 140.0)[:2]) < 0.01 < math.hypot(*nu(vehicle, 41.0)[:2])
 
 
 def test_a_loss_is_not_felt_before_its_time(make_vehicle) -> None:
     healthy, failed = make_vehicle(), make_vehicle()
     for vehicle in (healthy, failed):
         vehicle.command(0.0, 10.0, 3.0, -17.0)
-    failed.set_thruster_health(10.0, 1, 0.0)
+    failed.set_thruster(10.0, 1, "dead")
     rows = row_at(10.0)
     healthy.look_ahead(rows + 20)
     failed.look_ahead(rows + 20)
