@@ -48,9 +48,8 @@ FLOOR, CEILING = 29, 30  # z of sea bed and surface, m
 WAVE_X, WAVE_Y = 31, 32  # amplitude of the varying part of the current, east and north, m/s
 WAVE_RATE, WAVE_PHASE = 33, 34  # its angle per row and at row 0, rad
 
-# Columns of the thrusters' array, a row for each, N.
-LEAST, GREATEST = 0, 1  # thrust that it can give; equal for one that has failed
-LAST = 2  # its thrust in the last step
+# Columns of the thrusters' array: what each can give, equal for one that has failed, and gave in the last step, N.
+LEAST, GREATEST, LAST = 0, 1, 2
 
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
@@ -67,12 +66,6 @@ Dynamics = tuple[float, Array, Array, Array, Array, Array]
 - wrenches: wrench for thrusts, shape (6, 6 thrusters);
 - thrusters: what each can give and gave last, shape (6 thrusters, 3).
 """
-
-
-@compiled
-def quarter_of_leg(length: float, jerk: float) -> float:
-    """Compute a quarter of the duration of a leg from rest to rest, at constant jerk with two sign changes."""
-    return float((length / (2.0 * jerk)) ** (1.0 / 3.0))
 
 
 @compiled
@@ -149,7 +142,7 @@ def advance(
     h, set_point, prm, allocation, wrenches, thrusters = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
     heading_w, heading_z, number = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN], set_point[NUMBER]
-    # Read number by number: unpacking a slice would create an array, which takes as long as a step.
+    # Unpacking a slice would create an array, which takes as long as a step.
     x, y, z = track[first, 0], track[first, 1], track[first, 2]
     qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
     u, v, w = track[first, 7], track[first, 8], track[first, 9]
@@ -164,8 +157,8 @@ def advance(
         to_x, to_y, to_z, leg_time = set_point[0], set_point[1], set_point[2], 0.0
     along_x, along_y, along_z = to_x - from_x, to_y - from_y, to_z - from_z
     length = math.sqrt(along_x * along_x + along_y * along_y + along_z * along_z)
-    if is_new_leg:
-        quarter = quarter_of_leg(length, prm[JERK])
+    if is_new_leg:  # from rest to rest at constant jerk with two sign changes
+        quarter = (length / (2.0 * prm[JERK])) ** (1.0 / 3.0)
     if length > 0.0:
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
     top_speed = prm[JERK] * quarter * quarter

@@ -122,8 +122,7 @@ class Vehicle:
         self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
         self.thrusters: list[ThrusterState] = ["works"] * len(model.thrusters)
-        limit_n = model.thrust_limit_n
-        self._thrust_n = np.array([[-limit_n, limit_n, 0.0]] * len(model.thrusters))
+        self._thrust_n = np.array([[-model.thrust_limit_n, model.thrust_limit_n, 0.0]] * len(model.thrusters))
         self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
         parameters = kernel_parameters(model, self.autopilot, self.z_limits_m).copy()
         parameters[kernel.CURRENT : kernel.FLOOR] = self.current_m_per_s
@@ -226,10 +225,9 @@ class Vehicle:
         return row
 
     def _thrust(self, thruster: int) -> float:
-        """Find the thrust that a thruster gives from the last row on that is filled, N."""
-        rows = np.repeat(self.track[self.computed_row : self.computed_row + 1], 2, axis=0)
-        kernel.advance(rows, 0, 1, self._dynamics, *kernel.UNCHECKED)
-        return self._thrust_n.item(thruster - 1, kernel.LAST)
+        """Find the thrust that a thruster gives after the last row that is filled, N."""
+        kernel.advance(np.repeat(self.track[[self.computed_row]], 2, axis=0), 0, 1, self._dynamics, *kernel.UNCHECKED)
+        return float(self._thrust_n[thruster - 1, kernel.LAST])
 
     def _replace_set_point(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
         set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m
