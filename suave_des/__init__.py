@@ -7,15 +7,14 @@ the package starts nothing: no Java, no pandas, no matplotlib until they are nee
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-from suave_des import imports as _imports
-
 if _TYPE_CHECKING:
     from suave_des.api import RecordedMission, resume_campaign, run_campaign, run_mission
-    from suave_des.campaign.single import train
+    from suave_des.campaign.training import train
     from suave_des.campaign.variation import read_ensemble
     from suave_des.errors import InputError, MissionError, SuaveDesError
     from suave_des.estimates import mean_of
     from suave_des.interfaces.exec import messages_schema
+    from suave_des.interfaces.gym import PipelineInspection
     from suave_des.interfaces.trees import PyTreesManager
     from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.managed.node import CustomFunction
@@ -40,7 +39,7 @@ __version__ = "1.0.0"
 __all__ = ["Mission", "RecordedMission", "Simulator", "load_scenario", "run_mission", "with_values"]
 __all__ += ["CampaignFrame", "read_ensemble", "resume_campaign", "run_campaign"]
 __all__ += ["CustomFunction", "ManagingSubsystem", "Metacontrol", "NoManager", "PyTreesManager", "Threshold"]
-__all__ += ["FAILED", "Kind", "train"]
+__all__ += ["FAILED", "Kind", "PipelineInspection", "train"]
 __all__ += ["compare_folders", "compare_with_paper", "draw_folder", "mean_of", "read_real", "read_runs", "validate"]
 __all__ += ["InputError", "KnowledgeBase", "MissionError", "SuaveDesError", "find", "messages_schema"]
 
@@ -48,11 +47,12 @@ _HOMES = {
     name: module
     for module, names in {
         "api": ("RecordedMission", "resume_campaign", "run_campaign", "run_mission"),
-        "campaign.single": ("train",),
+        "campaign.training": ("train",),
         "campaign.variation": ("read_ensemble",),
         "errors": ("InputError", "MissionError", "SuaveDesError"),
         "estimates": ("mean_of",),
         "interfaces.exec": ("messages_schema",),
+        "interfaces.gym": ("PipelineInspection",),
         "interfaces.trees": ("PyTreesManager",),
         "kb.knowledge_base": ("KnowledgeBase",),
         "managed.node": ("CustomFunction",),
@@ -75,8 +75,6 @@ _HOMES = {
     for name in names
 }
 """Modules, each imported when a name that it has is first used."""
-
-_imports.when_imported("gymnasium", _imports.register_environments)
 
 
 def __getattr__(name: str) -> object:

@@ -12,11 +12,15 @@ from typing import TYPE_CHECKING, Any, Unpack
 from suave_des.arguments import plain_arguments
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
+from suave_des.campaign.inputs import check_inputs, provenance
 from suave_des.campaign.progress import OnProgress
-from suave_des.campaign.spec import CampaignSpec
+from suave_des.campaign.spec import RUNS_LIMIT, CampaignSpec, check_range, check_seed
+from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.metrics.result import MissionResult
-from suave_des.registry import ManagerLike
-from suave_des.scenario.loader import LoadedScenario, Replacements
+from suave_des.records.knowledge import KNOWLEDGE_FILE
+from suave_des.records.mission_folder import mission_files, record_of
+from suave_des.registry import ManagerLike, name_of
+from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +55,6 @@ class RecordedMission(MissionResult):
         Raises:
             InputError: there is no such figure of a mission.
         """
-        from suave_des.records.mission_folder import record_of
         from suave_des.results.figures import draw_mission
 
         return draw_mission(record_of(self, self.loaded.scenario, self.loaded.inputs), kind)
@@ -66,6 +69,7 @@ def run_mission(
     out: str | Path | None = None,
     *,
     overwrite: bool = False,
+    command: Sequence[str] = (),
     **replacements: Unpack[Replacements],
 ) -> RecordedMission:
     """Run one mission and keep its events and trajectory; it equals this run of a campaign with this seed.
@@ -82,6 +86,7 @@ def run_mission(
         out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons, knowledge.jsonl; it is
             made if its parent exists. None: no files.
         overwrite: whether results of the same kind in the folder are replaced.
+        command: the command line, for mission.json.
         replacements: ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options, as of
             load_scenario.
 
@@ -89,9 +94,21 @@ def run_mission(
         InputError: something given cannot be used; nothing is written then.
         MissionError: the manager raised; nothing is written then.
     """
-    from suave_des.campaign.single import run_recorded  # with the compiler, which campaigns load in their workers
+    from suave_des.simulation.simulator import Simulator  # with the compiler, which campaigns load in their workers
 
-    loaded, result = run_recorded(scenario, manager, run, seed, out, overwrite=overwrite, **replacements)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        check_output_folder(folder, "mission", overwrite=overwrite)
+    check_range("run", run, 1, RUNS_LIMIT)
+    check_seed(seed)
+    name = name_of(manager)
+    loaded = load_scenario(scenario, **replacements)
+    inputs = check_inputs([loaded], [name], replacements)
+    result = Simulator(loaded).run(name, run, seed, record=True)
+    if folder is not None:
+        make_output_folder(folder)
+        files = mission_files(result, loaded.scenario, provenance(loaded, inputs, command))
+        write_files(folder, files, stale=(KNOWLEDGE_FILE,))
     return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
 
 

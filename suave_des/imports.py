@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Final
 
@@ -39,47 +36,3 @@ def main_hidden() -> Iterator[None]:
             yield
         finally:
             sys.modules["__main__"] = main
-
-
-def register_environments() -> None:
-    """Make `gymnasium.make("suave_des/PipelineInspection-v0")` known."""
-    from gymnasium import register
-
-    register(id="suave_des/PipelineInspection-v0", entry_point="suave_des.interfaces.gym:PipelineInspection")
-
-
-def when_imported(module: str, act: Callable[[], None]) -> None:
-    """Call a function as soon as a module is imported, now if it is already.
-
-    Gymnasium has no entry points for environments; importing it here for those who do not use it would be slow.
-    """
-    if module in sys.modules:
-        act()
-    else:
-        sys.meta_path.insert(0, _Awaiting(module, act))
-
-
-class _Awaiting(MetaPathFinder):
-    """Finds a module as it would be found without it, and has a function called after its import."""
-
-    def __init__(self, module: str, act: Callable[[], None]) -> None:
-        self._module, self._act = module, act
-
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        """Find the module."""
-        if fullname != self._module:
-            return None
-        sys.meta_path.remove(self)
-        spec = importlib.util.find_spec(fullname)
-        if spec is None or spec.loader is None:
-            return spec
-        execute, act = spec.loader.exec_module, self._act
-
-        def execute_and_act(module: ModuleType) -> None:
-            execute(module)
-            act()
-
-        spec.loader.exec_module = execute_and_act  # type: ignore[method-assign]
-        return spec

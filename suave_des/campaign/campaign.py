@@ -19,13 +19,22 @@ from suave_des.campaign.inputs import (
     trained_on,
 )
 from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
-from suave_des.campaign.progress import OnProgress, Progress, ProgressTracker
+from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignSpec, read_campaign_file
 from suave_des.campaign.workers import LocalWorkers, in_process
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.files import check_output_folder, make_output_folder, remove_parts, remove_results
-from suave_des.records.store import FILES, STORE_FILE, Store, StoreError, check_no_link, has_campaign, is_left_over
+from suave_des.records.store import (
+    FILES,
+    STORE_FILE,
+    MissionFailure,
+    Store,
+    StoreError,
+    check_no_link,
+    has_campaign,
+    is_left_over,
+)
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario
 
@@ -34,10 +43,6 @@ _MORE_MANAGERS = (
     "for other managers, run a second campaign with the same seed into another folder:"
     " suave-des compare {} FOLDER pairs their runs by number"
 )
-_LARGE = 1_000_000
-"""Missions from which a campaign needs to be confirmed."""
-_MISSIONS_A_SECOND = 450
-"""Of one worker, as docs/guides/cluster.md counts."""
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -97,7 +102,9 @@ def run_campaign(
 
     def read() -> Campaign:
         campaign = read_campaign(spec, file, loaded)
-        _check_size(campaign)
+        if spec.suave_format and campaign.variation.sweep.points > 1:
+            remedy = "omit --format suave, or run a campaign for each point"
+            raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
         return campaign
 
     with ExitStack() as stack:
@@ -200,18 +207,6 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
         )
 
 
-def _check_size(campaign: Campaign) -> None:
-    """Check that a very large campaign is intended, and that the exemplar's files can have its results."""
-    spec, total = campaign.spec, campaign.planned
-    if total > _LARGE and not spec.confirmed:
-        hours = total / (_MISSIONS_A_SECOND * spec.processes) / 3600.0
-        problem = f"{total:,} missions take about {hours:,.1f} hours at {_MISSIONS_A_SECOND} a second for each worker"
-        raise InputError(problem, remedy="confirm with --yes")
-    if spec.suave_format and campaign.variation.sweep.points > 1:
-        remedy = "omit --format suave, or run a campaign for each point"
-        raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
-
-
 def _run(
     stack: ExitStack,
     spec: CampaignSpec,
@@ -311,16 +306,17 @@ def _work(
     campaign: Campaign, store: Store, executor: Executor, on_progress: OnProgress | None
 ) -> tuple[KeyboardInterrupt | SuaveDesError | None, list[Remark]]:
     """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
-    spec, variation = campaign.spec, campaign.variation
-    tracker = ProgressTracker(variation.sweep.points, spec.managers, spec.runs)
     with store.reading():
         kept = store.about("remarks", default=[])
         remarks = {(manager, text): int(count) for manager, text, count in kept if text != GIVEN_UP}
+    done = failed = 0
     stopped: KeyboardInterrupt | SuaveDesError | None = None
     try:
         with store.reading():
-            tracker.add(store.outcomes())
-        if left := tracker.total - tracker.done:
+            for _, each in store.outcomes():
+                done += 1
+                failed += isinstance(each, MissionFailure)
+        if left := campaign.planned - done:
             for among in executor(campaign, campaign.missions(store.settled), left):
                 finished = []
                 for key, each in among:
@@ -328,10 +324,11 @@ def _work(
                         remarks[each.manager, each.text] = remarks.get((each.manager, each.text), 0) + each.times
                     else:
                         finished.append((key, each))
+                        failed += isinstance(each, MissionFailure)
                 store.append(finished)
-                tracker.add(finished)
+                done += len(finished)
                 if on_progress is not None:
-                    on_progress(tracker.progress())
+                    on_progress(Progress(done, failed, campaign.planned))
         store.commit()
     except (KeyboardInterrupt, SuaveDesError) as error:
         stopped = error

@@ -39,7 +39,7 @@ ANSWER_TIMEOUT_S = 10.0
 """Time for a scheduler to answer at all."""
 _AHEAD, _FEWEST_WORKERS = 3, 2
 """Chunks for each worker: one under way and some to go on with; a cluster that grows with its work begins with none."""
-_CHUNK_S, _FIRST_CHUNK, _LARGEST_CHUNK, _SHARES = 1.0, 10, 10_000, 4
+_CHUNK_S, _FIRST_CHUNK, _SHARES = 1.0, 10, 4
 """Work in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets of what is left."""
 _EXIT_AFTER_S = 30.0
 """Missions that are so much over their time, in code that cannot be interrupted, end their worker."""
@@ -59,29 +59,26 @@ def connected(scheduler: str) -> Iterator[DaskCluster]:
         remedy = "pip install 'suave-des[dask]'"
         raise InputError(f"a scheduler needs Dask, which is not installed ({error})", remedy=remedy) from None
 
-    async def kind() -> str:
+    async def answers() -> bool:
         async with distributed.rpc(scheduler) as there:
-            return str((await asyncio.wait_for(there.identity(), ANSWER_TIMEOUT_S))["type"])
+            identity = await asyncio.wait_for(there.identity(), ANSWER_TIMEOUT_S)
+            return bool(identity["type"] == "Scheduler")
 
     with _silenced():
         with ThreadPoolExecutor(1) as thread:  # a Client would wait for ever for one who is silent
             try:
-                found = thread.submit(asyncio.run, kind()).result()
+                is_there = thread.submit(asyncio.run, answers()).result()
             except Exception:
-                problem = f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s"
-                raise InputError(problem, remedy="check that `dask scheduler` is running there") from None
-        if found != "Scheduler":
-            problem = f"scheduler: {scheduler} is a Dask {found.lower()}"
-            raise InputError(problem, remedy="give its scheduler's address")
+                is_there = False
+        if not is_there:
+            problem = f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s"
+            raise InputError(problem, remedy="check that `dask scheduler` is running there")
         with distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False) as client:
-            answers = client.run(code_versions, on_error="return")
-            for address, there in sorted(answers.items()):
+            for address, there in sorted(client.run(code_versions, on_error="return").items()):
                 if isinstance(there, BaseException):
                     problem = f"worker {address} cannot run missions: {type(there).__name__}: {there}"
                     raise InputError(problem, remedy=f"install suave-des {suave_des.__version__} on all workers")
                 _check_same(code_versions(), there, address)
-            if not answers:
-                logging.getLogger("suave_des").warning("suave-des: %s has no workers; waiting for some", scheduler)
             yield DaskCluster(client, scheduler)
 
 
@@ -111,10 +108,6 @@ class DaskCluster:
 
     A worker that dies loses nothing: Dask gives its chunks to others. The missions of chunks with which workers die
     again and again are run alone, one after the other, and one with which they die even so has failed.
-
-    Args:
-        client: connected to the scheduler.
-        scheduler: its address, for messages.
     """
 
     def __init__(self, client: Any, scheduler: str) -> None:
@@ -138,7 +131,7 @@ class DaskCluster:
             while True:
                 workers = len(client.scheduler_info()["workers"])
                 while len(under_way) < _AHEAD * max(workers, _FEWEST_WORKERS):
-                    fair = max(1, min(left // (_SHARES * max(workers, 1)), size, _LARGEST_CHUNK))
+                    fair = max(1, min(left // (_SHARES * max(workers, 1)), size))
                     if not (chunk := tuple(islice(remaining, fair))):
                         break
                     under_way[future := submit(chunk)] = chunk
@@ -175,11 +168,7 @@ class DaskCluster:
 
 
 def pack(campaign: Campaign) -> bytes:
-    """Pack a campaign with the content of every file that it needs.
-
-    Raises:
-        InputError: a file cannot be read, or a manager is in a module that cannot be sent.
-    """
+    """Pack a campaign with the content of every file that it needs; a compiled module cannot be sent."""
     from suave_des.knowledge.ontology_file import collect
 
     loaded, managers = campaign.loaded, campaign.spec.managers
@@ -208,7 +197,7 @@ _lock = threading.Lock()
 def run(
     token: str, here: Mapping[str, str], parcel: bytes, chunk: Chunk, limit_s: float
 ) -> tuple[float, list[Finished]]:
-    """Run missions in this process, which is a worker of a cluster.
+    """Run missions in this process, which is a worker of a cluster; return the seconds that it took, and outcomes.
 
     Args:
         token: the campaign's.
@@ -216,9 +205,6 @@ def run(
         parcel: what pack returned there.
         chunk: keys of the missions.
         limit_s: time after which this process is ended.
-
-    Returns:
-        Seconds that it took, and outcomes.
 
     Raises:
         InputError: the campaign cannot be run here.

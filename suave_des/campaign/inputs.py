@@ -71,11 +71,8 @@ def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: Load
         ensemble, path, digest = read_ensemble(spec.ensemble)
         variation = with_ensemble(loaded, variation, ensemble, path)
         files.note(path, digest)
-    if "time_out_s" not in spec.model_fields_set:  # it follows from the reasoners
-        names = [name for name, path in variation.paths.items() if path == "knowledge.reasoner"]
-        points = [variation.sweep.values(point) for point in (variation.sweep.each_value() if names else ())]
-        reasoners = (loaded.scenario.knowledge.reasoner, *(str(values[name]) for values in points for name in names))
-        time_out_s = max(_TIME_OUTS_S.get(each, spec.time_out_s) for each in reasoners)
+    if "time_out_s" not in spec.model_fields_set:
+        time_out_s = _TIME_OUTS_S.get(loaded.scenario.knowledge.reasoner, spec.time_out_s)
         spec = spec.model_copy(update={"time_out_s": time_out_s})
     return Campaign(request, spec, loaded, variation, file, files.inputs)
 
@@ -92,17 +89,11 @@ def _located(file: CampaignFile | None) -> Iterator[None]:
 def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, confirmed: bool) -> None:
     """Check that the user trusts the code that a campaign folder refers to; nothing is imported before that.
 
-    Code that is already imported, for example by a script that resumes its own campaign, is not checked; nor is that
-    of a campaign that this user has begun.
-
-    Args:
-        campaign: what was read.
-        named: what the user has named himself.
-        folder: the campaign's.
-        confirmed: whether the user has said that the folder's code may run.
+    He does if he has named or confirmed it, if it is imported already, as by a script that resumes its own campaign,
+    or if he has begun the campaign himself.
 
     Raises:
-        InputError: a manager or a class is neither named nor confirmed.
+        InputError: a manager or a class is neither.
     """
 
     def is_imported(name: str) -> bool:
@@ -149,7 +140,6 @@ def check_campaign(campaign: Campaign) -> dict[str, str]:
     spec = campaign.spec
     with _located(campaign.file):
         check_drawn(campaign.loaded, campaign.variation)
-    given = any(spec.replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
     points = sorted(set(campaign.variation.sweep.each_value()))
     useless = Counter(
         words
@@ -159,30 +149,32 @@ def check_campaign(campaign: Campaign) -> dict[str, str]:
     for words, number in useless.items():
         where = f", at {number} of {len(points)} swept values" if len(points) > 1 else ""
         logging.getLogger(MISTAKES_LOGGER).warning("note: %s%s", words, where)
-    return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, given=given)}
+    return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, spec.replacements)}
 
 
-def check_inputs(scenarios: Sequence[LoadedScenario], managers: Sequence[str], *, given: bool) -> dict[str, str]:
+def check_inputs(
+    scenarios: Sequence[LoadedScenario], managers: Sequence[str], replacements: Mapping[str, Any]
+) -> dict[str, str]:
     """Check the inputs of missions before they run: functions, knowledge base, managers and their files.
 
-    The knowledge base is opened if a manager uses it or the user gave ontologies.
+    The knowledge base is opened if a manager uses it or the user gave ontologies or rules.
 
     Args:
         scenarios: those of the missions; what differs between them is what managers and functions are set to.
         managers: names, or module:Class.
-        given: whether the user gave ontologies or rules.
+        replacements: what the user gave instead of the scenario's own files, as of load_scenario.
 
     Returns:
         SHA-256 of each input file that is not among those of the scenario, by its name as shown to the user, or its
-        place among modules: of ontologies that are imported, if the knowledge base was opened, of the code of
-        user-defined functions and managers, and of files that managers declare.
+        place among modules: of ontologies that are imported, of code, and of files that managers declare.
 
     Raises:
-        InputError: a function has no node; the knowledge base cannot be read, does not fit the mission or the modes
-            file, or is inconsistent; a manager refuses the scenario, or a file of it cannot be read.
+        InputError: a function has no node; the knowledge base cannot be used; a manager refuses the scenario, or a file
+            of it cannot be read.
     """
     functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     files = InputFiles()
+    given = any(replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
         from suave_des.scenario_knowledge import open_knowledge
@@ -212,11 +204,7 @@ def check_inputs(scenarios: Sequence[LoadedScenario], managers: Sequence[str], *
 
 
 def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[tuple[str, str], Path]:
-    """Locate the files that managers declare, by manager and their names as given.
-
-    Raises:
-        InputError: one is not there.
-    """
+    """Locate the files that managers declare, by manager and their names as given; each has to be there."""
     return {
         (manager, name): path
         for loaded in scenarios
@@ -229,10 +217,6 @@ def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     """Log the errors and warnings that `kb check` has without a reasoner, as it words them; once for the same files.
 
     This takes some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
-
-    Args:
-        loaded: the scenario with its files.
-        base: its knowledge base.
     """
     from suave_des.knowledge.checks import static_findings
     from suave_des.scenario_knowledge import subject_of
@@ -242,18 +226,16 @@ def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     files = (loaded.path, loaded.modes_path, *loaded.ontologies, *loaded.rules)
     if all(any(path.resolve().is_relative_to(folder) for folder in shipped) for path in files):
         return
-    checked = hash((base.content_hash, loaded.scenario.model_dump_json(), tuple(sorted(loaded.inputs.items())), files))
+    checked = base.content_hash, loaded.scenario.model_dump_json(), *loaded.inputs.values(), files
     if checked in _told or not logger.isEnabledFor(logging.WARNING):
         return
+    _told.add(checked)
     findings = ordered(static_findings(subject_of(loaded), base.sources))
-    lines = [str(each) for each in findings if each.level is not Level.INFO]
-    known = (base.content_hash, *lines)
-    if lines and known not in _told:
+    if lines := [str(each) for each in findings if each.level is not Level.INFO]:
         for line in lines[:MISTAKES_SHOWN]:
             logger.warning("%s", line)
         more = f"{len(lines) - MISTAKES_SHOWN} more; " if len(lines) > MISTAKES_SHOWN else ""
         logger.warning("note: %ssuave-des kb check, with the same files, looks for contradictions, too", more)
-    _told.update((checked, known))
 
 
 def trained_on(campaign: Campaign) -> Iterator[str]:

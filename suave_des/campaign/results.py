@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
-from suave_des.estimates import known, mean_of, percent, std_of
+from suave_des.estimates import known, mean_of, std_of
 from suave_des.files import csv_text, json_text
 from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
-from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, METRICS, PAPER_METRICS, Row
+from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.store import (
     ENSEMBLE_FILE,
     MANIFEST_FILE,
@@ -31,7 +31,6 @@ from suave_des.records.store import (
     write_campaign,
 )
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.tables import Table
 
 if TYPE_CHECKING:
     import pandas
@@ -71,19 +70,6 @@ class CampaignResult:
     summary: tuple[dict[str, Any], ...]
     outcomes: Callable[[], Iterator[Outcome]]
     remarks: tuple[str, ...]
-
-    def __repr__(self) -> str:
-        """Return the summary as a table, and where the files are."""
-        headings = (
-            "manager",
-            "n",
-            "found",
-            *(f"{METRICS[metric].brief}: mean, 95% interval" for metric in PAPER_METRICS),
-        )
-        table = Table(headings, list(map(_shown_summary, self.summary)), align="l" * len(headings))
-        where = "" if self.folder is None else f", files in {self.folder}"
-        title = f"{self.loaded.scenario.name}, seed {self.spec.seed}: {self.done} of {self.planned} missions{where}"
-        return f"{title}\n{table.text()}"
 
     @property
     def folder(self) -> Path | None:
@@ -228,18 +214,6 @@ class CampaignResult:
             exemplar_names(managers, revision, has_battery=scenario.battery is not None)
         ):
             yield f"{file}.csv", suave_pieces(revision, name, COLUMNS, numbered(number), limit_s)
-
-
-def _shown_summary(record: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a row of summary.csv as text; the point of a sweep stands with the manager."""
-    swept = "".join(f", {name} {value}" for name, value in record.items() if name not in SUMMARY_COLUMNS)
-    cells = [f"{record['manager']}{swept}", str(record["n"])]
-    cells.append("" if record["found_share"] is None else percent(record["found_share"]))
-    for metric in PAPER_METRICS:
-        mean, low, high = (record[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high"))
-        interval = "" if low is None else f" ({low:.1f} to {high:.1f})"
-        cells.append("" if mean is None else f"{mean:.2f}{interval}")
-    return tuple(cells)
 
 
 def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]) -> CampaignResult:

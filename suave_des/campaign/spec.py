@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Mapping
@@ -25,10 +24,11 @@ from suave_des.scenario.yamlfile import InputFiles, Layer, find_named
 RUNS_LIMIT = 1_000_000
 SEED_LIMIT = 2**63 - 1
 """The greatest that tools which read the result files can hold."""
+WORKERS_LIMIT = 256
+"""More than one for each core gain nothing."""
 _WORKERS = 2
 _FEW_MISSIONS = 300
 """So many take one process no longer than two, which load the compiler first."""
-_WORKERS_PER_CORE = 4
 _ADDRESS = re.compile(r"(?:tcp|tls)://(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:@\[\]]+):(\d{1,5})/?")
 
 Whole = Annotated[int, Field(strict=True)]
@@ -112,14 +112,14 @@ class CampaignSpec(CampaignKeys):
     """Record the knowledge states that managers analysed, in knowledge_states.jsonl, for `kb try`."""
     out: Annotated[Path | None, Option("DIR")] = None
     """Folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists."""
-    workers: Annotated[Whole | None, Option(default="2, or 1 for few missions")] = None
+    workers: Annotated[Whole | None, Field(ge=1, le=WORKERS_LIMIT), Option(default="2, or 1 for few missions")] = None
     """Worker processes; results do not depend on the number."""
     scheduler: Annotated[Annotated[str, AfterValidator(_address)] | None, Option("tcp://HOST:PORT")] = None
     """Run missions on the workers of this Dask scheduler; results are the same."""
     overwrite: bool = False
     """Replace results of the same kind in the output folder."""
     confirmed: Annotated[bool, Option(flag="--yes")] = False
-    """Confirm more than a million missions; with --resume: trust the code that DIR names."""
+    """With --resume: trust the code that DIR names."""
     command: tuple[str, ...] = ()
     """The command line, for the manifest."""
     folder: str = ""
@@ -134,7 +134,7 @@ class CampaignSpec(CampaignKeys):
         Raises:
             InputError: there is no such option, or a value is not allowed.
         """
-        given = {name: plain(value, name) for name, value in options.items() if value is not None}
+        given = {name: plain(value) for name, value in options.items() if value is not None}
         replaced = {name: given.pop(name) for name in Replacements.__annotations__ if name in given}
         return cls.read({"scenario": str(scenario), "replacements": replaced, "folder": str(Path.cwd()), **given})
 
@@ -175,7 +175,7 @@ class CampaignSpec(CampaignKeys):
         """Check what depends on this machine; imports the managers.
 
         Raises:
-            InputError: an unknown or repeated manager, too many workers, or a library that is not installed.
+            InputError: an unknown or repeated manager, or a library that is not installed.
         """
         for index, manager in enumerate(self.managers):
             manager_class(manager)
@@ -183,11 +183,9 @@ class CampaignSpec(CampaignKeys):
                 raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
         if self.parquet and find_spec("pyarrow") is None:
             raise InputError("Parquet needs pyarrow, which is not installed", remedy="pip install 'suave-des[parquet]'")
-        workers = 1 if self.workers is None else self.workers
-        check_workers(workers)
-        if self.scheduler is not None and workers != 1:
+        if self.scheduler is not None and self.workers not in (None, 1):
             remedy = "omit it; `dask worker --nworkers N` sets how many missions run there at a time"
-            raise InputError(f"workers: {workers} cannot be used with a scheduler", remedy=remedy)
+            raise InputError(f"workers: {self.workers} cannot be used with a scheduler", remedy=remedy)
 
 
 def check_range(what: str, number: int, least: int, greatest: int) -> None:
@@ -207,19 +205,6 @@ def check_seed(seed: int) -> None:
         InputError: it does not.
     """
     check_range("seed", seed, 0, SEED_LIMIT)
-
-
-def check_workers(workers: int) -> None:
-    """Check that the number of processes makes sense on this machine.
-
-    Raises:
-        InputError: it does not.
-    """
-    cores = os.cpu_count() or 1
-    limit = _WORKERS_PER_CORE * cores
-    if not 1 <= workers <= limit:
-        remedy = f"give 1 to {limit}; this machine has {cores} cores, and more workers than cores gain nothing"
-        raise InputError(f"workers: {workers} is out of range", remedy=remedy)
 
 
 # Campaign files.

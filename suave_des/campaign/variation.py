@@ -14,15 +14,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations, groupby, islice
+from itertools import combinations, groupby, islice, product
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from suave_des.arguments import plain_arguments
-from suave_des.domain import WATER_VISIBILITY
 from suave_des.draws import Streams
 from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.estimates import known, mean_of, t_quantile
@@ -31,9 +30,9 @@ from suave_des.metrics.result import MissionResult
 from suave_des.records.metrics import Row
 from suave_des.records.store import MissionKey
 from suave_des.resources import find
-from suave_des.scenario.loader import LoadedScenario, value_at, with_values
+from suave_des.scenario.loader import LoadedScenario, full_path, value_at, with_values
 from suave_des.scenario.models import MissionSettings
-from suave_des.scenario.quantities import Distribution, Real, Strict, wrong
+from suave_des.scenario.quantities import Real, Strict, wrong
 from suave_des.scenario.schema import problem_and_remedy
 
 ENSEMBLE_COLUMN = "ensemble_member"
@@ -45,10 +44,8 @@ ENSEMBLE_COLUMNS = (
 """Columns of ensemble.csv before those of swept parameters."""
 _NO_PARAMETERS = ("member", "loss")
 _ENSEMBLE_LIMIT_BYTES = 5_000_000
-_MOST_VALUES = 1_000_000
 _CHECKED_POINTS = 300
 """Of sweeps with more points, so many are checked before anything runs."""
-_DISTRIBUTION: TypeAdapter[Any] = TypeAdapter(Distribution)
 
 
 def _each_once(values: Sequence[Any]) -> Sequence[Any]:
@@ -123,12 +120,10 @@ class Sweep(Strict):
 
     def values(self, point: int) -> dict[str, Any]:
         """Return the value of each parameter at a point."""
-        places = []
-        for size in reversed(self._sizes()):
-            point, place = divmod(point, size)
-            places.append(place)
-        sampled, row, *grid = places
-        values = {path: own[place] for (path, own), place in zip(self.grid.items(), reversed(grid), strict=True)}
+        import numpy as np
+
+        *grid, row, sampled = map(int, np.unravel_index(point, self._sizes()))
+        values = {path: own[place] for (path, own), place in zip(self.grid.items(), grid, strict=True)}
         values |= {path: column[row] for path, column in self.zip.items()}
         if self.sample is not None:
             values |= dict(zip(self.sample.ranges, self._sampled[sampled], strict=True))
@@ -163,28 +158,22 @@ class Sweep(Strict):
         return rows
 
 
-def plain(given: Any, name: str = "sweep") -> Any:
+def plain(given: Any) -> Any:
     """Convert what a caller gives to the form of a file: arrays, ranges, series and the like become lists, paths text.
 
     Example:
         >>> plain({"thruster_events.0.time_s": range(20, 50, 10)})
         {'thruster_events.0.time_s': [20, 30, 40]}
-
-    Raises:
-        InputError: a range is without end, or very long.
     """
     if isinstance(given, Path):
         return str(given)
     if isinstance(given, Mapping):
-        return {key: plain(each, f"{name}.{key}") for key, each in given.items()}
+        return {key: plain(each) for key, each in given.items()}
     if hasattr(given, "tolist"):  # of numpy or pandas
         return given.tolist()
     if isinstance(given, str | bytes) or not isinstance(given, Iterable):
         return given
-    values = list(islice(given, _MOST_VALUES + 1))
-    if len(values) > _MOST_VALUES:
-        raise InputError(f"{name} has more than {_MOST_VALUES:,} values", remedy="give fewer")
-    return [plain(each, name) for each in values]
+    return [plain(each) for each in given]
 
 
 def cell_of(value: Any) -> str | int | float | bool | None:
@@ -283,24 +272,24 @@ def vary(
     """
     varied: dict[str, str] = {}
 
-    def full_path(place: str, name: str) -> str:
-        """Return the key path of a name: a signal needs no `signals.`, and visibility is water_visibility."""
-        first, *rest = name.split(".")
-        signal = WATER_VISIBILITY if first == "visibility" else first
-        if first not in type(loaded.scenario).model_fields and signal in loaded.scenario.signals:
-            name = ".".join(("signals", signal, *rest))
+    def path_of(place: str, name: str) -> str:
+        path = full_path(dict(loaded.scenario), name)
         with _at(place):
-            value_at(loaded, name)
-            if name in varied:
-                raise InputError(f"varies {name}, as {varied[name]} does", remedy="vary each key once")
-        varied[name] = place
-        return name
+            value_at(loaded, path)
+            if path in varied:
+                raise InputError(f"varies {path}, as {varied[path]} does", remedy="vary each key once")
+        varied[path] = place
+        return path
 
-    drawn = {full_path(f"perturbations.{name}", name): name for name in perturbations}
+    drawn = {path_of(f"perturbations.{name}", name): name for name in perturbations}
     for path, name in drawn.items():
-        loaded = _perturbed(loaded, f"perturbations.{name}", path, perturbations[name])
+        with _at(f"perturbations.{name}"):
+            if not isinstance(distribution := perturbations[name], Mapping):
+                remedy = "such as {distribution: normal, mean: 1, std: 2}"
+                raise InputError(f"expected a distribution, got {shown(distribution)}", remedy=remedy)
+            loaded = with_values(loaded, {path: dict(distribution)})
     found, places = _sweep(sweep, seed)
-    paths = {name: full_path(places[name], name) for name in found.parameters}
+    paths = {name: path_of(places[name], name) for name in found.parameters}
     variation = Variation(found, drawn, paths, runs_per_draw)
     points = {*range(0, found.points, max(1, found.points // _CHECKED_POINTS))}
     points.update(islice(found.each_value(), _CHECKED_POINTS))
@@ -311,25 +300,12 @@ def vary(
 
 
 @contextmanager
-def _at(place: str, problem: str = "") -> Iterator[None]:
-    """Give errors a key path within what was given as their place, and perhaps begin them with a problem."""
+def _at(place: str) -> Iterator[None]:
+    """Give errors a key path within what was given as their place."""
     try:
         yield
     except InputError as error:
-        raise InputError(problem + error.problem, place=place, remedy=error.remedy) from None
-
-
-def _perturbed(loaded: LoadedScenario, place: str, path: str, distribution: Any) -> LoadedScenario:
-    if not isinstance(distribution, Mapping):
-        remedy = "such as {distribution: normal, mean: 1, std: 2}"
-        raise InputError(f"expected a distribution, got {shown(distribution)}", place=place, remedy=remedy)
-    try:
-        _DISTRIBUTION.validate_python(distribution)
-    except ValidationError as error:
-        keys, problem, how = problem_and_remedy(error, dict(distribution), Distribution)
-        raise InputError(problem, place=".".join(map(str, [place, *keys])), remedy=how) from None
-    with _at(place, f"{path} cannot have such a distribution: "):
-        return with_values(loaded, {path: dict(distribution)})
+        raise InputError(error.problem, place=place, remedy=error.remedy) from None
 
 
 def _sweep(given: Mapping[str, Any], seed: int) -> tuple[Sweep, dict[str, str]]:
@@ -398,11 +374,11 @@ def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
         if len(row) != len(header):
             problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
             raise line_error(path, line, problem, "give each column one")
-        cells = {name: cell for name, cell in zip(header, row, strict=True) if name not in _NO_PARAMETERS}
-        for name, cell in cells.items():
-            if not math.isfinite(as_number(cell)):
-                raise line_error(path, line, f"{name}: expected a number, got {shown(cell)}", "give it a value")
-        members.append(tuple(map(float, cells.values())))
+        member = {name: as_number(cell) for name, cell in zip(header, row, strict=True) if name not in _NO_PARAMETERS}
+        if not all(map(math.isfinite, member.values())):
+            problem = f"expected numbers, got {', '.join(map(shown, row))}"
+            raise line_error(path, line, problem, "give each parameter a value")
+        members.append(tuple(member.values()))
     if len(members) < 2:
         raise line_error(path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more")
     return Ensemble(path.stem, paths, tuple(members)), path, digest
@@ -453,34 +429,34 @@ def differences(
         runs_sharing_draw: consecutive runs that share a draw, and so are not independent.
     """
     for point, group in groupby(rows, key=lambda each: each[0].point):
-        by_manager: dict[int, dict[int, list[Any]]] = {}
+        by_manager: dict[int, dict[int, Sequence[Any]]] = {}
         for key, row in group:
-            by_manager.setdefault(key.manager, {})[key.run] = [row[place] for place in metrics.values()]
-        for place, metric in enumerate(metrics):
-            for second, first in combinations(sorted(by_manager), 2):
-                ours, theirs = by_manager[first], by_manager[second]
-                if by_run := {run: ours[run][place] - theirs[run][place] for run in ours if run in theirs}:
-                    names = {"first": managers[first], "second": managers[second], "metric": metric}
-                    yield {**names, **_difference(by_run, ensemble, runs_sharing_draw), "point": point}
-
-
-def _difference(by_run: Mapping[int, float], ensemble: Ensemble, runs_sharing_draw: int) -> dict[str, Any]:
-    by_member: dict[int, list[float]] = {}
-    for run, value in by_run.items():
-        by_member.setdefault(ensemble.member(run), []).append(value)
-    means, mean = list(map(fmean, by_member.values())), fmean(by_run.values())
-    of_draws = mean_of(list(by_run.values()), [(run - 1) // runs_sharing_draw for run in by_run])
-    members, half = len(means), math.nan
-    if members > 1:
-        half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)
-    return {
-        "n": len(by_run),
-        "difference": mean,
-        "ci95_low": known(of_draws.low),
-        "ci95_high": known(of_draws.high),
-        "members": members,
-        "members_above_0": sum(each > 0.0 for each in means),
-        "members_below_0": sum(each < 0.0 for each in means),
-        "range95_low": known(mean - half),
-        "range95_high": known(mean + half),
-    }
+            by_manager.setdefault(key.manager, {})[key.run] = row
+        for (metric, place), (second, first) in product(metrics.items(), combinations(sorted(by_manager), 2)):
+            ours, theirs = by_manager[first], by_manager[second]
+            by_run: dict[int, Any] = {run: ours[run][place] - theirs[run][place] for run in ours if run in theirs}
+            if not by_run:
+                continue
+            by_member: dict[int, list[float]] = {}
+            for run, value in by_run.items():
+                by_member.setdefault(ensemble.member(run), []).append(value)
+            means, mean = list(map(fmean, by_member.values())), fmean(by_run.values())
+            interval = mean_of(list(by_run.values()), [(run - 1) // runs_sharing_draw for run in by_run])
+            members, half = len(means), math.nan
+            if members > 1:
+                half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)
+            yield {
+                "first": managers[first],
+                "second": managers[second],
+                "metric": metric,
+                "n": len(by_run),
+                "difference": mean,
+                "ci95_low": known(interval.low),
+                "ci95_high": known(interval.high),
+                "members": members,
+                "members_above_0": sum(each > 0.0 for each in means),
+                "members_below_0": sum(each < 0.0 for each in means),
+                "range95_low": known(mean - half),
+                "range95_high": known(mean + half),
+                "point": point,
+            }

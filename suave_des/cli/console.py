@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from textwrap import fill
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,7 @@ from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
-    from suave_des.metrics.result import Event, MissionMetrics, MissionResult
+    from suave_des.metrics.result import MissionMetrics, MissionResult
 
 TEXT_WIDTH = 95
 """Columns of text at most, which is hard to read in longer lines."""
@@ -78,25 +77,17 @@ class PlainConsole(Console):
 
 
 _PLAIN_WIDTH = 120
-_LEAST_WIDTH = 72
-"""Lines of a timeline are not wrapped shorter than this: a narrower terminal wraps them itself."""
+_TIME_WIDTH = 10
+"""Of a timeline."""
 _STYLES = {
-    "task_requested": "bold",
-    "task_done": "bold",
-    "mission_ended": "bold",
+    **dict.fromkeys(("task_requested", "task_done", "mission_ended"), "bold"),
+    **dict.fromkeys(("component_status", "no_design_left", "refused"), "red"),
     "pipeline_detected": "bold green",
-    "component_status": "red",
-    "first_measurement": "cyan",
-    "visibility_crossing": "cyan",
     "inferred": "magenta",
     "adaptation": "yellow",
-    "no_design_left": "red",
-    "refused": "red",
     "mode_requested": "dim",
 }
 """Of a timeline's events; one that is not here, such as an outside manager's, has none."""
-
-
 _UNITS = {"_m2": " m2", "_s": " s"}
 """Of further metrics, by the end of a column."""
 
@@ -129,25 +120,6 @@ def progress(label: str, *, quiet: bool) -> Iterator[OnProgress | None]:
 
 
 @contextmanager
-def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float, float], None] | None]:
-    """Show the mission time reached until the mission ends; yields None if the console is not a terminal.
-
-    Args:
-        scenario: its name, as given.
-        console: where to show it.
-    """
-    if not console.is_terminal:
-        yield None
-        return
-    with console.status(Text(f"{scenario}: starting")) as status:
-
-        def show(t_s: float, limit_s: float) -> None:
-            status.update(Text(f"{scenario}: mission time {t_s:.0f} of {limit_s:.0f} s"))
-
-        yield show
-
-
-@contextmanager
 def counted(what: str, console: Console) -> Iterator[Callable[[int, int], None]]:
     """Show, while it takes and where the console is a terminal, how many of how many are done."""
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
@@ -177,31 +149,17 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     heading = f"\n{'time, s':>8}  {'source':<{sources}}  {'event':<{names}}  detail"
     console.print(Text(title, "bold"))
     console.print(Text(heading, "italic"))
-    # If the console is not a terminal, each event is one line, for tools that search.
-    width = max(console.width, _LEAST_WIDTH) if console.is_terminal or "COLUMNS" in os.environ else None
     for event in result.events:
-        console.print(_event_line(event, sources, names, width))
+        source, name = event.source.replace("_", " "), event.event.replace("_", " ")
+        detail = " ".join(event.detail.splitlines())  # one of a manager's own may have several
+        line = Text(f"{event.t_s:8.2f}  {source:<{sources}}  {name:<{names}}  {detail}")
+        line.stylize(_STYLES.get(event.event, ""), _TIME_WIDTH)
+        console.print(line)
     console.print()
     rows = list(_metrics_rows(metrics, result.further))
     names, values = (max(len(row[column]) for row in rows) for column in (0, 1))
     for name, value, remark in rows:
         console.print(f"{name:<{names}}  {value:>{values}}  {remark}".rstrip())
-
-
-def _event_line(event: Event, sources: int, names: int, width: int | None) -> Text:
-    """An event; one that does not fit into a width has its detail in lines of its own."""
-    source, name = event.source.replace("_", " "), event.event.replace("_", " ")
-    time_text = f"{event.t_s:8.2f}  "
-    begin = f"{time_text}{source:<{sources}}  {name:<{names}}  "
-    detail = " ".join(event.detail.splitlines())  # one of a manager's own may have several
-    line = f"{begin}{detail}"
-    if width is not None and len(line) > width:
-        indent = " " * (len(time_text) + 2)
-        detail = fill(detail, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
-        line = f"{begin.rstrip()}\n{detail}"
-    text = Text(line, no_wrap=True)
-    text.stylize(_STYLES.get(event.event, ""), len(time_text))
-    return text
 
 
 def _metrics_rows(metrics: MissionMetrics, further: Mapping[str, float | int | None]) -> Iterator[tuple[str, str, str]]:

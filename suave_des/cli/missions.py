@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.console import errors, mission_status, output, print_table, print_timeline
+from suave_des.cli.console import errors, output, print_table, print_timeline
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -53,13 +53,10 @@ def run(
     files: Files,
 ) -> None:
     """Run one mission and print its timeline."""
-    from suave_des.campaign.single import run_recorded
+    from suave_des.api import run_mission
 
-    with mission_status(scenario, errors()) as show:
-        replaced = files.with_options(manager_option, [manager])
-        _, result = run_recorded(
-            scenario, manager, run_number, command=command_line(), on_time=show, **options, **replaced
-        )
+    replaced = files.with_options(manager_option, [manager])
+    result = run_mission(scenario, manager, run_number, command=command_line(), **options, **replaced)
     for remark in result.remarks:
         errors().print(f"suave-des: manager {manager}: {remark}")
     console = output()
@@ -87,8 +84,8 @@ def train(
 
     A campaign uses the resulting file with --manager-option learned=FILE, and does not change it.
     """
-    from suave_des.campaign.single import blocks
-    from suave_des.campaign.single import train as trained
+    from suave_des.campaign.training import blocks
+    from suave_des.campaign.training import train as trained
 
     times_s: list[float] = []
     distances_m: list[float] = []

@@ -53,6 +53,8 @@ class Reward:
 class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     """SUAVE's mission; an episode is a mission, a step is one adaptation period.
 
+    Once it is imported, `gymnasium.make("suave_des/PipelineInspection-v0", ...)` makes one, too.
+
     Observation: a vector of float32, named by `observation_names`: the values that monitors measured last, -1 before
     the first; for each thruster 1 unless it was reported as failed; whether the pipeline is inspected; the distance
     inspected in m; mission time as a share of the limit; for each function with a choice, the index of the mode that
@@ -66,7 +68,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     drawn. `gymnasium.make_vec(..., num_envs=8)` gives many side by side (gymnasium's SyncVectorEnv).
 
     Example:
-        >>> environment = gymnasium.make("suave_des/PipelineInspection-v0", scenario="seams2023", period_s=2.0)
+        >>> environment = PipelineInspection("seams2023", period_s=2.0)
         >>> observation, info = environment.reset(seed=8)
         >>> observation, reward, terminated, truncated, info = environment.step([2, 0])
 
@@ -240,6 +242,9 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         if mission.is_over:
             info["metrics"] = mission.metrics()
         return info
+
+
+gymnasium.register(id="suave_des/PipelineInspection-v0", entry_point=f"{__name__}:PipelineInspection")
 
 
 def _numbers(action: Any, count: int) -> list[int]:

@@ -279,7 +279,7 @@ def firing_states(
     Returns:
         how many states, and of how many.
     """
-    from suave_des.campaign.single import run_recorded
+    from suave_des.api import run_mission
 
     loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
     bases = list(map(open_base, loaded))
@@ -292,7 +292,7 @@ def firing_states(
     fires: dict[Hashable, bool] = {}
     states = firing = 0
     for run in range(1, runs + 1):
-        for record in run_recorded(loaded[0], _MANAGER, run, seed)[1].knowledge:
+        for record in run_mission(loaded[0], _MANAGER, run, seed).knowledge:
             key = regions.key(record.state)
             if key not in fires:
                 fires[key] = bool(probes.holding(Situation(record.state)))

@@ -124,7 +124,7 @@ def missions_run(loaded: LoadedScenario, chosen: MissionSelection) -> list[Recor
     _check_number(len(managers))
     check_range("run", chosen.run, 1, RUNS_LIMIT)
     check_seed(chosen.seed)
-    check_inputs([loaded], managers, given=False)
+    check_inputs([loaded], managers, {})
     simulator = Simulator(loaded)
     return [recorded_result(loaded, simulator.run(each, chosen.run, chosen.seed, record=True)) for each in managers]
 

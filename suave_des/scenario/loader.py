@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypedDict, Unpack
 
 from suave_des.arguments import plain_arguments
+from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.resources import find
 from suave_des.scenario.models import REASONERS, Scenario
@@ -281,8 +282,16 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
 # Values by their key paths, such as signals.water_visibility.period_s.
 
 
+def full_path(data: Mapping[str, Any], path: str) -> str:
+    """Return a key path of a scenario in full: a signal needs no `signals.`, and visibility is water_visibility."""
+    first, *rest = path.split(".")
+    signal = WATER_VISIBILITY if first == "visibility" else first
+    return ".".join(("signals", signal, *rest)) if first not in data and signal in data.get("signals", ()) else path
+
+
 def _keys(data: dict[str, Any], path: str) -> list[str]:
     """The keys of a key path; names of managers may contain dots, and their settings may be missing."""
+    path = full_path(data, path)
     first, _, rest = path.partition(".")
     if first != "managers" or ":" not in rest:
         return path.split(".")

@@ -1,13 +1,9 @@
 """Runs missions of one scenario."""
 
-from collections.abc import Callable
-
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import ManagerLike
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.prepared import PreparedScenario
-
-OnTime = Callable[[float, float], None]
 
 
 class Simulator(PreparedScenario):
@@ -25,9 +21,7 @@ class Simulator(PreparedScenario):
         89.0
     """
 
-    def run(
-        self, manager: ManagerLike, run: int, seed: int, *, record: bool = False, on_time: OnTime | None = None
-    ) -> MissionResult:
+    def run(self, manager: ManagerLike, run: int, seed: int, *, record: bool = False) -> MissionResult:
         """Run one mission.
 
         Args:
@@ -35,15 +29,10 @@ class Simulator(PreparedScenario):
             run: number of the run in its campaign; together with the seed it decides everything that is random.
             seed: seed of the campaign.
             record: whether to keep events and trajectory.
-            on_time: called once per second of mission time with that time and the time limit, in s.
 
         Raises:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
         with Mission(self, manager, run=run, seed=seed, record=record) as mission:
-            limit_s = self.loaded.scenario.mission.time_limit_s
-            while on_time is not None and not mission.is_over and mission.now_s <= limit_s:
-                on_time(mission.now_s, limit_s)
-                mission.advance(mission.now_s + 1.0)
             return mission.result()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from suave_des import InputError, run_campaign, run_mission
-from suave_des.campaign.single import blocks, train
+from suave_des.campaign.training import blocks, train
 from tests.helpers import AWKWARD
 from tests.helpers.command import command_here, suave_des_command
 

@@ -17,7 +17,6 @@ import pytest
 import suave_des
 from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
-from suave_des.campaign.progress import ProgressTracker
 from suave_des.errors import InputError
 from suave_des.records import store as stores
 from suave_des.records.store import STORE_FILE, Outcome, Store, StoreError, has_campaign
@@ -79,14 +78,16 @@ def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(
     """What was read is still held by the exception then, and must not keep the database locked."""
     interrupted(scenario, tmp_path / "out")
 
-    def ctrl_c(tracker: ProgressTracker, finished: Iterator[Outcome]) -> None:
-        next(finished)
+    outcomes = Store.outcomes
+
+    def ctrl_c(store: Store) -> Iterator[Outcome]:
+        monkeypatch.undo()
+        yield next(outcomes(store))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(ProgressTracker, "add", ctrl_c)
+    monkeypatch.setattr(Store, "outcomes", ctrl_c)
     with pytest.raises(CampaignInterrupted):
         resume_campaign(tmp_path / "out")
-    monkeypatch.undo()
     resume_campaign(tmp_path / "out")
     assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed(scenario, 20, tmp_path / "whole")
 

@@ -43,7 +43,7 @@ def test_the_public_api_is_documented(site):
         ("missions", "suave_des.run_campaign"),
         ("managers", "suave_des.managing.base.ManagingSubsystem.adapt"),
         ("interfaces", "suave_des.Mission.advance"),
-        ("interfaces", "suave_des.interfaces.gym.PipelineInspection.step"),
+        ("interfaces", "suave_des.PipelineInspection.step"),
         ("knowledge", "suave_des.kb.KnowledgeBase.infer"),
     ):
         text = (site / "reference" / "api" / page / "index.html").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Single missions: with their whole record, and for training."""
+"""Training of managers: missions in one process, in the order of their runs, and a file at the end."""
 
 from __future__ import annotations
 
@@ -7,59 +7,14 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from suave_des.arguments import plain_arguments
-from suave_des.campaign.inputs import check_inputs, provenance
+from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.errors import InputError
-from suave_des.files import check_output_file, check_output_folder, make_output_folder, write_files
+from suave_des.files import check_output_file, write_files
 from suave_des.learned import Learned, read_file
-from suave_des.metrics.result import MissionMetrics, MissionResult
-from suave_des.records.knowledge import KNOWLEDGE_FILE
-from suave_des.records.mission_folder import mission_files
-from suave_des.registry import ManagerLike, name_of
-from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
+from suave_des.metrics.result import MissionMetrics
+from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.simulator import Simulator
-
-
-def run_recorded(
-    scenario: str | Path | LoadedScenario,
-    manager: ManagerLike = "metacontrol",
-    run: int = 1,
-    seed: int = 1,
-    out: str | Path | None = None,
-    *,
-    overwrite: bool = False,
-    command: Sequence[str] = (),
-    on_time: Callable[[float, float], None] | None = None,
-    **replacements: Unpack[Replacements],
-) -> tuple[LoadedScenario, MissionResult]:
-    """Run one mission, as suave_des.run_mission does, whose arguments it has; return its scenario, too.
-
-    Args:
-        scenario, manager, run, seed, out, replacements: see suave_des.run_mission.
-        overwrite, command: see CampaignSpec.
-        on_time: called once per second of mission time with that time and the time limit, in s.
-
-    Raises:
-        InputError, MissionError: as suave_des.run_mission.
-    """
-    folder = None if out is None else Path(out)
-    if folder is not None:
-        check_output_folder(folder, "mission", overwrite=overwrite)
-    check_range("run", run, 1, RUNS_LIMIT)
-    check_seed(seed)
-    name = name_of(manager)
-    loaded = load_scenario(scenario, **replacements)
-    given = any(replacements.get(each) for each in ("ontologies", "rules", "disabled_rules"))
-    inputs = check_inputs([loaded], [name], given=given)
-    result = Simulator(loaded).run(name, run, seed, record=True, on_time=on_time)
-    if folder is not None:
-        make_output_folder(folder)
-        files = mission_files(result, loaded.scenario, provenance(loaded, inputs, command))
-        write_files(folder, files, stale=(KNOWLEDGE_FILE,))
-    return loaded, result
-
-
-# Training: missions in one process, in the order of their runs, and a file at the end.
 
 TRAINING_SEED = 0
 """Not that of campaigns, so that a campaign has missions that training has not seen."""
@@ -102,7 +57,7 @@ def train(
     check_range("missions", missions, 1, RUNS_LIMIT)
     check_seed(seed)
     loaded = load_scenario(scenario, **replacements)
-    inputs = check_inputs([loaded], [manager], given=False)
+    inputs = check_inputs([loaded], [manager], {})
     before = None if start is None else read_file(Path(start))
     learned: dict[str, Any] = {} if before is None else dict(before.learned)
     simulator = Simulator(loaded, training={manager: learned})
