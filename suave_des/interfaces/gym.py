@@ -53,8 +53,6 @@ class Reward:
 class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     """SUAVE's mission; an episode is a mission, a step is one adaptation period.
 
-    Once it is imported, `gymnasium.make("suave_des/PipelineInspection-v0", ...)` makes one, too.
-
     Observation: a vector of float32, named by `observation_names`: the values that monitors measured last, -1 before
     the first; for each thruster 1 unless it was reported as failed; whether the pipeline is inspected; the distance
     inspected in m; mission time as a share of the limit; for each function with a choice, the index of the mode that
@@ -248,7 +246,6 @@ gymnasium.register(id="suave_des/PipelineInspection-v0", entry_point=f"{__name__
 
 
 def _numbers(action: Any, count: int) -> list[int]:
-    """An action as plain numbers."""
     rows = np.asarray(action)
     if rows.shape != (count,) or rows.dtype.kind not in "iu":
         raise InputError(f"action {action!r} is not {count} whole numbers", remedy="see action_space")

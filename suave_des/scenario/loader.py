@@ -270,11 +270,7 @@ def _named_files(scenario: Scenario) -> tuple[object, ...]:
 
 
 def value_at(loaded: LoadedScenario, path: str) -> Any:
-    """Return the value at a key path, as plain data.
-
-    Raises:
-        InputError: the path leads nowhere.
-    """
+    """Return the value at a key path, as plain data; it is an InputError if the path leads nowhere."""
     holder, key = holder_of(loaded.scenario.model_dump(mode="json"), path)
     return holder[key]
 
