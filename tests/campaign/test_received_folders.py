@@ -231,4 +231,3 @@ def test_the_time_out_follows_the_reasoner() -> None:
     assert default() == default(reasoner="pellet") == 120
     assert default(reasoner="owlready2") == 1800
     assert default(reasoner="owlready2", time_out_s=5) == 5
-    assert default(sweep={"knowledge.reasoner": ["pellet", "owlready2"]}) == 1800
