@@ -22,11 +22,11 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.files import decode, read_bytes
 from suave_des.findings import Finding, Level, has_level, ordered
 from suave_des.kb.space import (
+    Scale,
     component_statuses,
     has_effect,
     interchangeable_components,
     numbers_in,
-    ranges_between,
 )
 from suave_des.knowledge.checks import Subject, static_findings
 from suave_des.knowledge.checks.model import check_revision, rules_of_2023
@@ -153,14 +153,14 @@ def simple_states(base: Ontology, measured: Collection[str] | None = None) -> It
     Only attributes that have an effect and, if those are given, are measured count, and one component of those that
     are treated alike.
     """
-    ranges = ranges_between(numbers_in(base))
+    scale = Scale(numbers_in(base))
     reports = [{group[0]: status} for group in interchangeable_components(base) for status in component_statuses(base)]
     measurements = [
         {name: value}
         for name in base.quality_attributes
         if has_effect(base, name) and (measured is None or name in measured)
-        for one in ranges
-        if (value := one.value()) is not None
+        for place in range(1, len(scale))
+        if (value := scale.value(place)) is not None
     ]
     for reported, values in (({}, {}), *((each, {}) for each in reports), *(({}, each) for each in measurements)):
         for function in base.functions:

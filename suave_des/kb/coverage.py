@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import testable_order
-from suave_des.kb.policy import kinds_of_states
 from suave_des.kb.situations import Body, Probes, Situation
+from suave_des.kb.space import States
 from suave_des.knowledge.rules import COMPARISON_OF, COMPARISONS, Rule, write_atom
 from suave_des.knowledge.state import KnowledgeState
 
@@ -162,12 +162,10 @@ def _reached(
     """Which goals each state of the policy covers; one state for each different set of them."""
     asked = _Asked(knowledge, questions)
     found: dict[frozenset[Goal], KnowledgeState] = {}
-    number = 0
-    for kinds in kinds_of_states(knowledge.base, knowledge.settings, max_failed, knowledge.space):
-        number += len(kinds)
-        for case in kinds:
-            found.setdefault(asked.covered(Situation(case.state)), case.state)
-    return {state: goals for goals, state in found.items() if goals}, number
+    states = States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space)
+    for state in states:
+        found.setdefault(asked.covered(Situation(state)), state)
+    return {state: goals for goals, state in found.items() if goals}, len(states)
 
 
 def least_cover(candidates: Mapping[KnowledgeState, frozenset[Goal]]) -> Sequence[KnowledgeState]:

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+import pandas
 import rdflib
 from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
-from suave_des.kb.policy import Policy, PolicyCase, no_proof
-from suave_des.kb.situations import Difference, Probes, Situation, compare
-from suave_des.kb.space import ValueRange
+from suave_des.kb.policy import Policy, no_proof
+from suave_des.kb.situations import Probes, Situation
+from suave_des.kb.space import PolicySpace
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
@@ -26,8 +27,6 @@ from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario_knowledge import open_base
 
 if TYPE_CHECKING:
-    import pandas
-
     from suave_des.campaign.progress import OnProgress
     from suave_des.estimates import Estimate
 
@@ -94,107 +93,100 @@ def _structure(base: Ontology) -> Iterator[str]:
             yield text(subject, frozenset())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolicyDifference:
     """The difference between two policies.
 
     Attributes:
         compared: number of states that both have.
-        differing: kinds of states that they decide differently.
-        reported: kinds in which they decide alike, but infer different statuses.
-        ranges: of each attribute, ascending.
+        cells: rows of the policies' cases that are decided differently; what differs has `_a` and `_b` at its end.
+        reported: number of states in which they decide alike, but infer different statuses.
+        space: what the policies tell apart.
+        functions: that have an objective.
         computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
     """
 
     compared: int
-    differing: tuple[Difference[PolicyCase], ...] = field(repr=False)
-    reported: tuple[Difference[PolicyCase], ...] = field(repr=False)
-    ranges: dict[str, tuple[ValueRange, ...]] = field(repr=False)
+    cells: pandas.DataFrame = field(repr=False)
+    reported: int
+    space: PolicySpace
+    functions: tuple[str, ...]
     computing: tuple[str, ...]
 
     @property
     def states(self) -> int:
         """Number of states that are decided differently."""
-        return sum(each.situation.reports.combinations for each in self.differing)
-
-    @property
-    def states_reported(self) -> int:
-        """Number of states in which only statuses differ."""
-        return sum(each.situation.reports.combinations for each in self.reported)
+        return int(self.cells["states"].sum())
 
     def lines(self) -> Iterator[str]:
         """The difference as `kb diff` prints it."""
-        are = "is" if self.states == 1 else "are"
-        yield f"{self.states} of {self.compared} states {are} decided differently"
+        yield f"{self.states} of {self.compared} states {'is' if self.states == 1 else 'are'} decided differently"
         if self.reported:
-            yield f"{self.states_reported} more have other statuses, but the same decisions"
+            yield f"{self.reported} more have other statuses, but the same decisions"
         if self.computing:
             yield no_proof(self.computing)
-        groups: dict[str, list[PolicyCase]] = {}
-        for each in self.differing:
-            case = each.situation
-            for name in each.functions or case.asked:
-                heading = f"{name}, now {case.present(name)}: A {each.one.choice(name)}, B {each.other.choice(name)}"
-                groups.setdefault(heading, []).append(case)
-        for heading, cases in groups.items():
+        groups: dict[str, list[int]] = {}
+        for number, case in enumerate(self.cells.to_dict("records")):
+            for name in self.functions:
+                one, other = case[f"{name}_then_a"], case[f"{name}_then_b"]
+                if one != other:
+                    heading = f"{name}, now {case[f'{name}_now']}: A {one}, B {other}"
+                    groups.setdefault(heading, []).append(number)
+        for heading, numbers in groups.items():
             yield heading
-            for ranges, states in _joined(cases, list(self.ranges.values())):
-                names = [f"{name} " if len(self.ranges) > 1 else "" for name in self.ranges]
-                words = [f"{name}{text}" for name, text in zip(names, ranges, strict=True) if text]
-                yield f"  {'; '.join(words) or 'whatever is measured'}: {number_of(states, 'state')}"
-            yield f"  for instance {cases[0].state}"
+            cells = self.cells.iloc[numbers]
+            yield from (f"  {text}" for text in self._ranges(cells))
+            yield f"  for instance {cells['state'].iloc[0]}"
+
+    def _ranges(self, cells: pandas.DataFrame) -> Iterator[str]:
+        """The ranges of measured values, neighbours joined, and the number of states in each."""
+        names, scale = list(self.space.attributes), self.space.scale
+        for row in joined(cells, names).to_dict("records"):
+            spans = {name: (row[f"{name}_first"], row[f"{name}_last"]) for name in names}
+            words = [
+                f"{name} {scale.text(*span)}" if len(names) > 1 else scale.text(*span)
+                for name, span in spans.items()
+                if span != (0, len(scale) - 1)
+            ]
+            yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(row['states'], 'state')}"
 
 
 def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
     """Compare two policies over the same space."""
+    functions = tuple(name for name in one.functions if name in other.functions)
+    compared = [*(f"{name}_then" for name in functions), "statuses"]
+    both = one.cases.merge(other.cases[["state", *compared]], on="state", suffixes=("_a", "_b"))
 
-    def key(case: PolicyCase) -> Hashable:
-        return case.ranges, case.state, case.asked
+    def differs(name: str) -> Any:
+        return both[f"{name}_a"] != both[f"{name}_b"]
 
-    there = {key(case): case for case in other.cases}
-    common = [case for case in one.cases if key(case) in there]
-    found = list(compare(lambda case: case.decided, lambda case: there[key(case)].decided, common))
+    decided = pandas.concat(map(differs, compared[:-1]), axis=1).any(axis=1)
     return PolicyDifference(
-        compared=sum(case.reports.combinations for case in common),
-        differing=tuple(each for each in found if each.is_decided),
-        reported=tuple(each for each in found if not each.is_decided and each.one.statuses != each.other.statuses),
-        ranges=dict(one.ranges),
+        compared=int(both["states"].sum()),
+        cells=both[decided],
+        reported=int(both["states"][~decided & differs("statuses")].sum()),
+        space=one.space,
+        functions=functions,
         computing=tuple(sorted({*one.computing, *other.computing})),
     )
 
 
-def _joined(
-    cases: Sequence[PolicyCase], ranges: Sequence[Sequence[ValueRange]]
-) -> Iterator[tuple[tuple[str, ...], int]]:
-    """Join neighbouring ranges of measured values, with their number of states; a text is empty for any value."""
-    counts: dict[tuple[tuple[int, int], ...], int] = {}
-    for case in cases:
-        places = (known.index(one) for known, one in zip(ranges, case.ranges, strict=True))
-        at = tuple((place, place) for place in places)
-        counts[at] = counts.get(at, 0) + case.reports.combinations
-    for place in reversed(range(len(ranges))):
-        joined: dict[tuple[tuple[int, int], ...], int] = {}
-        ends: dict[Hashable, tuple[tuple[int, int], ...]] = {}
-        for at, states in sorted(counts.items(), key=lambda entry: entry[0][place]):
-            others = at[:place], at[place + 1 :]
-            last = ends.get(others)
-            if last is not None and last[place][1] + 1 == at[place][0]:
-                states += joined.pop(last)
-                at = (*at[:place], (last[place][0], at[place][1]), *at[place + 1 :])
-            joined[at] = states
-            ends[others] = at
-        counts = joined
-    for at, states in sorted(counts.items()):
-        yield tuple(_span(known, *span) for known, span in zip(ranges, at, strict=True)), states
+def joined(cells: pandas.DataFrame, attributes: Sequence[str]) -> pandas.DataFrame:
+    """Join neighbouring places of measured values.
 
-
-def _span(ranges: Sequence[ValueRange], first: int, last: int) -> str:
-    """Words for neighbouring ranges; "not measured" is the first of all, and joins no number."""
-    if (first, last) == (0, len(ranges) - 1):
-        return ""
-    if first == 0 and last > 0:
-        return f"{ranges[0]} or {_span(ranges, 1, last)}"
-    return str(ranges[first] if first == last else ranges[first].joined(ranges[last]))
+    Returns:
+        `states` of each range, with its `_first` and `_last` place of each attribute, ascending.
+    """
+    ends = [f"{name}_{end}" for name in attributes for end in ("first", "last")]
+    found: Any = cells[["states"]].assign(all=0, **{end: cells[end.rpartition("_")[0]] for end in ends})
+    for name in reversed(attributes):
+        first, last = f"{name}_first", f"{name}_last"
+        same = ["all", *(end for end in ends if end not in (first, last))]
+        found = found.groupby([*same, first, last], as_index=False)["states"].sum()
+        found["run"] = (found[first] != found.groupby(same)[last].shift() + 1).cumsum()
+        ranges = found.groupby([*same, "run"], as_index=False)
+        found = ranges.agg(**{first: (first, "min"), last: (last, "max"), "states": ("states", "sum")})
+    return pandas.DataFrame(found.groupby(["all", *ends], as_index=False)["states"].sum())
 
 
 class PairedDifference(NamedTuple):

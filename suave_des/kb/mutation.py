@@ -23,10 +23,9 @@ from typing import Final, NamedTuple, TypeVar
 from suave_des.errors import KnowledgeError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import instance, matched
-from suave_des.kb.policy import kinds_of_states
 from suave_des.kb.rule_tests import RuleTest, passes
 from suave_des.kb.situations import Body, Outcome, Probes, Situation, compare
-from suave_des.kb.space import PolicySpace
+from suave_des.kb.space import PolicySpace, States
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.planning import plan
@@ -497,10 +496,10 @@ def _compared(original: _Original, situations: Iterable[Situation], max_failed: 
     space = knowledge.space
     for changed in left:  # which may depend on more than the original does
         space = space.common(PolicySpace.of(changed.base, knowledge.settings))
-    number = 0
-    for kinds in kinds_of_states(knowledge.base, knowledge.settings, max_failed, space):
-        number += len(kinds)
-        for case in kinds if left else ():
-            look(Situation(case.state))
-    reason = f"nothing differs in {number} kinds of states"
-    return [*results, *(MutantResult(changed.mutant, EQUIVALENT, reason) for changed in left)], number
+    states = States.of(knowledge.base, knowledge.settings, max_failed, space)
+    for state in states:
+        if not left:
+            break
+        look(Situation(state))
+    reason = f"nothing differs in {len(states)} kinds of states"
+    return [*results, *(MutantResult(changed.mutant, EQUIVALENT, reason) for changed in left)], len(states)

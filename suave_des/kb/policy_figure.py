@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from suave_des.errors import InputError
-from suave_des.kb.policy import FLIP_FLOP, FunctionTable, Policy, TableRow, function_table
+from suave_des.kb.policy import FLIP_FLOP, FunctionTable, Policy, function_table
 from suave_des.kb.situations import INCONSISTENT
-from suave_des.kb.space import ValueRange
+from suave_des.kb.space import Scale
 from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, STAYS
 from suave_des.results.figures import check_picture, write_picture
 from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publication
@@ -23,14 +23,16 @@ _LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradictio
 _NARROW: Final = 0.3
 _ROW_IN: Final = 0.21
 _MOST_ROWS: Final = 60
+#: First and last place of a range of values.
+_Span = tuple[int, int]
 
 
 class _Panel(NamedTuple):
-    """A grid of cells: its title, what is along either side (None: all values), and the designs in use afterwards."""
+    """A grid of cells: its title, the ranges or labels along either side, and the designs in use afterwards."""
 
     title: str
-    across: Sequence[ValueRange | None]
-    down: Sequence[str | ValueRange | None]
+    across: Sequence[_Span | str]
+    down: Sequence[_Span | str]
     designs: Sequence[Sequence[str]]
 
 
@@ -44,25 +46,22 @@ def draw_policy(policy: Policy, path: Path) -> None:
     Raises:
         InputError: there are no or more attributes, or too many rows; or the file cannot be written.
     """
-    if len(policy.attributes) not in (1, 2):
+    attributes, scale = policy.space.attributes, policy.space.scale
+    if len(attributes) not in (1, 2):
         raise InputError(
-            f"the policy depends on {len(policy.attributes)} measured values", remedy="a picture needs one or two"
+            f"the policy depends on {len(attributes)} measured values", remedy="a picture needs one or two"
         )
     check_picture(path)
     tables = [table for table in (function_table(policy, name) for name in policy.functions) if _has_choice(table)]
     if not tables:
         raise InputError("no function has a choice to draw")
-    if sum(len(table.rows) for table in tables) > _MOST_ROWS:
+    if sum(len(table.outcomes) for table in tables) > _MOST_ROWS:
         raise InputError(f"there are more than {_MOST_ROWS} rows to draw", remedy="lower --max-failed, or use --csv")
     import matplotlib.pyplot as plt
     from matplotlib.patches import Patch
 
-    is_flat = len(policy.attributes) == 1
-    panels = (
-        [_rows_of(table) for table in tables]
-        if is_flat
-        else [_map_of(policy, table, row) for table in tables for row in table.rows]
-    )
+    is_flat = len(attributes) == 1
+    panels = [panel for table in tables for panel in ([_rows_of(table)] if is_flat else _maps_of(table, attributes))]
     columns = 1 if is_flat else 2 if len(panels) == 4 else min(3, len(panels))
     lines = -(-len(panels) // columns)
     heights = [len(panel.down) + 2.5 for panel in panels] if is_flat else [10.0] * lines
@@ -75,13 +74,13 @@ def draw_policy(policy: Policy, path: Path) -> None:
         for axes in grid.flat[len(panels) :]:
             axes.set_axis_off()
         for axes, panel in zip(grid.flat, panels, strict=False):
-            _draw(axes, panel, colours)
+            _draw(axes, panel, colours, scale)
             axes.set_title(panel.title, loc="left", fontsize=None if is_flat else 7.5)
-            axes.set_xlabel(_measured(policy.attributes[0]))
+            axes.set_xlabel(_measured(attributes[0]))
             if is_flat:
                 axes.invert_yaxis()
             else:
-                axes.set_ylabel(_measured(policy.attributes[1]))
+                axes.set_ylabel(_measured(attributes[1]))
         handles = [
             Patch(facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name))
             for name, colour in colours.items()
@@ -104,73 +103,77 @@ def _low_to_high(design: str) -> tuple[int, str]:
 
 
 def _has_choice(table: FunctionTable) -> bool:
-    return len({outcome for row in table.rows for outcome in row.outcomes} - {STAYS}) > 1
+    return len({outcome for row in table.outcomes for outcome in row.values()} - {STAYS}) > 1
 
 
 def _rows_of(table: FunctionTable) -> _Panel:
     """A function's table: measured values across, all else that has an effect down."""
     title = f"{table.function}: what is grounded now (left), and then (colour)"
-    columns = [column[0] if column else None for column in table.columns]
-    rows = sorted(table.rows, key=lambda row: _low_to_high(row.groundings.get(table.function, "")))
-    return _Panel(title, columns, [_label(table, row) for row in rows], [_designs(table, row) for row in rows])
+    rows = sorted(range(len(table.outcomes)), key=lambda row: _low_to_high(table.groundings[row][table.function]))
+    (across,) = table.spans.values() or ([""],)
+    designs = [list(_designs(table, row).values()) for row in rows]
+    return _Panel(title, across, [_label(table, row) for row in rows], designs)
 
 
-def _map_of(policy: Policy, table: FunctionTable, row: TableRow) -> _Panel:
-    """One row of a function's table: one measured value across, the other up."""
-    columns = [dict(zip(table.attributes, column, strict=True)) for column in table.columns]
-    x, y = (list(dict.fromkeys(column.get(name) for column in columns)) for name in policy.attributes)
-    after = dict(zip((tuple(map(each.get, policy.attributes)) for each in columns), _designs(table, row), strict=True))
-    return _Panel(f"{table.function}, now\n{_label(table, row)}", x, y, [[after[a, b] for a in x] for b in y])
+def _maps_of(table: FunctionTable, attributes: Sequence[str]) -> list[_Panel]:
+    """Each row of a function's table as a map: one measured value across, the other up."""
+    x, y = (table.spans.get(name, [""]) for name in attributes)
+    panels = []
+    for row in range(len(table.outcomes)):
+        designs = _designs(table, row)
+        points = [[(a, b) for a in range(len(x))] for b in range(len(y))]
+        has = [name in table.spans for name in attributes]
+        cells = [[designs[tuple(itertools.compress(point, has))] for point in line] for line in points]
+        panels.append(_Panel(f"{table.function}, now\n{_label(table, row)}", x, y, cells))
+    return panels
 
 
-def _draw(axes: Any, panel: _Panel, colours: Mapping[str, str]) -> None:
-    from matplotlib.patches import Rectangle
+def _draw(axes: Any, panel: _Panel, colours: dict[str, str], scale: Scale) -> None:
+    import numpy as np
+    from matplotlib.colors import ListedColormap
 
-    lefts, bottoms = _edges(panel.across), _edges(panel.down)
-    for row, bottom, top in zip(panel.designs, bottoms, bottoms[1:], strict=False):
-        for design, left, right in zip(row, lefts, lefts[1:], strict=False):
-            colour, hatch = colours[design.partition(" (")[0]], "////" if FLIP_FLOP in design else None
-            axes.add_patch(
-                Rectangle(
-                    (left, bottom),
-                    right - left,
-                    top - bottom,
-                    facecolor=colour,
-                    edgecolor="white",
-                    linewidth=0.5,
-                    hatch=hatch,
-                )
-            )
-    axes.set(xlim=(lefts[0], lefts[-1]), ylim=(bottoms[0], bottoms[-1]))
-    axes.set_xticks(*_ticks(panel.across, lefts))
-    axes.set_yticks(*_ticks(panel.down, bottoms))
+    x, y = _edges(panel.across), _edges(panel.down)
+    names = list(colours)
+    numbers = np.array([[names.index(design.partition(" (")[0]) for design in row] for row in panel.designs])
+    axes.pcolormesh(
+        x, y, numbers, cmap=ListedColormap(list(colours.values())), vmin=-0.5, vmax=len(names) - 0.5,
+        edgecolors="white", linewidth=0.5,
+    )  # fmt: skip
+    flips = np.array([[FLIP_FLOP in design for design in row] for row in panel.designs])
+    if flips.any():
+        axes.pcolor(x, y, np.ma.masked_where(~flips, numbers), hatch="////", alpha=0.0)
+    axes.set_xticks(*_ticks(panel.across, x, scale))
+    axes.set_yticks(*_ticks(panel.down, y, scale))
     axes.grid(False)
     axes.tick_params(length=0)
 
 
-def _edges(cells: Sequence[str | ValueRange | None]) -> list[float]:
+def _is_number(cell: _Span | str) -> bool:
+    return not isinstance(cell, str) and cell[0] == cell[1] > 0 and cell[0] % 2 == 0
+
+
+def _edges(cells: Sequence[_Span | str]) -> list[float]:
     """Where cells begin and the last one ends: a single value is narrow, ranges are as wide as one another."""
-    edges = [0.0]
-    for cell in cells:
-        edges.append(edges[-1] + (_NARROW if isinstance(cell, ValueRange) and cell.is_number else 1.0))
-    return edges
+    return [0.0, *itertools.accumulate(_NARROW if _is_number(cell) else 1.0 for cell in cells)]
 
 
-def _ticks(cells: Sequence[str | ValueRange | None], edges: Sequence[float]) -> tuple[list[float], list[str]]:
+def _ticks(cells: Sequence[_Span | str], edges: Sequence[float], scale: Scale) -> tuple[list[float], list[str]]:
     """Places and texts of the ends of ranges, and of what is no range."""
     found: dict[float, str] = {}
     for cell, begin, end in zip(cells, edges, edges[1:], strict=False):
-        if not isinstance(cell, ValueRange) or cell.is_missing or cell.is_number:
-            found[(begin + end) / 2] = "" if cell is None else str(cell).replace("not measured", "not\nmeasured")
-        elif cell.low is not None and f"{cell.low:f}" not in found.values():
-            found[begin] = f"{cell.low:f}"
+        if isinstance(cell, str) or _is_number(cell) or cell == (0, 0):
+            text = cell if isinstance(cell, str) else scale.text(*cell)
+            found[(begin + end) / 2] = text.replace("not measured", "not\nmeasured")
+        elif (low := scale.low(cell[0])) is not None and f"{low:f}" not in found.values():
+            found[begin] = f"{low:f}"
     return list(found), list(found.values())
 
 
-def _designs(table: FunctionTable, row: TableRow) -> list[str]:
+def _designs(table: FunctionTable, row: int) -> dict[tuple[int, ...], str]:
     """The design in use afterwards, or why there is none, for each column."""
-    now = row.groundings.get(table.function, NO_GROUNDING)
-    return [text.replace(STAYS, now, 1) if text.startswith(STAYS) else text for text in row.outcomes]
+    now = table.groundings[row][table.function]
+    outcomes = table.outcomes[row].items()
+    return {at: text.replace(STAYS, now, 1) if text.startswith(STAYS) else text for at, text in outcomes}
 
 
 def _colours(names: set[str]) -> dict[str, str]:
@@ -178,13 +181,12 @@ def _colours(names: set[str]) -> dict[str, str]:
     from matplotlib.colors import to_hex
 
     fixed = {**MODE_COLOURS, **_FIXED}
-    more = (to_hex(colormaps["Set2"](number)) for number in range(8))
-    others = itertools.cycle(dict.fromkeys((*OTHER_MODES, *more)))
+    others = itertools.cycle(dict.fromkeys((*OTHER_MODES, *map(to_hex, map(colormaps["Set2"], range(8))))))
     return {name: fixed[name] if name in fixed else next(others) for name in sorted(names, key=_low_to_high)}
 
 
-def _label(table: FunctionTable, row: TableRow) -> str:
-    own = dict(row.groundings)
-    parts = [own.pop(table.function, ""), *(f"{function}: {design}" for function, design in own.items())]
-    parts.append(row.components if len(row.components) <= 44 else row.components[:41] + "...")
+def _label(table: FunctionTable, row: int) -> str:
+    own, components = dict(table.groundings[row]), table.components[row]
+    parts = [own.pop(table.function), *(f"{function}: {design}" for function, design in own.items())]
+    parts.append(components if len(components) <= 44 else components[:41] + "...")
     return "; ".join(filter(None, parts))

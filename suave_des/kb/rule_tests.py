@@ -31,7 +31,7 @@ from suave_des.kb.explain import verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.replay import mission_scenario
 from suave_des.kb.situations import Decide, Outcome, Situation
-from suave_des.kb.space import ValueRange, measurements_in, parse_region
+from suave_des.kb.space import Region, measurements_in, parse_region
 from suave_des.kb.states import (
     NEW_INDIVIDUAL,
     FactReader,
@@ -226,7 +226,7 @@ def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[t
         builder.add_state(recorded_state(recorded_states(folder / given.mission, given.run), given.at_s))
     elif given.mission is not None or given.at_s is not None or given.run is not None:
         raise InputError("mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7")
-    regions: dict[str, ValueRange] = {}
+    regions: dict[str, Region] = {}
     for kind, name, value, _ in given.parts():
         region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
         builder.add(kind, name, 0 if region else value)

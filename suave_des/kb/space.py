@@ -1,6 +1,6 @@
 """The states that a policy tells apart, and what of a state its decision can depend on.
 
-States are ranges of measured values, reports of components and groundings. Only the number of components with a status
+States are places of measured values, reports of components and groundings. Only the number of components with a status
 counts where ontologies and rules treat components alike. Quality attributes are independent of one another where every
 comparison in a rule is between values of one of them: then a measured value counts by its place among the numbers of
 its own attribute, and not at all for functions whose designs expect no value of it. Where the schema or a rule has more
@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections import Counter
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from math import comb
-from typing import Final
+from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, shown
-from suave_des.kb.states import ManagingSettings
+from suave_des.kb.states import LASTING, ManagingSettings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
     C_STATUS,
@@ -38,109 +39,77 @@ from suave_des.knowledge.rdf import (
 )
 from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, texts_of
-from suave_des.knowledge.state import exact
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState, exact
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 
+#: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would take ten minutes.
+LARGEST: Final = 400_000
 _NUMBER: Final = r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
 _REGION: Final = re.compile(rf"(?:{_NUMBER}\s*(<=?)\s*)?\.(?:\s*(<=?)\s*{_NUMBER})?")
 _ABOVE: Final = re.compile(rf">(=?)\s*{_NUMBER}")
 _MISSING: Final = "not measured"
 
 
-@dataclass(frozen=True, slots=True)
-class ValueRange:
-    """A range of measured values, or no measurement.
+@dataclass(frozen=True)
+class Scale:
+    """The places that a measured value can have among numbers: 0 is no measurement, then ranges and numbers take turns.
 
     Attributes:
-        low, high: its ends; None: it has none there.
-        low_closed, high_closed: whether the end belongs to it.
-        is_missing: whether there is no measurement.
+        numbers: ascending.
 
     Example:
-        >>> str(ValueRange(Decimal("1.25"), Decimal("2.25"), low_closed=True))
+        >>> Scale((Decimal("1.25"), Decimal("2.25"))).text(2, 3)
         '1.25 <= . < 2.25'
     """
 
-    low: Decimal | None = None
-    high: Decimal | None = None
-    low_closed: bool = False
-    high_closed: bool = False
-    is_missing: bool = False
+    numbers: tuple[Decimal, ...]
 
-    def __str__(self) -> str:
-        """In words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . < 2.25"."""
-        if self.is_missing:
-            return _MISSING
-        if self.is_number:
-            return str(self.low)
-        below = "" if self.high is None else f"{'<=' if self.high_closed else '<'} {self.high}"
-        if self.low is None:
-            return below or "any"
-        if self.high is None:
-            return f"{'>=' if self.low_closed else '>'} {self.low}"
-        return f"{self.low} {'<=' if self.low_closed else '<'} . {below}"
+    def __len__(self) -> int:
+        """Number of places."""
+        return 2 * len(self.numbers) + 2
 
-    @property
-    def is_number(self) -> bool:
-        """Whether it is one number."""
-        return self.low is not None and self.low == self.high
+    def low(self, place: int) -> Decimal | None:
+        """The lower end of a place; None: it has none."""
+        return self.numbers[place // 2 - 1] if place > 1 else None
 
-    def value(self, step: int = 0, steps: int = 1) -> Decimal | None:
-        """A value in it, above 0 if there is one; in an open range the `step`-th of `steps` ascending ones."""
-        if self.is_missing or self.is_number:
-            return self.low
-        low = self.low
+    def _high(self, place: int) -> Decimal | None:
+        return self.numbers[(place - 1) // 2] if 0 < place < len(self) - 1 else None
+
+    def text(self, first: int, last: int | None = None) -> str:
+        """Neighbouring places in words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . < 2.25"."""
+        last = first if last is None else last
+        if first == 0:
+            return _MISSING if last == 0 else f"{_MISSING} or {self.text(1, last)}"
+        low, high = self.low(first), self._high(last)
+        if low is not None and low == high:
+            return str(low)
+        below = "" if high is None else f"{'<' if last % 2 else '<='} {high}"
         if low is None:
-            low = Decimal(0) if self.high is None or self.high > 0 else self.high - 1
-        high = self.high if self.high is not None else low + 1
-        return exact(low + (high - low) * (step + 1) / Decimal(2 ** steps.bit_length()))
+            return below or "any"
+        return f"{low} {'<' if first % 2 else '<='} . {below}" if below else f"{'>' if first % 2 else '>='} {low}"
 
-    def holds(self, part: ValueRange) -> bool:
-        """Whether all of a range between two neighbouring numbers is in it."""
-        if part.is_missing or self.is_missing:
-            return part.is_missing and self.is_missing
-        value = part.value()
-        assert value is not None
-        above = self.low is None or value > self.low or (self.low_closed and value == self.low)
-        return above and (self.high is None or value < self.high or (self.high_closed and value == self.high))
+    def value(self, place: int, rank: int = 0, ranks: int = 1) -> Decimal | None:
+        """A value there, above 0 if there is one; in a range the `rank`-th of `ranks` ascending ones."""
+        low, high = self.low(place), self._high(place)
+        if place % 2 == 0:
+            return low
+        if low is None:
+            low = Decimal(0) if high is None or high > 0 else high - 1
+        high = low + 1 if high is None else high
+        return exact(low + (high - low) * (rank + 1) / Decimal(2 ** ranks.bit_length()))
 
-    def joined(self, following: ValueRange) -> ValueRange:
-        """The range of this one and the one that follows it."""
-        return ValueRange(self.low, following.high, self.low_closed, following.high_closed)
+    def values(self, places: Sequence[int]) -> Iterator[tuple[Decimal | None, ...]]:
+        """Values of several attributes at given places, for every order that the values can have.
 
-
-def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
-    """Every number in the ontologies and enabled rules, ascending."""
-    return tuple(map(exact, regions_of(base).thresholds))
-
-
-def ranges_between(numbers: Sequence[Decimal]) -> tuple[ValueRange, ...]:
-    """No measurement, then each open range and each number, ascending."""
-    ends: list[Decimal | None] = [None, *numbers, None]
-    found = [ValueRange(is_missing=True)]
-    for low, high in itertools.pairwise(ends):
-        found.append(ValueRange(low, high))
-        if high is not None:
-            found.append(ValueRange(high, high, True, True))
-    return tuple(found)
-
-
-def values_in(ranges: Sequence[ValueRange]) -> Iterator[tuple[Decimal | None, ...]]:
-    """Values of several attributes, one in each given range, for every order that the values can have.
-
-    Values in different ranges are ordered by these; those in the same open range can be in any order, and equal.
-    """
-    places: dict[ValueRange, list[int]] = {}
-    for place, one in enumerate(ranges):
-        if not one.is_missing and not one.is_number:
-            places.setdefault(one, []).append(place)
-    shared = [(one, group) for one, group in places.items() if len(group) > 1]
-    for ranks in itertools.product(*(_weak_orders(len(group)) for _, group in shared)):
-        values = [one.value() for one in ranges]
-        for (one, group), order in zip(shared, ranks, strict=True):
-            for place, rank in zip(group, order, strict=True):
-                values[place] = one.value(rank, len(group))
-        yield tuple(values)
+        Values at different places are ordered by these; those in the same range can be in any order, and equal.
+        """
+        groups = [[n for n, each in enumerate(places) if each == place] for place in dict.fromkeys(places) if place % 2]
+        for ranks in itertools.product(*(_weak_orders(len(group)) for group in groups)):
+            values = list(map(self.value, places))
+            for group, order in zip(groups, ranks, strict=True):
+                for number, rank in zip(group, order, strict=True):
+                    values[number] = self.value(places[number], rank, len(group))
+            yield tuple(values)
 
 
 def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
@@ -149,19 +118,41 @@ def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
     return (each for each in ranks if set(each) == set(range(max(each) + 1)))
 
 
-def parse_region(text: str) -> ValueRange | None:
+def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
+    """Every number in the ontologies and enabled rules, ascending."""
+    return tuple(map(exact, regions_of(base).thresholds))
+
+
+class Region(NamedTuple):
+    """Measured values that a test is about: between two ends (None: there is none), or no measurement."""
+
+    low: Decimal | None = None
+    high: Decimal | None = None
+    low_closed: bool = False
+    high_closed: bool = False
+    is_missing: bool = False
+
+    def holds(self, value: Decimal | None) -> bool:
+        """Whether a measured value, None for none, is in it."""
+        if value is None or self.is_missing:
+            return value is None and self.is_missing
+        above = self.low is None or value > self.low or (self.low_closed and value == self.low)
+        return above and (self.high is None or value < self.high or (self.high_closed and value == self.high))
+
+
+def parse_region(text: str) -> Region | None:
     """Read a region as `kb policy` writes it; None for what is none, such as a number.
 
     Example:
-        >>> str(parse_region("1.25 <= . < 2.25"))
-        '1.25 <= . < 2.25'
+        >>> parse_region("1.25 <= . < 2.25").holds(Decimal(2))
+        True
 
     Raises:
         InputError: there is no number in it.
     """
     text = text.strip()
     if text == _MISSING:
-        return ValueRange(is_missing=True)
+        return Region(is_missing=True)
     if not {"<", ">"} & {*text}:
         return None
     found = _REGION.fullmatch(_ABOVE.sub(r"\2 <\1 .", f". {text}" if text.startswith("<") else text))
@@ -169,15 +160,13 @@ def parse_region(text: str) -> ValueRange | None:
         remedy = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
         raise InputError(f"{shown(text)} is not a region", remedy=remedy)
     low, high = (exact(number) if number else None for number in (found[1], found[4]))
-    region = ValueRange(low, high, found[2] == "<=", found[3] == "<=")
-    if low is not None and high is not None and (low > high or (low == high and not region.holds(region))):
+    region = Region(low, high, found[2] == "<=", found[3] == "<=")
+    if low is not None and high is not None and (low > high or (low == high and not region.holds(low))):
         raise InputError(f"no number is in the region {shown(text)}", remedy="write the smaller number first")
     return region
 
 
-def measurements_in(
-    base: Ontology, regions: Mapping[str, ValueRange]
-) -> Iterator[tuple[dict[str, Decimal | None], str]]:
+def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[tuple[dict[str, Decimal | None], str]]:
     """Measured values, one for each kind that rules that only compare can tell apart, with words for them.
 
     Args:
@@ -185,12 +174,12 @@ def measurements_in(
         regions: by quality attribute type.
     """
     ends = {end for region in regions.values() for end in (region.low, region.high) if end is not None}
-    between = ranges_between(sorted({*numbers_in(base), *ends}))
-    names = tuple(regions)
-    for ranges in itertools.product(*([each for each in between if regions[name].holds(each)] for name in names)):
-        words = ", ".join(f"{name} {each}" for name, each in zip(names, ranges, strict=True))
-        for values in values_in(ranges):
-            yield dict(zip(names, values, strict=True)), words
+    scale = Scale(tuple(sorted({*numbers_in(base), *ends})))
+    inside = ([at for at in range(len(scale)) if region.holds(scale.value(at))] for region in regions.values())
+    for places in itertools.product(*inside):
+        words = ", ".join(f"{name} {scale.text(at)}" for name, at in zip(regions, places, strict=True))
+        for values in scale.values(places):
+            yield dict(zip(regions, values, strict=True)), words
 
 
 #: One side of a comparison: IRIs of quality attributes whose values it can be, and numbers.
@@ -309,8 +298,7 @@ def component_statuses(base: Ontology) -> tuple[str, ...]:
     return tuple(sorted({*asked, FAILED, RECOVERED}))
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentReports:
+class Reports(NamedTuple):
     """What components report; stands for all reports that differ by an exchange of interchangeable components.
 
     Attributes:
@@ -322,9 +310,7 @@ class ComponentReports:
     combinations: int
 
 
-def component_reports(
-    groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int
-) -> Iterator[ComponentReports]:
+def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int) -> Iterator[Reports]:
     """All that components can report, up to an exchange of interchangeable ones, fewest reports first.
 
     Args:
@@ -332,24 +318,26 @@ def component_reports(
         statuses: that a component can report.
         most: at most so many components report at all.
     """
-    counts = [list(_counts(len(statuses), min(most, len(group)))) for group in groups]
-    for chosen in itertools.product(*counts):
-        if sum(map(sum, chosen)) > most:
+    ways = (
+        [
+            each
+            for count in range(min(most, len(group)) + 1)
+            for each in itertools.combinations_with_replacement(statuses, count)
+        ]
+        for group in groups
+    )
+    for chosen in itertools.product(*ways):
+        if sum(map(len, chosen)) > most:
             continue
-        components: list[tuple[str, str]] = []
         combinations = 1
-        for group, numbers in zip(groups, chosen, strict=True):
-            left = list(group)
-            for status, number in zip(statuses, numbers, strict=True):
-                combinations *= comb(len(left), number)
-                components += [(left.pop(0), status) for _ in range(number)]
-        yield ComponentReports(tuple(sorted(components)), combinations)
-
-
-def _counts(kinds: int, most: int) -> list[tuple[int, ...]]:
-    """How many components report each status."""
-    found = [numbers for numbers in itertools.product(range(most + 1), repeat=kinds) if sum(numbers) <= most]
-    return sorted(found, key=lambda numbers: (sum(numbers), [-number for number in numbers]))
+        components: list[tuple[str, str]] = []
+        for group, named in zip(groups, chosen, strict=True):
+            components += zip(group, named, strict=False)
+            left = len(group)
+            for number in Counter(named).values():
+                combinations *= comb(left, number)
+                left -= number
+        yield Reports(tuple(sorted(components)), combinations)
 
 
 @dataclass(frozen=True)
@@ -376,6 +364,11 @@ class PolicySpace:
         attributes = tuple(name for name in measured_attributes(base, settings) if has_effect(base, name))
         functions = tuple(name for name in base.functions if base.designs(name))
         return cls(attributes, numbers_in(base), interchangeable_components(base), component_statuses(base), functions)
+
+    @property
+    def scale(self) -> Scale:
+        """The places of measured values."""
+        return Scale(self.numbers)
 
     def common(self, other: PolicySpace) -> PolicySpace:
         """What has an effect in either; components are alike only if they are so in both that have them."""
@@ -509,3 +502,70 @@ def _is_plain(base: Ontology) -> bool:
             atom.predicate in _OF_VALUES or (atom.kind == "object" and atom.predicate in functional) for atom in heads
         )
     )
+
+
+class Task(NamedTuple):
+    """Functions asked for together, as the mission's tasks do, and one way to ground them."""
+
+    asked: tuple[str, ...]
+    objectives: tuple[ObjectiveState, ...]
+    groundings: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class States:
+    """Every kind of state that a space tells apart: any measured values, with any reports and any task.
+
+    Attributes:
+        measured: place of each attribute's value, and (attribute, value) of those that are measured.
+        reports: what components report.
+        tasks: objectives and groundings.
+    """
+
+    measured: tuple[tuple[tuple[int, ...], tuple[tuple[str, Decimal], ...]], ...]
+    reports: tuple[Reports, ...]
+    tasks: tuple[Task, ...]
+
+    @classmethod
+    def of(cls, base: Ontology, settings: ManagingSettings, max_failed: int, space: PolicySpace) -> States:
+        """Find the kinds of states of a knowledge base in which at most `max_failed` components report a status.
+
+        Raises:
+            InputError: there would be too many states.
+        """
+        reports = tuple(component_reports(space.alike, space.statuses, max_failed))
+        tasks = tuple(_tasks(base, settings, space))
+        scale, attributes = space.scale, space.attributes
+        total = len(scale) ** len(attributes) * len(reports) * len(tasks)
+        if total <= LARGEST:  # else so many already that it does not matter how many values a range has
+            measured = tuple(
+                (places, tuple((name, each) for name, each in zip(attributes, values, strict=True) if each is not None))
+                for places in itertools.product(range(len(scale)), repeat=len(attributes))
+                for values in scale.values(places)
+            )
+            total = len(measured) * len(reports) * len(tasks)
+        if total > LARGEST:
+            raise InputError(
+                f"the policy has {total:,} kinds of states, which is too many",
+                remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes",
+            )
+        return cls(measured, reports, tasks)
+
+    def __len__(self) -> int:
+        """Number of kinds."""
+        return len(self.measured) * len(self.reports) * len(self.tasks)
+
+    def __iter__(self) -> Iterator[KnowledgeState]:
+        """One state of each kind; those that differ only in their task follow one another."""
+        for (_, values), reports, task in itertools.product(self.measured, self.reports, self.tasks):
+            yield KnowledgeState(task.objectives, task.groundings, reports.components, values)
+
+
+def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> Iterator[Task]:
+    solvable = [name for name in base.functions if base.designs(name) or name in space.functions]
+    lasting = [name for name in LASTING if name in solvable]
+    for asked in [(*lasting, name) for name in solvable if name not in lasting] or [tuple(lasting)]:
+        for designs in itertools.product(*((None, *base.designs(name)) for name in asked)):
+            groundings = {name: design for name, design in zip(asked, designs, strict=True) if design is not None}
+            state = settings.state(dict.fromkeys(asked), groundings)
+            yield Task(asked, state.objectives, state.groundings)

@@ -23,10 +23,9 @@ from suave_des.kb.mutation import (
     mutate,
     sample,
 )
-from suave_des.kb.policy import kinds_of_states
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
 from suave_des.kb.situations import Situation, compare
-from suave_des.kb.space import PolicySpace, interchangeable_components
+from suave_des.kb.space import PolicySpace, States, interchangeable_components
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import QA_OPERATOR
 from tests.helpers.knowledge_states import FEWER_NUMBERS
@@ -178,10 +177,10 @@ def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_ra
     assert set(map(str, equivalent)) == EQUIVALENT_ONES
     draw = random.Random(7)
     space = PolicySpace.of(knowledge.base, knowledge.settings)
-    cases = [case for kinds in kinds_of_states(knowledge.base, knowledge.settings, 1, space) for case in kinds]
+    every = list(States.of(knowledge.base, knowledge.settings, 1, space))
     states = [
-        replace(case.state, measurements=(("water_visibility", Decimal(str(round(draw.uniform(0.5, 4.5), 3)))),))
-        for case in draw.sample(cases, 50)
+        replace(state, measurements=(("water_visibility", Decimal(str(round(draw.uniform(0.5, 4.5), 3)))),))
+        for state in draw.sample(every, 50)
     ]
     for each in equivalent:
         changed = knowledge.changed(each.applied(knowledge.base))

@@ -11,31 +11,13 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.kb import KnowledgeBase
-from suave_des.kb.policy import FLIP_FLOP, Policy, PolicyCase, _with_flip_flops, function_table, make_policy
+from suave_des.kb.policy import Policy, function_table, make_policy
 from suave_des.kb.policy_figure import draw_policy
-from suave_des.kb.situations import Outcome, Situation
-from suave_des.kb.space import (
-    ComponentReports,
-    Dependence,
-    PolicySpace,
-    ValueRange,
-    component_reports,
-    interchangeable_components,
-    ranges_between,
-    values_in,
-)
+from suave_des.kb.situations import Situation
+from suave_des.kb.space import Dependence, PolicySpace, Scale, component_reports, interchangeable_components
 from suave_des.kb.states import ManagingSettings
-from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan, Reasoning, exact
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
-
-
-def holds(one, value):
-    """Whether a measured value is in a range."""
-    if value is None or one.is_missing:
-        return one.is_missing and value is None
-    above = one.low is None or value > one.low or (one.low_closed and value == one.low)
-    return above and (one.high is None or value < one.high or (one.high_closed and value == one.high))
 
 
 def rules_file(tmp_path, text, name="more.swrl"):
@@ -58,24 +40,27 @@ def policy(knowledge):
     return knowledge.policy(max_failed=1)
 
 
-class TestRanges:
-    def test_cover_every_number_once(self):
-        ranges = ranges_between([Decimal(1), Decimal("2.5")])
-        for value in (None, *map(Decimal, ("-3", "0.99", "1", "1.01", "2.4", "2.5", "2.51", "9"))):
-            assert sum(holds(one, value) for one in ranges) == 1
-        assert list(map(str, ranges)) == ["not measured", "< 1", "1", "1 < . < 2.5", "2.5", "> 2.5"]
+class TestScale:
+    def test_places_follow_one_another_and_have_a_value_of_their_own(self):
+        scale = Scale((Decimal(1), Decimal("2.5")))
+        assert list(map(scale.text, range(len(scale)))) == ["not measured", "< 1", "1", "1 < . < 2.5", "2.5", "> 2.5"]
+        values = list(map(scale.value, range(len(scale))))
+        assert values[0] is None
+        assert Decimal(0) < values[1] < values[2] == 1 < values[3] < values[4] == Decimal("2.5") < values[5]
+        assert scale.value(1) < scale.value(1, 2, 3) < 1 and scale.value(5, 0, 3) > Decimal("2.5")
 
-    def test_have_a_value_of_their_own(self):
-        for one in ranges_between([Decimal(1), Decimal("2.5")]):
-            assert holds(one, one.value())
+    def test_neighbours_are_told_as_one_range(self):
+        scale = Scale((Decimal(1), Decimal("2.5")))
+        spans = {(1, 2): "<= 1", (2, 3): "1 <= . < 2.5", (3, 4): "1 < . <= 2.5", (4, 5): ">= 2.5", (1, 5): "any"}
+        assert {span: scale.text(*span) for span in spans} == spans
+        assert scale.text(0, 2) == "not measured or <= 1"
 
     def test_two_values_in_one_open_range_come_in_every_order(self):
-        between = ValueRange(Decimal(1), Decimal(2))
-        orders = {(one > other) - (one < other) for one, other in values_in([between, between])}
-        assert orders == {-1, 0, 1}
-        assert all(holds(between, value) for values in values_in([between, between]) for value in values)
-        assert list(values_in([ValueRange(is_missing=True)] * 2)) == [(None, None)]
-        assert len(list(values_in([ValueRange(Decimal(1), Decimal(1), True, True)] * 2))) == 1
+        scale = Scale((Decimal(1), Decimal(2)))
+        assert {(one > other) - (one < other) for one, other in scale.values([3, 3])} == {-1, 0, 1}
+        assert all(1 < value < 2 for values in scale.values([3, 3]) for value in values)
+        assert list(scale.values([0, 0])) == [(None, None)]
+        assert list(scale.values([2, 2])) == [(1, 1)]
 
 
 class TestInterchangeableComponents:
@@ -102,57 +87,45 @@ class TestPolicy:
 
     def test_any_state_is_decided_as_its_case_says(self, knowledge, policy):
         chance = random.Random(5)
-        for case in chance.sample(policy.cases, 60):
-            (one,) = case.ranges
-            value = None if one.is_missing else one.value(chance.randrange(7), 7)
-            assert holds(one, value)
+        for case in policy.cases.sample(60, random_state=5).to_dict("records"):
+            value = policy.space.scale.value(case["water_visibility"], chance.randrange(7), 7)
             others = [f"c_thruster_{n}" for n in range(1, 7)]
             chance.shuffle(others)
+            statuses = [status for _, status in case["state"].components]
             state = knowledge.state(
-                objectives=case.asked,
-                groundings=dict(case.state.groundings),
-                components={name: status for name, (_, status) in zip(others, case.reports.components, strict=False)},
-                measurements={} if value is None else {"water_visibility": exact(value)},
+                objectives=[each.function for each in case["state"].objectives],
+                groundings=dict(case["state"].groundings),
+                components=dict(zip(others, statuses, strict=False)),
+                measurements={} if value is None else {"water_visibility": value},
             )
             reasoning = knowledge.infer(state)
-            assert reasoning.changes == case.decided.changes
-            assert tuple(sorted(reasoning.statuses)) == case.decided.statuses
+            for function in policy.functions:
+                then = case[f"{function}_then"]
+                assert then == ("" if not case[f"{function}_now"] else reasoning.changes.get(function, "stays"))
+            assert "; ".join(sorted(reasoning.statuses)) == case["statuses"]
 
     def test_the_search_table_has_the_deployed_thresholds(self, policy):
-        table = function_table(policy, SEARCH)
-        assert table.attributes == ("water_visibility",)
-        assert [str(column) for (column,) in table.columns] == [
-            "not measured",
-            "< 1.25",
-            "1.25 <= . < 2.25",
-            "2.25 <= . < 3.25",
-            ">= 3.25",
-        ]
-        from_high = next(row for row in table.rows if dict(row.groundings) == {SEARCH: "fd_spiral_high"})
-        assert from_high.outcomes == ("stays", "none left", "fd_spiral_low", "fd_spiral_medium", "stays")
+        table = function_table(policy, SEARCH).table(policy.space)
+        ranges = ["not measured", "< 1.25", "1.25 <= . < 2.25", "2.25 <= . < 3.25", ">= 3.25"]
+        assert table.headings == ["now", "components", *ranges]
+        (from_high,) = {tuple(row[2:]) for row in table.rows if row[0] == "fd_spiral_high" and "no report" in row[1]}
+        assert from_high == ("stays", "none left", "fd_spiral_low", "fd_spiral_medium", "stays")
 
     def test_motion_does_not_depend_on_visibility(self, policy):
-        table = function_table(policy, MOTION)
-        assert table.attributes == ()
-        failed = next(
-            row for row in table.rows if row.components == "1 FALSE" and row.groundings == {MOTION: "fd_all_thrusters"}
-        )
-        assert failed.outcomes == ("fd_recover_thrusters",)
+        table = function_table(policy, MOTION).table(policy.space)
+        assert table.headings == ["now", "components", "then"]
+        assert ["fd_all_thrusters", "1 FALSE", "fd_recover_thrusters"] in table.rows
 
     def test_a_contradiction_is_marked_where_it_is(self, tmp_path):
         file = rules_file(tmp_path, f'clash: {VISIBLE} ^ lessThan(?v, 1.5) -> fg_status(?fg, "IN_ERROR_FR")\n')
         found = policy_between(KnowledgeBase.load(rules=[file]), "1.25", "1.5")
         marked = found.marked("inconsistent")
-        assert {case.state.grounded(SEARCH) for case in marked} == {
-            "fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"
-        }  # fmt: skip
-        low = {str(case.ranges[0]) for case in marked if case.state.grounded(SEARCH) == "fd_spiral_low"}
-        high = {str(case.ranges[0]) for case in marked if case.state.grounded(SEARCH) == "fd_spiral_high"}
-        assert "1.25 < . < 1.5" in high - low
-        assert "1.5" not in high
-        for case in marked:
-            assert "by the rules QAWaterVisibility (" in case.decided.contradiction
-            assert ", clash (" in case.decided.contradiction
+        by_design = marked.groupby(f"{SEARCH}_now")["water_visibility"].agg(set).to_dict()
+        low, high = ({found.space.scale.text(at) for at in by_design[f"fd_spiral_{name}"]} for name in ("low", "high"))
+        assert set(by_design) == {"fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"}
+        assert "1.25 < . < 1.5" in high - low and "1.5" not in high
+        for problem in marked["problem"]:
+            assert "by the rules QAWaterVisibility (" in problem and ", clash (" in problem
 
     def test_a_choice_that_alternates_is_marked(self, tmp_path):
         # Each motion design is unrealisable while it is in use.
@@ -165,11 +138,10 @@ class TestPolicy:
         )
         found = policy_between(KnowledgeBase.load(rules=[file], disabled_rules=["S9"]), "3.25")
         flipping = found.marked("flip-flop")
-        assert {case.state.grounded(MOTION) for case in flipping} == {"fd_all_thrusters", "fd_recover_thrusters"}
-        assert any("(flip-flop)" in outcome for row in function_table(found, MOTION).rows for outcome in row.outcomes)
-        assert {case.flipping for case in flipping} == {(MOTION,)}
-        others = [outcome for row in function_table(found, SEARCH).rows for outcome in row.outcomes]
-        assert not any("flip-flop" in outcome for outcome in others)
+        assert set(flipping[f"{MOTION}_now"]) == {"fd_all_thrusters", "fd_recover_thrusters"}
+        assert set(flipping["flipping"]) == {(MOTION,)}
+        motion, search = (function_table(found, name).table(found.space).text() for name in (MOTION, SEARCH))
+        assert "(flip-flop)" in motion and "flip-flop" not in search
 
     def test_a_rule_that_computes_takes_the_proof_away(self, tmp_path):
         file = rules_file(
@@ -199,19 +171,6 @@ def test_it_says_how_far_it_is(knowledge):
     assert counts == sorted(counts)
     assert {total for _, total in counts} == {counts[-1][0]}
     assert counts[0][0] == 0 < counts[-1][0] <= len(found.cases)
-
-
-def test_a_decision_flips_back_only_if_others_lead_back_to_it():
-    def case(grounded, chosen=None):
-        state = KnowledgeState.of([ObjectiveState(SEARCH, "OK")], groundings={SEARCH: grounded})
-        plan = Plan((Decision(SEARCH, chosen, ""),) if chosen else ())
-        outcome = Outcome(Reasoning(Inference(state, frozenset(), frozenset()), plan))
-        return PolicyCase((), state, ComponentReports((), 1), (SEARCH,), outcome)
-
-    cases = [case("a", "b"), case("b", "c"), case("c", "a"), case("d", "a"), case("e"), case("f", "not a state")]
-    found = {dict(each.state.groundings)[SEARCH]: each for each in _with_flip_flops(cases)}
-    assert {name for name, each in found.items() if FLIP_FLOP in each.marks} == {"a", "b", "c"}
-    assert found["a"].flipping == (SEARCH,) and found["e"].flipping == ()
 
 
 class TestFiles:
@@ -252,8 +211,7 @@ class TestFiles:
         found = make_policy(two.base, settings, two.outcome, 0, space)
         draw_policy(found, tmp_path / "two.svg")
         assert "battery level" in (tmp_path / "two.svg").read_text()
-        table = function_table(found, SEARCH)
-        assert table.attributes == ("battery_level", "water_visibility")
+        assert list(function_table(found, SEARCH).spans) == ["battery_level", "water_visibility"]
 
     def test_a_picture_of_another_kind_is_refused(self, policy, tmp_path):
         with pytest.raises(InputError, match=r"one of \.png"):
@@ -287,11 +245,11 @@ def extended(tmp_path: Path, rule: str) -> KnowledgeBase:
 
 
 def check_like_deciding_each(knowledge: KnowledgeBase, policy: Policy, most: int) -> None:
-    cases = random.Random(5).sample(policy.cases, min(most, len(policy.cases)))
-    for case in cases:
-        alone, decided = knowledge.outcome(Situation(case.state)), case.decided
-        assert (decided.statuses, decided.changes) == (alone.statuses, alone.changes), str(case.state)
-        assert decided.contradiction == alone.contradiction
+    for case in policy.cases.sample(min(most, len(policy.cases)), random_state=5).to_dict("records"):
+        alone = knowledge.outcome(Situation(case["state"]))
+        asked = [each.function for each in case["state"].objectives]
+        assert [case[f"{name}_then"] for name in asked] == list(map(alone.choice, asked)), str(case["state"])
+        assert (case["statuses"], case["problem"]) == ("; ".join(alone.statuses), alone.contradiction)
 
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=RULES)

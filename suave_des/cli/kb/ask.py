@@ -24,16 +24,13 @@ from suave_des.cli.kb.options import (
     shown,
     state_at,
 )
-from suave_des.errors import InputError, number_of
+from suave_des.errors import InputError
 from suave_des.files import csv_text, write_files
 from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.kb.policy import FunctionTable, Policy
     from suave_des.knowledge.state import Reasoning
-
-_EXAMPLES = 5
 
 
 def infer(options: ReasonerOptions, at: At = None, form: AsFormat = Format.TEXT) -> None:
@@ -100,13 +97,12 @@ def policy(
     png: Annotated[
         Path | None, typer.Option("--png", metavar="FILE", help="Draw it over one or two measured values.")
     ] = None,
-    form: AsFormat = Format.TEXT,
 ) -> None:
     """Tabulate the decision in every state.
 
     Measured values are divided into ranges: at and between the numbers that the knowledge base mentions.
     """
-    from suave_des.kb.policy import columns_of, function_table, rows_of
+    from suave_des.kb.policy import function_table
 
     if csv is not None and csv.is_dir():
         raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
@@ -118,61 +114,10 @@ def policy(
 
         draw_policy(found, png)
     if csv is not None:
-        write_files(csv.parent, {csv.name: csv_text(columns_of(found), rows_of(found))})
-    tables = [function_table(found, name) for name in found.functions]
-    content = {
-        "states": found.states,
-        "kinds": len(found.cases),
-        "attributes": found.attributes,
-        "without_effect": found.without_effect,
-        "alike": found.alike,
-        "computing_rules": found.computing,
-        "marked": found.marks,
-        "tables": tables,
-    }
-    emit(content, form, lambda: (*map(shown, map(_function_table, tables)), *_policy_summary(found)))
-
-
-def _function_table(found: FunctionTable) -> Table:
-    """A function's decisions; the last attribute goes across, the others down."""
-    others = [name for name in found.rows[0].groundings if name != found.function]
-    with_components = any(row.components for row in found.rows)
-    across = list(dict.fromkeys(column[-1:] for column in found.columns))
-    headings = ["now", *others, *["components"] * with_components, *found.attributes[:-1]]
-    rows = []
-    for row in found.rows:
-        outcomes = dict(zip(found.columns, row.outcomes, strict=True))
-        groundings = (row.groundings.get(found.function, "any"), *map(row.groundings.__getitem__, others))
-        for down in dict.fromkeys(column[:-1] for column in found.columns):
-            before = (*groundings, *[row.components] * with_components, *map(str, down))
-            rows.append((*before, *(outcomes[(*down, *last)] for last in across)))
-    columns = [*headings, *(str(last[0]) if last else "then" for last in across)]
-    what = f", by measured {', '.join(found.attributes)}" if found.attributes else ""
-    return Table(columns, rows, f"{found.function}{what}", "l" * len(columns))
-
-
-def _policy_summary(found: Policy) -> Iterator[str]:
-    from suave_des.kb.policy import no_proof
-    from suave_des.knowledge.state import NONE_LEFT
-
-    kinds, most = len(found.cases), found.max_failed
-    counts = f"{number_of(found.states, 'state')} in {kinds} equivalence class{'' if kinds == 1 else 'es'}"
-    yield f"{counts}, with at most {number_of(most, 'component')} reporting"
-    for group in found.alike:
-        if len(group) > 1:
-            yield f"interchangeable (only their number matters): {', '.join(group)}"
-    for name in found.without_effect:
-        yield f"without any effect: measured {name}"
-    if found.computing:
-        yield no_proof(found.computing)
-    for mark, states in found.marks.items():
-        yield f"{mark}: {number_of(states, 'state')}"
-        cases = () if mark == NONE_LEFT else found.marked(mark)
-        for case in cases[:_EXAMPLES]:
-            problem = case.decided.contradiction
-            yield f"  {case.state}" + (f": {problem}" if problem else "")
-        if len(cases) > _EXAMPLES:
-            yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
+        write_files(csv.parent, {csv.name: found.csv()})
+    for name in found.functions:
+        print(shown(function_table(found, name).table(found.space)))
+    print(*found.lines(), sep="\n")
 
 
 class TableFormat(StrEnum):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from suave_des.cli.console import progress
-from suave_des.cli.kb.options import AsFormat, Format, MaxFailed, ReasonerOptions, counting_states, emit, shown
+from suave_des.cli.kb.options import MaxFailed, ReasonerOptions, counting_states, shown
 from suave_des.cli.options import Modes, Quiet, Seed, Workers
 from suave_des.estimates import interval_text
 from suave_des.records.metrics import Metric, metric_of
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from suave_des.kb.difference import MissionDifference, PairedDifference, PolicyDifference
 
 _MOST_RUNS = 10
-"""Numbers of missions that are listed; all of them are in the JSON form."""
+"""Numbers of missions that are listed."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,6 @@ def diff(
     ],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
     max_failed: MaxFailed = 2,
-    form: AsFormat = Format.TEXT,
 ) -> None:
     """Show what differs between two ontologies, or two sets of rules: axioms, decisions, and missions.
 
@@ -61,17 +60,11 @@ def diff(
     with counting_states(before) as on_count:
         difference = before.diff(after, max_failed, on_count)
     missions = None if mission_options.missions is None else _missions(both, mission_options)
-    content = {"axioms": axioms, **_decisions(difference), "missions": missions}
-
-    def lines() -> Iterator[str]:
-        if axioms.removed or axioms.added:
-            yield f"axioms and rules: {len(axioms.removed)} removed, {len(axioms.added)} added"
-            yield from (f"  - {text}" for text in axioms.removed)
-            yield from (f"  + {text}" for text in axioms.added)
-        yield from difference.lines()
-
-    emit(content, form, lines)
-    if missions is not None and form is Format.TEXT:
+    if axioms.removed or axioms.added:
+        print(f"axioms and rules: {len(axioms.removed)} removed, {len(axioms.added)} added")
+        print(*(f"  - {text}" for text in axioms.removed), *(f"  + {text}" for text in axioms.added), sep="\n")
+    print(*difference.lines(), sep="\n")
+    if missions is not None:
         print()
         print(shown(_table(difference, missions)))
         print(*_mission_lines(both, mission_options, missions), sep="\n")
@@ -128,22 +121,3 @@ def _mission_lines(both: list[ReasonerOptions], options: MissionOptions, mission
         metric = _metric(each)
         for run, before, after in each.extremes if each.metric in METRICS else ():
             yield f"  run {run}: {metric.title} {before:.1f} {metric.unit} -> {after:.1f} {metric.unit}"
-
-
-def _decisions(difference: PolicyDifference) -> dict[str, Any]:
-    return {
-        "compared": difference.compared,
-        "states": difference.states,
-        "other_statuses_only": difference.states_reported,
-        "computing_rules": difference.computing,
-        "cells": [
-            {
-                "regions": dict(zip(difference.ranges, each.situation.ranges, strict=True)),
-                "state": each.situation.state,
-                "states": each.situation.reports.combinations,
-                "a": {name: each.one.choice(name) for name in each.situation.asked},
-                "b": {name: each.other.choice(name) for name in each.situation.asked},
-            }
-            for each in difference.differing
-        ],
-    }

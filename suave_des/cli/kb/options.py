@@ -158,13 +158,12 @@ def emit(content: object, form: Format, lines: Callable[[], Iterable[str]]) -> N
 
 
 def _plain(value: Any) -> Any:
-    from suave_des.kb.space import ValueRange
     from suave_des.kb.states import state_dict
     from suave_des.knowledge.state import Fact, KnowledgeState
 
     if isinstance(value, KnowledgeState):
         return state_dict(value)
-    if isinstance(value, Fact | ValueRange | Path | Decimal):
+    if isinstance(value, Fact | Path | Decimal):
         return str(value)
     if dataclasses.is_dataclass(value):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
