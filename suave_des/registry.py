@@ -18,7 +18,7 @@ from pathlib import Path
 from sysconfig import get_path
 from traceback import FrameSummary, extract_tb, walk_tb
 from types import ModuleType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
 from suave_des.domain import (
@@ -60,11 +60,17 @@ _FAMILIES = {
 """Managers that are named with an argument after a colon: what makes the class of one, and how it is written."""
 _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
-_MANAGER_HOOKS = (
-    *("__init__", "check", "input_files", "recall", "mission_started", "mission_ended"),
-    *("task_requested", "task_cancelled", "diagnostic", "adapt"),
-)
-_FUNCTION_HOOKS = ("__init__", "configure", "activated", "deactivated")
+_HOOKS = {
+    "ManagingSubsystem": (
+        *("__init__", "check", "input_files", "recall", "mission_started", "mission_ended"),
+        *("task_requested", "task_cancelled", "diagnostic", "adapt"),
+    ),
+    "CustomFunction": ("__init__", "configure", "activated", "deactivated"),
+}
+_PASSES = {
+    "ManagingSubsystem": "adapt may let time pass: with yield self.system.env.timeout(seconds)",
+    "CustomFunction": "what takes mission time is a process: self.env.process(self.another_method())",
+}
 _MAY_YIELD = ("adapt", "input_files")
 _checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
 
@@ -114,36 +120,22 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     """The class of a manager.
 
     Raises:
-        InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem.
+        InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem, or has a
+            hook that cannot be called.
     """
-    if name in _BUILT_IN:
-        return _built_in(name)
     family, _, argument = name.partition(":")
     if family in _FAMILIES:
-        return _member(family, argument)
-    target = name if ":" in name else _registered().get(name)
+        place, form = _FAMILIES[family]
+        if not argument.strip():
+            raise InputError(f"there is no manager {family!r}", remedy=f"write {form}")
+        module, _, function = place.partition(":")
+        make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
+        return make(argument)
+    target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
     if target is None:
         hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
-    found = _load(f"manager {name!r}", target, ManagingSubsystem)
-    if found not in _checked:
-        check_manager(f"manager {name!r}", found)
-        _checked.add(found)
-    return found
-
-
-@cache
-def _built_in(name: str) -> type[ManagingSubsystem]:
-    return _load(f"manager {name!r}", _BUILT_IN[name], ManagingSubsystem)
-
-
-def _member(family: str, argument: str) -> type[ManagingSubsystem]:
-    target, form = _FAMILIES[family]
-    if not argument.strip():
-        raise InputError(f"there is no manager {family!r}", remedy=f"write {form}")
-    module, _, function = target.partition(":")
-    make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
-    return make(argument)
+    return _load(f"manager {name!r}", target, ManagingSubsystem)
 
 
 def registered_functions() -> tuple[str, ...]:
@@ -152,11 +144,7 @@ def registered_functions() -> tuple[str, ...]:
 
 
 def function_class(function: str, name: str) -> type[CustomFunction]:
-    """Find the class of a user-defined function.
-
-    Args:
-        function: name of the function, for errors.
-        name: module:Class, or a registered name.
+    """Find the class of a user-defined function by module:Class, or a registered name; the function's is for errors.
 
     Raises:
         InputError: there is no such class, it is no subclass of CustomFunction, or a hook is wrong.
@@ -167,12 +155,7 @@ def function_class(function: str, name: str) -> type[CustomFunction]:
     if target is None:
         hint = did_you_mean(name, registered_functions(), "registered")
         raise InputError(f"function {function}: no package registers {name!r}", remedy=f"{hint}; or give module:Class")
-    what = f"function {function}, {name!r}"
-    found = _load(what, target, CustomFunction)
-    if found not in _checked:
-        check_function(what, found, CustomFunction)
-        _checked.add(found)
-    return found
+    return _load(f"function {function}, {name!r}", target, CustomFunction)
 
 
 def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
@@ -214,7 +197,7 @@ def _registered(group: str = MANAGER_GROUP) -> dict[str, str]:
 
 def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     module_name, _, attribute = target.partition(":")
-    module = imported(what, module_name)
+    module = _imported(what, module_name)
     found = getattr(module, attribute, None)
     if not (isinstance(found, type) and issubclass(found, base)):
         classes = {name for name, each in vars(module).items() if isinstance(each, type) and issubclass(each, base)}
@@ -223,18 +206,19 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
             remedy=(nearest(attribute, classes) if found is None else None)
             or f"derive your class from suave_des.{base.__name__}",
         )
+    if found not in _checked and not module_name.startswith("suave_des."):
+        _check_hooks(what, found, base)
+        if issubclass(found, ManagingSubsystem):
+            _check_subscriptions(what, found.subscribes_to)
+        _checked.add(found)
     return found
 
 
 # Users' code.
 
 
-def imported(what: str, module: str) -> ModuleType:
-    """Import a module of a user's.
-
-    Raises:
-        InputError: it is not there, or its code raises; `what` names what it is imported for.
-    """
+def _imported(what: str, module: str) -> ModuleType:
+    """Import a module of a user's; `what` names what it is imported for."""
     try:
         if module not in sys.modules and (here := str(Path.cwd())) not in sys.path:
             sys.path.append(here)  # where `python` would find it, but an installed command would not
@@ -252,16 +236,7 @@ def imported(what: str, module: str) -> ModuleType:
         raise InputError(problem, remedy=remedy) from error
 
 
-def check_manager(what: str, kind: type[ManagingSubsystem]) -> None:
-    """Check a manager's hooks, and what it subscribes to.
-
-    Raises:
-        InputError: a hook cannot be called as hooks are called, a method is most likely a misspelt one, or something
-            subscribed to is no kind of diagnostics; `what` names the manager.
-    """
-    passes = "adapt may let time pass: with yield self.system.env.timeout(seconds)"
-    _check_hooks(what, kind, ManagingSubsystem, _MANAGER_HOOKS, passes)
-    subscribed = kind.subscribes_to
+def _check_subscriptions(what: str, subscribed: Any) -> None:
     is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
     unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
     if unknown or not (is_collection or isinstance(subscribed, property)):
@@ -270,20 +245,13 @@ def check_manager(what: str, kind: type[ManagingSubsystem]) -> None:
         raise InputError(f"{what}: subscribes_to {found}", remedy=remedy)
 
 
-def check_function(what: str, kind: type, root: type) -> None:
-    """Check the hooks of a user-defined function; `root` is CustomFunction.
+def _check_hooks(what: str, kind: type, root: type) -> None:
+    """Check that hooks can be called as hooks are called, and that no method is most likely a misspelt one."""
 
-    Raises:
-        InputError: as `check_manager`.
-    """
-    passes = "what takes mission time is a process: self.env.process(self.another_method())"
-    _check_hooks(what, kind, root, _FUNCTION_HOOKS, passes)
-
-
-def _check_hooks(what: str, kind: type, root: type, hooks: Collection[str], lets_time_pass: str) -> None:
     def wrong(problem: str, remedy: str) -> InputError:
         return InputError(f"{what}: {problem}", remedy=remedy)
 
+    hooks, lets_time_pass = _HOOKS[root.__name__], _PASSES[root.__name__]
     forms = {name: _form(root, name) for name in hooks}
     for hook, form in forms.items():
         function = getattr(kind, hook)

@@ -257,13 +257,3 @@ def managers_of(scenario: str | Path) -> tuple[str, ...]:
     """Return the managers that a campaign has if none are given: those of a campaign file, or the default."""
     file = read_campaign_file(scenario)
     return CampaignKeys().managers if file is None else file.settings.managers
-
-
-def campaign_schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of a campaign file."""
-    from suave_des.scenario.schema import field_docs
-
-    schema = CampaignSettings.model_json_schema()
-    for name, text in field_docs(CampaignSettings).items():
-        schema["properties"][name]["description"] = " ".join(text.split())
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "suave-des campaign"}

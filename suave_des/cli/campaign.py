@@ -38,10 +38,8 @@ _RUNS = 200
 _FAILURES_SHOWN = 20
 _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
-_NARROW = 10
+_NARROW = 8
 """A heading is broken into lines of about this width where the summary is too wide otherwise."""
-_LOOKS = ((100, 6, True), (_NARROW, 6, True), (_NARROW, 6, False), (8, 4, False))
-"""Width of headings, digits of swept values, and whether standard deviations are shown: from the widest on."""
 _MAY_CHANGE = ("managers", "runs", "workers", "scheduler", "confirmed")
 """Options of a campaign that is resumed, too."""
 
@@ -127,44 +125,36 @@ def campaign(
     exit_telling_failures(result)
 
 
-def _summary(result: CampaignResult, width: int) -> Table:
-    """The rows of summary.csv; headings that do not fit are broken into lines, and what else does not is left out."""
-    for look in _LOOKS:
-        table = _summary_in(result, *look)
-        if max(map(len, table.text(width).splitlines())) <= width:
-            break
-    return table
-
-
-def _summary_in(result: CampaignResult, heading_width: int, digits: int, has_std: bool) -> Table:
+def _summary(result: CampaignResult, width: int, *, is_narrow: bool = False) -> Table:
+    """The rows of summary.csv; where they do not fit, headings are broken into lines, and spreads left out."""
     from suave_des.estimates import percent
     from suave_des.records.metrics import METRICS, PAPER_METRICS
 
     def figures(cells: Mapping[str, Any], metric: str) -> list[str]:
         mean, low, high, std = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std"))
         half = "" if low is None or high is None else f" ± {(high - low) / 2.0:.2f}"
-        return [f"{number(mean)}{half}", *([number(std)] if has_std else [])]
+        return [f"{number(mean)}{half}", *([] if is_narrow else [number(std)])]
 
-    parameters = result.variation.sweep.parameters
+    parameters, style = result.variation.sweep.parameters, ".4g" if is_narrow else ".6g"
     headings = [*parameters, "manager", "missions", "found"]
     for metric in PAPER_METRICS:
-        headings += [METRICS[metric].brief, "std"] if has_std else [METRICS[metric].brief]
+        headings += [METRICS[metric].brief] if is_narrow else [METRICS[metric].brief, "std"]
     records = result.summary
     rows = []
     for cells in records if len(records) <= _ROWS_SHOWN else records[: _ROWS_SHOWN - 1]:
         swept = (
-            f"{value:.{digits}g}" if isinstance(value := cells[name], float) else str(value) for name in parameters
+            f"{cells[name]:{style}}" if isinstance(cells[name], float) else str(cells[name]) for name in parameters
         )
         found = "" if cells["found_share"] is None else percent(cells["found_share"])
         measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
         rows.append([*swept, cells["manager"], str(cells["n"]), found, *measured])
     title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
-    return Table(
-        [broken_name(heading, heading_width, "") for heading in headings],
-        rows,
-        f"{title}, standard deviations" if has_std else title,
-        align=f"{'r' * len(parameters)}l",
-    )
+    align = f"{'r' * len(parameters)}l"
+    if is_narrow:
+        return Table([broken_name(heading, _NARROW, "") for heading in headings], rows, title, align)
+    table = Table(headings, rows, f"{title}, standard deviations", align)
+    is_too_wide = max(map(len, table.text(width).splitlines())) > width
+    return _summary(result, width, is_narrow=True) if is_too_wide else table
 
 
 def _differences(found: list[dict[str, Any]], parameters: Sequence[str]) -> Table:
@@ -196,15 +186,11 @@ def exit_telling_failures(result: CampaignResult) -> None:
     alike: dict[tuple[str, str], list[MissionFailure]] = {}
     for failure in result.failures:
         alike.setdefault((failure.manager, failure.cause), []).append(failure)
-    groups = list(alike.values())
-    for first, *others in groups[:_FAILURES_SHOWN]:
-        line = " ".join(str(first).split())
+    for first, *others in list(alike.values())[:_FAILURES_SHOWN]:
         count = f" ({len(others) + 1} missions like this)" if others else ""
-        console.print(f"suave-des: failed: {line}{count}")
-    more = sum(map(len, groups[_FAILURES_SHOWN:]))
-    if more > 0:
-        where = "" if result.folder is None else f", all of them in {result.folder}/manifest.json"
-        console.print(f"suave-des: failed: {more} more{where}")
+        console.print(f"suave-des: failed: {' '.join(str(first).split())}{count}")
+    if len(alike) > _FAILURES_SHOWN:
+        console.print("suave-des: failed: ... and others, see manifest.json")
     console.print(f"suave-des: {len(result.failures)} of {result.planned} missions failed; the others are kept")
     raise typer.Exit(3)
 

@@ -12,7 +12,7 @@ from typing import IO, Any
 import pytest
 
 from suave_des.campaign import workers
-from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
+from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.missions import GIVEN_UP, MissionRunner, WorkerError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD, rows_of
@@ -52,30 +52,6 @@ def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
     assert len(result.failures) == 2
     assert rows_of(tmp_path / "out") == []
     assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith(f"{AWKWARD}:RaisesAlways,0,")
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_interrupted_finished_missions_are_kept(workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("AWKWARD_TARGET", str(os.getpid()))
-    monkeypatch.setenv("AWKWARD_ONCE", str(tmp_path / "once"))
-    (tmp_path / "once").touch()
-    managers = ["none", f"{AWKWARD}:InterruptsOnce"]
-    with pytest.raises(CampaignInterrupted, match=r"\d+ of 200 missions are done, and kept in ") as stopped:
-        run_campaign("seams2023", managers, 100, 1, workers, tmp_path / "out")
-    assert isinstance(stopped.value, KeyboardInterrupt)
-    kept = rows_of(tmp_path / "out")
-    assert 0 < len(kept) < 200
-    whole = {row["run"]: row for row in _rows_without_trouble(tmp_path)}
-    for row in kept:
-        if row["manager"] == "none":
-            assert row == whole[row["run"]]
-    left_out = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]["left_out"]
-    assert left_out == 200 - len(kept)
-
-
-def _rows_without_trouble(tmp_path: Path) -> list[dict[str, str]]:
-    run_campaign("seams2023", ["none"], 100, 1, out=tmp_path / "whole")
-    return rows_of(tmp_path / "whole")
 
 
 def test_interrupted_before_the_first_mission_is_done_leaves_nothing(
@@ -182,32 +158,6 @@ def test_missions_run_in_as_many_processes_as_asked_for() -> None:
 
 
 class TestRefusedBeforeAnythingIsWritten:
-    @pytest.mark.parametrize(
-        ("change", "words"),
-        [
-            ({"managers": []}, "managers: "),
-            ({"managers": ["metacontrl"]}, "there is no manager 'metacontrl' (did you mean metacontrol?"),
-            ({"managers": ["none", "none"]}, "'none' is given twice"),
-            ({"managers": ["no_such_module:Manager"]}, "no_such_module"),
-            ({"managers": [f"{AWKWARD}:NoSuchClass"]}, "NoSuchClass"),
-            ({"runs": 0}, "runs: 0 "),
-            ({"runs": -5}, "runs: -5 "),
-            ({"time_out_s": 0.0}, "time_out_s: 0.0 "),
-            ({"time_out_s": float("nan")}, "time_out_s: .nan "),
-            ({"workers": 0}, "workers: 0 "),
-            ({"workers": 10_000}, "workers: 10000 "),
-            ({"scenario": "no_such_scenario"}, "no_such_scenario"),
-            ({"reasoner": "hermit", "managers": ["metacontrol"]}, "hermit"),
-            ({"ontologies": ["no_such.owl"]}, "no_such.owl"),
-            ({"modes_file": "no_such.yaml"}, "no_such.yaml"),
-        ],
-    )
-    def test_bad_input(self, change: dict[str, object], words: str, tmp_path: Path) -> None:
-        asked: dict[str, object] = {"scenario": "seams2023", "managers": ["none"], "runs": 1, "workers": 1} | change
-        with pytest.raises(InputError, match=re.escape(words)):
-            run_campaign(seed=1, out=tmp_path / "out", **asked)  # type: ignore[arg-type]
-        assert not (tmp_path / "out").exists()
-
     def test_an_ontology_that_is_given_is_checked_even_if_no_manager_uses_it(self, tmp_path: Path) -> None:
         (tmp_path / "broken.owl").write_text("<rdf")
         with pytest.raises(InputError, match=r"broken\.owl"):
@@ -229,23 +179,6 @@ class TestRefusedBeforeAnythingIsWritten:
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
             *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv"),
         ]
-
-    def test_a_file_in_place_of_the_folder(self, tmp_path: Path) -> None:
-        (tmp_path / "out").write_text("")
-        with pytest.raises(InputError, match="out: the output folder is not a folder"):
-            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
-
-    def test_a_folder_whose_parent_is_missing(self, tmp_path: Path) -> None:
-        with pytest.raises(InputError, match=r"there is no folder .*nowhere"):
-            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "nowhere" / "out")
-
-    def test_a_name_that_is_too_long(self, tmp_path: Path) -> None:
-        with pytest.raises(InputError, match="the output folder cannot be written: File name too long"):
-            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / ("x" * 300))
-
-    def test_a_place_where_nothing_can_be_written(self) -> None:
-        with pytest.raises(InputError, match="the output folder cannot be written"):
-            run_campaign("seams2023", ["none"], 1, 1, out="/proc/suave-des")
 
 
 def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
@@ -39,12 +37,6 @@ def test_a_run_is_the_mission_of_the_scenario_with_its_members_values(two):
     loaded = with_values(load_scenario("seams2023"), {GAIN: 2.0})
     alone = Simulator(loaded).run("none", 2, 3).metrics
     assert (row["search_time_s"], row["detection_time_s"]) == (alone.search_time_s, round(alone.detection_time_s, 6))
-
-
-def test_members_run_through_again_at_each_point_of_a_sweep(two):
-    sweep = {"visibility.period_s": [60, 80]}
-    frame = run_campaign("seams2023", ["none"], 3, ensemble=two, sweep=sweep).frame()
-    assert frame[ENSEMBLE_COLUMN].tolist() == [1, 2, 1, 1, 2, 1]
 
 
 def test_resuming_gives_the_same_bytes(two, tmp_path):
@@ -173,13 +165,6 @@ def test_the_range_over_members_is_that_of_their_means():
     assert (found["range95_low"], found["range95_high"]) == pytest.approx(
         (11.0 - 4.302653 * 10.0 * (4 / 3) ** 0.5, 11.0 + 4.302653 * 10.0 * (4 / 3) ** 0.5), rel=1e-6
     )
-
-
-@given(st.integers(1, 10_000), st.integers(2, 50))
-def test_members_are_used_equally_often(run, size):
-    ensemble = Ensemble("any", ("x",), tuple((float(number),) for number in range(size)))
-    assert ensemble.member(run) == ensemble.member(run + size)
-    assert 1 <= ensemble.member(run) <= size
 
 
 SHIPPED = sorted(shipped_folder("scenarios/ensembles").glob("*.csv"))

@@ -173,10 +173,6 @@ class Async(ManagingSubsystem):
     async def task_requested(self, task):
         pass
 
-class AsyncAdapt(Loops):
-    async def adapt(self):
-        pass
-
 class Returns(Loops):
     def adapt(self):
         return "fd_spiral_low"
@@ -186,33 +182,14 @@ class TextPeriod(Loops):
         super().__init__(system)
         self.period_s = "2"
 
-class NoStart(Loops):
-    def __init__(self, system):
-        super().__init__(system)
-        self.starts_s = float("nan")
-
 class Early(Loops):
     starts_s = -50.0
-
-class Never(Loops):
-    starts_s = float("inf")
-
-class NoPeriod(Loops):
-    def __init__(self, system):
-        super().__init__(system)
-        self.period_s = float("inf")
-
-class NoThreshold(ManagingSubsystem):
-    depends_on = {"water_visibility": (2.25, float("nan"))}
 
 class NothingMeasured(ManagingSubsystem):
     depends_on = {"water_visiblity": (3.25,)}
 
 class NoKind(ManagingSubsystem):
     subscribes_to = ("visibility",)
-
-class OneKind(ManagingSubsystem):
-    subscribes_to = "Pose"
 
 class NoKinds(ManagingSubsystem):
     subscribes_to = None
@@ -238,17 +215,11 @@ class NeedsSetting(ManagingSubsystem):
         ("Loops", 3, "no mission time passed"),
         ("Waits", 2, "diagnostic yields, and nothing would run it"),
         ("Async", 2, "task_requested is async"),
-        ("AsyncAdapt", 2, "adapt is async"),
         ("Returns", 3, "adapt returned 'fd_spiral_low'; it may return None"),
         ("TextPeriod", 3, "period_s is '2'; it must be a number above 0"),
-        ("NoStart", 3, "starts_s is nan"),
         ("Early", 3, "starts_s is -50.0"),
-        ("Never", 3, "starts_s is inf"),
-        ("NoPeriod", 3, "period_s is inf"),
-        ("NoThreshold", 3, "depends_on is"),
         ("NothingMeasured", 3, "'water_visiblity', which nothing measures (did you mean 'water_visibility'?"),
         ("NoKind", 2, "subscribes_to has 'visibility'"),
-        ("OneKind", 2, "subscribes_to is 'Pose'"),
         ("NoKinds", 2, "subscribes_to is nothing"),
         ("NoClassMethod", 2, "write @classmethod def check(cls, loaded)"),
         ("NeedsSetting", 2, "--manager-option table=..."),

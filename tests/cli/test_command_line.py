@@ -110,11 +110,6 @@ def test_a_shell_completes_names(command, monkeypatch: pytest.MonkeyPatch, begun
     assert command("").out.split() == [offered]
 
 
-def test_one_mission_is_not_called_missions(command) -> None:
-    ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", *OUT)
-    assert ended.out.endswith("\n1 mission is in out/runs.csv\n")
-
-
 def test_a_folder_with_brackets_is_named_as_it_is(command) -> None:
     folder = "new[b] :car:"
     ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", folder)
@@ -122,14 +117,6 @@ def test_a_folder_with_brackets_is_named_as_it_is(command) -> None:
 
 
 class TestResume:
-    def test_does_what_is_left_and_may_add_runs(self, command, tmp_path: Path) -> None:
-        command("campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", *OUT)
-        ended = command("campaign", "--resume", "out", "--runs", "4", "--workers", "1")
-        assert ended.status == 0
-        assert "4 missions are in out/runs.csv" in ended.out
-        command("campaign", "seams2023", "--managers", "none", "--runs", "4", "--workers", "1", "--out", "whole")
-        assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
-
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
@@ -166,23 +153,6 @@ class TestProgress:
         assert ended.status == 0
         assert ("missions" in ended.err) == (not quiet)
         assert not re.search(r"\d of \d+ missions", ended.out)
-
-
-class TestSummary:
-    @pytest.mark.parametrize("width", [80, 100])
-    def test_fits(self, width: int, command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        monkeypatch.setenv("COLUMNS", str(width))
-        (tmp_path / "mine_with_a_long_name.py").write_text(MANAGER)
-        (tmp_path / "file.yaml").write_text(
-            "campaign: 1\nscenario: seams2023\nruns: 3\nmanagers: [metacontrol, mine_with_a_long_name:Mine]\n"
-            "sweep: {visibility.period_s: [40, 80]}\n"
-        )
-        for number, arguments in enumerate((("seams2023", "--runs", "3"), ("file.yaml",))):
-            ended = command("campaign", *arguments, "--workers", "1", "--out", f"out{number}")
-            lines = ended.out.splitlines()
-            assert max(map(len, lines)) <= width
-            assert "…" not in ended.out
-            assert re.search(r"^ *(40  )?metacontrol +3 +\d+% +\d+\.\d\d ± \d+\.\d\d ", ended.out, re.MULTILINE)
 
 
 class TestRun:
@@ -231,12 +201,6 @@ class TestRun:
         metrics = json.loads((tmp_path / "mission" / "mission.json").read_text())["metrics"]
         assert {name: "" if value is None else str(value) for name, value in metrics.items()} == row
 
-    def test_twice_gives_the_same_bytes(self, command, tmp_path: Path) -> None:
-        for name in ("a", "b"):
-            command("run", "seams2023", "--manager", "none", "--out", name)
-        for file in ("events.csv", "trajectory.csv"):
-            assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
-
     def test_refuses_a_folder_with_results(self, command, tmp_path: Path) -> None:
         command("run", "seams2023", "--manager", "none", "--out", "out")
         again = command("run", "seams2023", "--manager", "none", "--out", "out")
@@ -276,23 +240,14 @@ class TestBadInput:
             (["run", "nowhere.yaml", *OUT], "nowhere.yaml: no such file"),
             (["run", "seams2023", "--manager", "rondom", *OUT], "did you mean random?"),
             (["run", "seams2023", "--manager", "os:path", *OUT], "os"),
-            (["run", "seams2023", "--manager", "none", "--run", "0", *OUT], "run: 0 is out of range"),
-            (["run", "seams2023", "--seed", "seven", *OUT], "--seed"),
             (["run", "seams2023", "--reasoner", "hermit", *OUT], "hermit"),
-            (["run", "seams2023", "--manager", "none", "--ontology", "no.owl", *OUT], "no.owl"),
-            (["run", "seams2023", "--manager", "none", "--modes", "no.yaml", *OUT], "no.yaml"),
-            (["campaign", "seams2023"], "--out"),
             (["campaign", "seams2023", "--managers", "", *OUT], "managers: "),
             (["campaign", "seams2023", "--managers", "none,nome", *OUT], "'nome' (did you mean none?"),
             (["campaign", "seams2023", "--managers", "none,none", *OUT], "twice"),
             (["campaign", "seams2023", "--workers", "0", *OUT], "workers: 0 "),
-            (["campaign", "seams2023", "--workers", "10000", *OUT], "workers: 10000 "),
             (["campaign", "seams2023", "--runs", "0", *OUT], "runs: 0 "),
             (["campaign", "seams2023", "--runs", "many", *OUT], "--runs"),
             (["campaign", "seams2023", "--format", "excel", *OUT], "--format"),
-            (["campaign", "seams2023", "--managers", "none", "--out", "no/where"], "no/where: there is no folder no"),
-            (["campaign", "seams2023", "--managers", "none", "--out", "/proc/x"], "cannot be written"),
-            (["reproduce", "--runs", "0", *OUT], "runs: 0"),
             (["figure", "nothing", "--out", "map.png"], "nothing: no such file"),
             (["figure", ".", "--out", "map.xyz"], "map.xyz: expected a picture, got .xyz"),
             (["campain"], "Did you mean 'campaign'?"),

@@ -46,15 +46,6 @@ class RaisesAlways(ManagingSubsystem):
         raise LookupError(task.name)
 
 
-class InterruptsOnce(_InRun):
-    """Does what Ctrl-C does to the process that runs the campaign, once: in the first run that finds AWKWARD_ONCE."""
-
-    def adapt(self) -> None:
-        with suppress(FileNotFoundError):
-            Path(os.environ["AWKWARD_ONCE"]).unlink()
-            os.kill(int(os.environ["AWKWARD_TARGET"]), signal.SIGINT)
-
-
 class DiesInSome(_InRun):
     """Ends its process as the system does when memory is short, in about one of ten runs."""
 

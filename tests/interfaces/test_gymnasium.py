@@ -84,11 +84,6 @@ def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simu
     assert {named["f_maintain_motion"] for named in inspecting[1:]} == {1.0}
 
 
-def test_modes_make_a_difference(simulator: Simulator) -> None:
-    environment = gymnasium.make(NAME, scenario=simulator)
-    assert play(environment, [2, 1], seed=1)[1] != play(environment, [0, 0], seed=1)[1]
-
-
 def test_the_reward_adds_up_to_what_it_weighs(simulator: Simulator) -> None:
     weights = {"inspected_per_m": 2.0, "searched_per_s": -0.5, "found": 10.0, "adaptation": -3.0}
     environment = gymnasium.make(NAME, scenario=simulator, reward=weights)

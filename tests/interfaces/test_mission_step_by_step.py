@@ -27,12 +27,6 @@ def test_how_a_mission_is_cut_into_steps_changes_nothing(simulator: Simulator, s
     assert mission.result().metrics == simulator.run("metacontrol", 2, 1).metrics
 
 
-def test_without_requests_it_is_the_manager_none(simulator: Simulator) -> None:
-    mission = Mission(simulator, run=3)
-    mission.advance()
-    assert mission.metrics().search_time_s == simulator.run("none", 3, 1).metrics.search_time_s
-
-
 def test_a_requested_mode_takes_effect_after_the_latency() -> None:
     mission = Mission("seams2023", run=1, record=True)
     mission.advance(10.0)
@@ -67,13 +61,6 @@ def test_reading_the_metrics_on_the_way_changes_nothing(simulator: Simulator) ->
         mission.advance(mission.now_s + 10.0)
         assert mission.metrics().mission_duration_s == mission.now_s
     assert mission.metrics().distance_inspected_m == simulator.run("none", 5, 1).metrics.distance_inspected_m
-
-
-def test_the_metrics_on_the_way_have_the_distance_until_now(simulator: Simulator) -> None:
-    mission = Mission(simulator, run=5)
-    while not mission.metrics().distance_inspected_m:
-        mission.advance(mission.now_s + 5.0)
-    assert not mission.is_over and mission.metrics().distance_inspected_m == mission.distance_inspected_m
 
 
 def test_many_missions_of_one_simulator_may_go_on_at_once(simulator: Simulator) -> None:
