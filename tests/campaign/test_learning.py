@@ -109,12 +109,6 @@ def test_modes_that_there_are_not_are_counted_and_reported(tmp_path: Path) -> No
     assert remark.endswith("(5 times)")
 
 
-def test_an_unknown_function_is_reported_with_the_nearest_one() -> None:
-    words = "the modes file has no function 'generate_search_path' .did you mean 'f_generate_search_path'"
-    with pytest.warns(UserWarning, match=words):
-        run_campaign("seams2023", [f"{AWKWARD}:MisspellsFunction"], 1)
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.usefixtures("quick_workers")
 def test_a_name_that_nothing_measures_is_reported_once(workers: int, tmp_path: Path) -> None:

@@ -59,11 +59,6 @@ def search_times(**options: object) -> list[float]:
     return run_campaign("seams2023", runs=3, **options)["search_time_s"].tolist()  # type: ignore[arg-type]
 
 
-def test_a_managers_options_reach_it(settable: str) -> None:
-    found = search_times(managers=[settable], manager_options={settable: {"mode": "fd_spiral_high"}})
-    assert found == search_times(managers=["fixed:fd_spiral_high"])
-
-
 def test_a_sweep_varies_a_managers_own_setting_which_the_scenario_need_not_have(settable: str) -> None:
     modes = ["fd_spiral_low", "fd_spiral_high"]
     frame = run_campaign("seams2023", [settable], runs=3, sweep={f"managers.{settable}.mode": modes})

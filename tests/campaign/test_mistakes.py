@@ -14,7 +14,6 @@ from suave_des.errors import MISTAKES_LOGGER
 from suave_des.findings import Finding
 from suave_des.knowledge.checks import Subject, static_findings
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.resources import shipped_folder
 from tests.helpers.command import command_here, suave_des_command
 
 STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
@@ -70,19 +69,6 @@ def test_quiet_campaigns_do_not_tell(tmp_path: Path, wrong_rule: str, caplog: py
     assert not logging.getLogger(MISTAKES_LOGGER).disabled
 
 
-def test_a_measured_attribute_that_is_misspelt(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    scenario = "base: seams2023\nname: mine\nsignals:\n  water_visiblity: {kind: constant, value: 2.0}\n"
-    (tmp_path / "mine.yaml").write_text(scenario, encoding="utf-8")
-    campaign(tmp_path, scenario="mine.yaml", managers="metacontrol")
-    assert "missions measure water_visiblity" in caplog.messages[0]
-
-
-def test_nothing_is_told_of_files_without_mistakes(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    (tmp_path / "right.swrl").write_text('Late: c_status(?c, "FALSE") -> Role(?c)\n', encoding="utf-8")
-    campaign(tmp_path, "--rules", "right.swrl")
-    assert not caplog.messages
-
-
 @pytest.mark.parametrize("scenario", ["seams2023", "extended"])
 def test_shipped_files_are_not_even_checked(scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("suave_des.knowledge.checks.static_findings", lambda *_: pytest.fail("checked"))
@@ -113,14 +99,3 @@ def test_many_mistakes_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixt
     *findings, last = caplog.messages
     assert len(findings) == MISTAKES_SHOWN
     assert last.startswith("note: 4 more; ")
-
-
-def test_an_ontology_of_ones_own(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    design = "http://www.metacontrol.org/suave#fd_spare"
-    kind = "http://metacontrol.org/tomasys#FunctionDesgn"
-    extra = f'<owl:NamedIndividual rdf:about="{design}"><rdf:type rdf:resource="{kind}"/></owl:NamedIndividual>'
-    (tmp_path / "mine.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
-    campaign(tmp_path, "--ontology", "mine.owl", managers="metacontrol")
-    assert caplog.messages[0].startswith("ERROR  mine.owl: line")
-    assert "fd_spare: class FunctionDesgn is not defined (did you mean FunctionDesign?)" in caplog.messages[0]

@@ -178,19 +178,6 @@ class TestRefusals:
         with pytest.raises(InputError, match=r"versions.suave-des was '[0-9.]+', and is now '99.0'"):
             resume_campaign(tmp_path / "out")
 
-    def test_another_code_of_a_manager(self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.syspath_prepend(tmp_path)
-        module = tmp_path / "manager_that_changes.py"
-        module.write_text("from suave_des.managing.simple import NoManager\nclass Mine(NoManager):\n    pass\n")
-        name = "manager_that_changes:Mine"
-        run_campaign(scenario, [name], 2, 1, out=tmp_path / "out")
-        module.write_text(module.read_text() + "    period_s = 5.0\n")
-        import linecache
-
-        linecache.checkcache()
-        with pytest.raises(InputError, match=r"files_sha256\.manager_that_changes\.py was "):
-            resume_campaign(tmp_path / "out", runs=3)
-
     def test_fewer_runs(self, scenario: Path, tmp_path: Path) -> None:
         interrupted(scenario, tmp_path / "out")
         with pytest.raises(InputError, match=r"runs was 20, and is now 10"):

@@ -107,22 +107,6 @@ def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path: Path) 
     assert list(shared["initial_y_m"]) == list(single["initial_y_m"])  # drawn by the scenario, each run its own
 
 
-def test_runs_share_nothing_where_nothing_is_drawn(tmp_path: Path) -> None:
-    result = run_campaign(write(tmp_path, HEAD + "runs_per_draw: 3\n"), ["none"], 6, out=tmp_path / "out")
-    alone = run_campaign("seams2023", ["none"], 6, 7)
-    assert result.variation.runs_sharing_draw == 1
-    assert result.summary == alone.summary  # its intervals are of six runs, not of two draws
-
-
-def test_what_is_drawn_can_be_given_again_exactly(tmp_path: Path) -> None:
-    path = write(tmp_path, HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n")
-    run_campaign(path, ["none"], 2, out=tmp_path / "out")
-    row = rows_of(tmp_path / "out")[1]
-    again = with_values(load_scenario("seams2023"), {"start.x_m": float(row["start.x_m"])})
-    metrics = Simulator(again).run("none", 2, 7).metrics
-    assert repr(round(metrics.distance_inspected_m, 6)) == row["distance_inspected_m"]
-
-
 @settings(max_examples=5, deadline=None)
 @given(st.integers(0, 2**31), st.lists(st.sampled_from([40.0, 60.0, 100.0]), min_size=1, max_size=3, unique=True))
 def test_more_points_managers_or_noise_change_no_other_row(seed: int, periods: list[float]) -> None:

@@ -2,46 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from suave_des.cli.main import main
-
-
-@dataclass(frozen=True)
-class Ended:
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Runs the command line in this process, in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-
-    def run(*arguments: str) -> Ended:
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        captured = capsys.readouterr()
-        assert isinstance(ended.value.code, int)
-        return Ended(ended.value.code, captured.out, captured.err)
-
-    return run
-
-
-def rows_of(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
+from tests.helpers import rows_of
 
 FILE = "campaign: 1\nscenario: seams2023\nmanagers: [none]\n"
 
@@ -324,7 +293,3 @@ def test_schema_is_the_json_schema_of_scenarios(command) -> None:
     from suave_des.scenario.schema import scenario_schema
 
     assert json.loads(command("schema").out) == scenario_schema() == json.loads(command("schema", "scenario").out)
-
-
-def test_schema_exec_is_the_json_schema_of_messages(command) -> None:
-    assert json.loads(command("schema", "exec").out)["$id"] == "urn:suave-des:exec:1"

@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
-from suave_des.cli.main import main
 from suave_des.files import FAMILIES
 
 RUN = ("run", "seams2023", "--manager", "none", "--out", "out")
 CAMPAIGN = ("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", "out")
 REPRODUCE = ("reproduce", "--runs", "2", "--workers", "1", "--out", "out")
 VALIDATE = ("validate", "--managers", "none", "--runs", "2", "--workers", "1", "--out", "out")
-
-
-@pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-
-    def run(*arguments: str) -> tuple[int, str]:
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        return int(ended.value.code or 0), capsys.readouterr().err
-
-    return run
 
 
 def files() -> dict[str, bytes]:
@@ -45,7 +30,7 @@ def files() -> dict[str, bytes]:
 def test_results_of_another_kind_are_left_alone(command, first, second, found) -> None:
     assert command(*first)[0] == 0
     before = files()
-    status, error = command(*second, "--overwrite")
+    status, _, error = command(*second, "--overwrite")
     assert status == 2
     assert f"out: the output folder has {found}, which this command does not replace" in error
     assert "give another folder" in error

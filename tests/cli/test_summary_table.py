@@ -48,7 +48,7 @@ def test_a_long_sweep_has_its_first_rows_and_where_the_others_are(
         assert sum(1 for _ in csv.DictReader(file)) == points
 
 
-@pytest.mark.parametrize(("width", "digits"), [(80, 4), (120, 6)])
+@pytest.mark.parametrize(("width", "digits"), [(80, 4), (200, 6)])
 def test_drawn_values_are_rounded_and_names_broken_to_fit_the_terminal(
     width: int, digits: int, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,7 +12,6 @@ import pytest
 
 from suave_des import InputError, run_campaign, run_mission
 from suave_des.interfaces import exec as programs
-from suave_des.registry import manager_class
 from tests.helpers.command import EXAMPLES, example_program
 
 HEAD = "import json, os, sys, time\nfor number, line in enumerate(sys.stdin):\n    message = json.loads(line)\n"
@@ -74,12 +73,6 @@ class Same(Threshold):
 '''
 
 
-def test_a_program_serves_one_mission_after_the_other() -> None:
-    count = "open('started', 'a').write('x') if number == 0 else None\n"
-    frame = run_campaign("seams2023", [program(count + EVERY_PERIOD)], runs=4)
-    assert len(frame) == 4 and Path("started").read_text() == "x"
-
-
 def test_what_it_says_stands_in_the_timeline() -> None:
     events = run_mission("seams2023", program(EVERY_PERIOD), 1, 1).events
     assert next(each.detail for each in events if each.event == "says") == "higher"
@@ -108,8 +101,6 @@ def test_it_is_told_what_happens() -> None:
         ("os.kill(os.getpid(), 9)", "ended with status -9"),
         ("sys.stdout.close(); os.close(1); time.sleep(60)", "closed its output"),
         ("print('good morning', flush=True)", "answered 'good morning', which is not JSON"),
-        ("print('[1]', flush=True)", "answered [1], which is not an object"),
-        ("print('[' * 100000, flush=True)", "which is not JSON"),
         ("print('x' * 10_000_000, flush=True)", "line of more than 1,000,000 bytes"),
         ("print('{}\\n{}', flush=True)", "more than one line"),
         ("print('{\"mode\": {}}', flush=True)", "did you mean 'modes'"),
@@ -117,9 +108,7 @@ def test_it_is_told_what_happens() -> None:
         ('print(\'{"period_s": "often"}\', flush=True)', "to mission_started"),
         ('print(\'{"subscribes_to": ["poses"]}\', flush=True)', "did you mean 'pose'"),
         ('print(\'{"period_s": 2, "starts_s": -50}\', flush=True)', "starts_s is -50.0"),
-        ('print(\'{"period_s": 2, "starts_s": Infinity}\', flush=True)', "starts_s is inf"),
         ('print(\'{"depends_on": {"water_visibility": [NaN]}}\', flush=True)', "depends_on is"),
-        ('print(\'{"depends_on": {"visibility": [2.0]}}\', flush=True)', "'visibility', which nothing measures"),
         ('print(\'{"modes": {"f_generate_search_path": "fd_spiral_hihg"}}\', flush=True)', "'fd_spiral_high'"),
         ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
     ],
@@ -206,7 +195,3 @@ def test_a_resumed_campaign_runs_no_program_unasked(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="would run the code of exec:"):
         resume_campaign(received, runs=2)
     assert len(resume_campaign(received, runs=2, managers=[manager])) == 2
-
-
-def test_the_class_of_a_command_is_made_once() -> None:
-    assert manager_class("exec:./mine") is manager_class("exec:./mine")

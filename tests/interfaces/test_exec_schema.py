@@ -104,15 +104,11 @@ def test_the_schema_has_the_metrics_and_kinds_that_there_are(schema: dict[str, A
     ("definition", "line"),
     [
         ("message", {"type": "adapt", "time_s": 1.0}),
-        ("message", {"type": "adapted", "time_s": 1.0, "measured": {}}),
         ("message", {"type": "adapt", "time_s": -1.0, "measured": {}}),
         ("message", {"type": "diagnostic", "time_s": 1.0, "kind": "pose", "key": "pose", "value": 1.0}),
-        ("message", {"type": "task_requested", "time_s": 1.0, "task": "search_pipeline", "functions": "f_x"}),
         ("answer", {"mode": {}}),
         ("answer", {"modes": {"f_maintain_motion": 1}}),
-        ("answer", {"period_s": 2.0}),
         ("first_answer", {"period_s": 0.0}),
-        ("first_answer", {"subscribes_to": ["poses"]}),
         ("first_answer", {"protocol": 2}),
     ],
 )

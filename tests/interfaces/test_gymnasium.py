@@ -123,11 +123,6 @@ def test_bad_options_are_refused(options: dict, words: str) -> None:
         gymnasium.make(NAME, **options)
 
 
-def test_a_step_before_reset_is_refused(simulator: Simulator) -> None:
-    with pytest.raises(InputError, match="call reset first"):
-        gymnasium.make(NAME, scenario=simulator).unwrapped.step([0, 0])
-
-
 def test_many_missions_side_by_side_are_those_of_single_environments(simulator: Simulator) -> None:
     vector = gymnasium.make_vec(NAME, num_envs=3, scenario=simulator, period_s=10.0)
     single = [gymnasium.make(NAME, scenario=simulator, period_s=10.0) for _ in range(3)]
@@ -178,10 +173,3 @@ def test_it_draws_the_way_so_far(simulator: Simulator) -> None:
     after = environment.render()
     assert before.shape == after.shape == (400, 600, 3) and before.dtype == np.uint8
     assert (before != after).any()
-
-
-def test_without_a_render_mode_it_says_how_to_draw(simulator: Simulator) -> None:
-    environment = gymnasium.make(NAME, scenario=simulator).unwrapped
-    environment.reset(seed=1)
-    with pytest.raises(InputError, match="rgb_array"):
-        environment.render()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des import InputError, Mission, load_scenario, run_mission
+from suave_des import InputError, Mission, load_scenario
 from suave_des.simulation.simulator import Simulator
 
 SEARCH = "f_generate_search_path"
@@ -72,12 +72,6 @@ def test_many_missions_of_one_simulator_may_go_on_at_once(simulator: Simulator) 
     assert found == [simulator.run("none", run, 1).metrics.search_time_s for run in range(1, 4)]
 
 
-def test_a_recorded_mission_has_the_events_of_run_mission() -> None:
-    mission = Mission("seams2023", "metacontrol", run=1, seed=8, record=True)
-    mission.advance(100.0)
-    assert mission.result().events == run_mission("seams2023", "metacontrol", 1, 8).events
-
-
 @pytest.mark.parametrize(
     ("function", "mode", "words"),
     [
@@ -104,12 +98,6 @@ def test_it_does_not_go_back(simulator: Simulator, until: float) -> None:
     mission.advance(5.0)
     with pytest.raises(InputError, match="cannot go to"):
         mission.advance(until)
-
-
-@pytest.mark.parametrize("number", [-1, 1.5, True, "1"])
-def test_a_run_is_a_whole_number(simulator: Simulator, number: object) -> None:
-    with pytest.raises(InputError, match="run"):
-        Mission(simulator, run=number)  # type: ignore[arg-type]
 
 
 def test_a_mission_loads_nothing_that_draws_learns_or_serves() -> None:
