@@ -20,7 +20,7 @@ from PIL import Image, ImageChops, ImageStat
 
 _COLOURS = 128
 """A picture of lines needs no more, and takes a third of the space."""
-_MEAN_DIFFERENCE = 2.0
+_MEAN_DIFFERENCE = 0.5
 """Of 255 levels, between a picture and the same drawn again: fonts are rendered differently on other machines."""
 
 

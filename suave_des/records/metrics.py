@@ -44,7 +44,8 @@ class Metric:
         less: a sentence about who has less: "finds the pipeline {} sooner than"; likewise more.
         most: phrase for the best mean: "finds the pipeline soonest"; empty if none is better.
         half_width: of the intervals for which the number of runs is given, if none is asked for; 0: 5% of the mean.
-        interval_decimals: of its intervals in tables; other values have two.
+        decimals: of its values in tables and sentences.
+        interval_decimals: of its intervals in tables.
         short: of its heading, where there is little room; empty: the title.
     """
 
@@ -56,6 +57,7 @@ class Metric:
     more: str = ""
     most: str = ""
     half_width: float = 0.0
+    decimals: int = 2
     interval_decimals: int = 1
     short: str = ""
 
@@ -83,11 +85,12 @@ class Metric:
         """Write a value for a table: a share in per cent, others with the paper's decimals; empty for None and nan."""
         if value is None or value != value:
             return ""
-        return f"{100.0 * value:.1f}%" if self.name == FOUND else f"{value:.2f}"
+        return f"{self.scale * value:.{self.decimals}f}{'%' if self.name == FOUND else ''}"
 
     def amount(self, value: float) -> str:
         """Write a difference's size for a sentence, with its unit."""
-        return f"{100.0 * value:.1f} percentage points" if self.name == FOUND else f"{value:.2f} {self.unit}".strip()
+        unit = "percentage points" if self.name == FOUND else self.unit
+        return f"{self.scale * value:.{self.decimals}f} {unit}".strip()
 
 
 _METRICS = (
@@ -121,6 +124,7 @@ _METRICS = (
         more="finds the pipeline in {} more of its missions than",
         most="finds the pipeline most often",
         half_width=0.05,
+        decimals=1,
     ),
     Metric(
         REACTION_TIME,
@@ -154,7 +158,7 @@ _METRICS = (
     Metric("reasoning_time_s", "reasoning time", "s"),
     Metric("area_covered_m2", "area covered", "m2"),
     Metric("operational_thrusters", "operational thrusters"),
-    Metric("battery_level", "battery level"),
+    Metric("battery_level", "battery level", decimals=3, interval_decimals=3),
     Metric("recharges", "recharges"),
     Metric("surfacing_time_s", "surfacing time", "s"),
 )
@@ -167,5 +171,15 @@ PAPER_METRICS = (SEARCH_TIME, DISTANCE)
 def metric_of(column: str) -> Metric | None:
     """Return the metric of a column; None for one that has something else, such as a swept value."""
     if column.startswith(REQUIREMENT):
-        return Metric(column, f"satisfaction of {column.removeprefix(REQUIREMENT)}")
+        name = column.removeprefix(REQUIREMENT)
+        return Metric(
+            column,
+            f"satisfaction of {name}",
+            better=1,
+            less=f"satisfies {name} {{}} worse than",
+            more=f"satisfies {name} {{}} better than",
+            most=f"satisfies {name} best",
+            decimals=3,
+            interval_decimals=3,
+        )
     return METRICS.get(column)

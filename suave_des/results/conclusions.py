@@ -160,7 +160,7 @@ def _interval(found: Difference, metric: Metric) -> str:
         return "no interval"
     is_turned = found.difference.value < 0.0 and _is_claimed(found)
     shown = -found.difference if is_turned else found.difference
-    return f"95% interval {shown.text('.1f' if metric.scale > 1.0 else '.2f', metric.scale)}"
+    return f"95% interval {shown.text(f'.{metric.decimals}f', metric.scale)}"
 
 
 def _basis(found: Difference) -> str:

@@ -12,9 +12,10 @@ from doc_blocks import ROOT, blocks_of
 import suave_des
 from suave_des import __version__, run_mission
 from suave_des.campaign.results import SUMMARY_COLUMNS
-from suave_des.records.metrics import COLUMNS
+from suave_des.records.metrics import COLUMNS, METRICS
 from suave_des.records.mission_folder import EVENT_COLUMNS, TRAJECTORY_COLUMNS
 from suave_des.records.runs import suave_pieces
+from suave_des.scenario.models import FURTHER_METRICS
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
@@ -54,6 +55,12 @@ def unit(column):
 )
 def test_columns_are_those_of_the_file(page, heading, names):
     assert columns(section(page, heading)) == [(column, unit(column)) for column in names]
+
+
+def test_every_further_metric_has_a_column_and_can_be_compared():
+    rows = tables(section(CSV_PAGE, "runs.csv"))[1]
+    assert {name.strip("`") for name, *_ in rows} == {*FURTHER_METRICS, "requirement_NAME"}
+    assert {*FURTHER_METRICS} <= METRICS.keys()
 
 
 @pytest.mark.parametrize(("revision", "place"), [("2023", 0), ("1.5", 1)])

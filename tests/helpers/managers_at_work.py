@@ -31,6 +31,9 @@ class AskedModes:
     def available_modes(self, function: str) -> tuple[str, ...]:
         return MODES.modes(function)
 
+    def current_mode(self, function: str) -> str | None:
+        return next((mode for asked, mode in reversed(self.asked) if asked == function), None)
+
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
         self.asked.append((function, mode))
         return mode in MODES.modes(function)

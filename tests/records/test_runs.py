@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import InputError
+from suave_des.records.metrics import METRICS, metric_of
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
 
@@ -231,3 +232,8 @@ def test_a_number_that_no_sweep_has_is_text_in_a_further_column_and_an_error_in_
 def test_a_word_that_is_neither_true_nor_false_is_named(write):
     with pytest.raises(InputError, match="pipeline_found: expected True or False, got 'maybe'"):
         read_runs(write("runs.csv", f"{OWN},pipeline_found\nnone,20,1,maybe\n"))
+
+
+def test_a_metric_of_which_one_direction_is_better_has_the_words_to_say_so():
+    metrics = [*METRICS.values(), metric_of("requirement_depth")]
+    assert all(each.less and each.more and each.most for each in metrics if each.better)
