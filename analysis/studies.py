@@ -27,7 +27,8 @@ SEED = 1
 FEW = 500
 """Missions that are done in this process before others have started."""
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
-COLOURS = {"none": style.GREY, "random": style.ORANGE, "metacontrol": style.BLUE, "bt": style.GREEN}
+_MANAGERS = ("none", "random", "metacontrol", "bt")
+COLOURS = {name: style.line(look)["color"] for name, look in zip(_MANAGERS, style.looks(_MANAGERS), strict=True)}
 
 
 @dataclass(frozen=True)

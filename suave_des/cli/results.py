@@ -186,9 +186,10 @@ class FigureKind(StrEnum):
     DISTRIBUTIONS = "distributions"
     RAINCLOUD = "raincloud"
     DETECTIONS = "detections"
-    CONVERGENCE = "convergence"
+    DIFFERENCES = "differences"
     REACTIONS = "reactions"
     SWEEP = "sweep"
+    HEATMAP = "heatmap"
     PATHS = "paths"
 
 
@@ -201,7 +202,7 @@ def figure(
         FigureKind,
         typer.Option(
             help="For a mission: map, timeline; for several: paths; for a campaign: distributions, raincloud,"
-            " detections, convergence, reactions; for a sweep: sweep."
+            " detections, differences, reactions; for a sweep: sweep, heatmap."
         ),
     ] = FigureKind.AUTO,
     parameters: Annotated[

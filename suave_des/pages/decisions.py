@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.explain import LEFT_OUT, verdicts
@@ -30,108 +30,47 @@ from suave_des.scenario_knowledge import open_base, read_base
 _TIME_DIGITS = 2
 
 
-@dataclass(frozen=True)
-class Step:
-    """How a fact follows, as the page shows it; see Derivation."""
-
-    fact: str
-    source: str
-    rule: str | None = None
-    bindings: tuple[tuple[str, str], ...] = ()
-    because: tuple[Step, ...] = ()
+Plain = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Design:
-    """A function design in a decision.
-
-    Attributes:
-        name: of the design.
-        verdict: "chosen", "left out" or "not the best".
-        performance: that the knowledge base expects of it.
-        reason: why it is left out; empty for the others.
-    """
-
-    name: str
-    verdict: str
-    performance: float
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class FunctionDecision:
-    """A decision about a function: the design grounded before and the one chosen, why, and all designs."""
-
-    function: str
-    before: str | None
-    chosen: str | None
-    reason: str
-    designs: tuple[Design, ...]
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """A reasoning cycle.
-
-    Attributes:
-        t_s: mission time at which it began.
-        objectives: status of each function's objective; None while all is well.
-        groundings: design in use, by function.
-        components: status of each component that has reported one.
-        measured: value of each quality attribute.
-        inferred: index in `Cycles.inferences` of what followed; -1: nothing.
-        decided: what was decided.
-    """
-
-    t_s: float
-    objectives: Mapping[str, str | None]
-    groundings: Mapping[str, str]
-    components: Mapping[str, str]
-    measured: Mapping[str, float]
-    inferred: int
-    decided: tuple[FunctionDecision, ...]
-
-
-@dataclass(frozen=True)
-class Inferred:
-    """What followed in a state, with its derivations as they were at one time."""
-
-    t_s: float
-    facts: tuple[Step, ...]
-
-
-@dataclass(frozen=True)
-class Cycles:
-    """All reasoning cycles of a mission.
-
-    Attributes:
-        cycles: in order of time.
-        inferences: what followed in them, each kind of situation once.
-        rules: text of each rule that took part.
-        note: why some of it is missing or may differ from what the mission saw; empty: nothing is.
-    """
-
-    cycles: tuple[Cycle, ...] = ()
-    inferences: tuple[Inferred, ...] = ()
-    rules: Mapping[str, str] = field(default_factory=dict)
-    note: str = ""
-
-
-def explain_cycles(mission: Recorded) -> Cycles:
-    """Reason about the recorded states again, and explain what follows and what is decided.
+def explain_cycles(mission: Recorded) -> Plain:
+    """Reason about a mission's recorded states again, and explain what follows and what is decided.
 
     Where the ontologies are not there any more, only the states are given, with a note.
+
+    Returns:
+        Plain data for the page. cycles: in order of time, with t_s, objectives (status by function; None while all is
+        well), groundings (design in use by function), components (status of each that reported one), measured (value of
+        each quality attribute), inferred (index of what followed; -1: nothing) and decided (function, design before and
+        chosen, reason, and all designs with name, verdict, expected performance, and the reason why one is left out).
+        inferences: what followed, each kind of situation once, with t_s and facts (fact, source, rule, bindings, and
+        because of which facts). rules: text of each rule that took part. note: why some of it is missing, or empty.
     """
+    cycles: list[Plain] = []
+    known: Plain = {"cycles": cycles, "inferences": [], "rules": {}, "note": ""}
     if not mission.record.knowledge:
-        return Cycles()
+        return known
     try:
         base, note = _base(mission)
         settings, reasoner = ManagingSettings.of(mission.scenario), mission.scenario.knowledge.reasoner
         knowledge = KnowledgeBase.of(base, settings, reasoner, TimeLimit(TIME_LIMIT_S, "the reasoner"))
     except InputError as error:
-        cycles = tuple(_cycle(record, -1, ()) for record in mission.record.knowledge)
-        return Cycles(cycles, note=f"Decisions are not explained: {error}")
-    return _Explainer(knowledge).cycles(mission, note)
+        cycles += [_cycle(record, -1, []) for record in mission.record.knowledge]
+        return known | {"note": f"Decisions are not explained: {error}"}
+    explainer = _Explainer(knowledge)
+    for record in mission.record.knowledge:
+        try:
+            reasoning = knowledge.infer(record.state)
+            cycles.append(_cycle(record, explainer.inferred(record.t_s, reasoning), list(explainer.decided(reasoning))))
+        except KnowledgeError as error:
+            note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
+            cycles.append(_cycle(record, -1, []))
+    rules = {
+        rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
+        for rule in knowledge.base.content.enabled_rules
+        if rule.name in explainer.rules
+    }
+    return known | {"inferences": explainer.inferences, "rules": rules, "note": note}
 
 
 def _base(mission: Recorded) -> tuple[Ontology, str]:
@@ -155,29 +94,11 @@ class _Explainer:
 
     def __init__(self, knowledge: KnowledgeBase) -> None:
         self.knowledge = knowledge
-        self.inferences: list[Inferred] = []
+        self.inferences: list[Plain] = []
         self.index: dict[object, int] = {}
         self.rules: set[str] = set()
 
-    def cycles(self, mission: Recorded, note: str) -> Cycles:
-        cycles = []
-        for record in mission.record.knowledge:
-            try:
-                reasoning = self.knowledge.infer(record.state)
-                inferred, decided = self._inferred(record.t_s, reasoning), tuple(self._decided(reasoning))
-            except KnowledgeError as error:
-                note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
-                inferred, decided = -1, ()
-            cycles.append(_cycle(record, inferred, decided))
-        base = self.knowledge.base
-        texts = {
-            rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
-            for rule in base.content.enabled_rules
-            if rule.name in self.rules
-        }
-        return Cycles(tuple(cycles), tuple(self.inferences), texts, note)
-
-    def _inferred(self, t_s: float, reasoning: Reasoning) -> int:
+    def inferred(self, t_s: float, reasoning: Reasoning) -> int:
         """The index of what follows; the numbers in its derivations are those of the first such cycle."""
         facts, state = reasoning.inference.facts, reasoning.inference.state
         if not facts:
@@ -188,40 +109,52 @@ class _Explainer:
             derived = self.knowledge.explain(state).facts
             for derivation in derived:
                 self.rules |= derivation.rules()
-            self.inferences.append(Inferred(t_s, tuple(map(_step, derived))))
+            self.inferences.append({"t_s": t_s, "facts": list(map(_step, derived))})
         return self.index[key]
 
-    def _decided(self, reasoning: Reasoning) -> Iterator[FunctionDecision]:
-        base, inference = self.knowledge.base, reasoning.inference
+    def decided(self, reasoning: Reasoning) -> Iterator[Plain]:
+        inference = reasoning.inference
         for decision in reasoning.plan.decisions:
-            designs = []
-            for each in verdicts(base, reasoning, decision):
-                expected = float(performance(inference, each.design))
-                designs.append(
-                    Design(each.design, each.verdict, expected, each.reason if each.verdict == LEFT_OUT else "")
-                )
-            designs.sort(key=lambda each: (-each.performance, each.name))
-            before = inference.state.grounded(decision.function)
-            yield FunctionDecision(decision.function, before, decision.design, decision.reason, tuple(designs))
+            designs: list[Plain] = [
+                {
+                    "name": each.design,
+                    "verdict": each.verdict,
+                    "performance": float(performance(inference, each.design)),
+                    "reason": each.reason if each.verdict == LEFT_OUT else "",
+                }
+                for each in verdicts(self.knowledge.base, reasoning, decision)
+            ]
+            designs.sort(key=lambda each: (-each["performance"], each["name"]))
+            yield {
+                "function": decision.function,
+                "before": inference.state.grounded(decision.function),
+                "chosen": decision.design,
+                "reason": decision.reason,
+                "designs": designs,
+            }
 
 
-def _cycle(record: KnowledgeRecord, inferred: int, decided: Sequence[FunctionDecision]) -> Cycle:
+def _cycle(record: KnowledgeRecord, inferred: int, decided: Sequence[Plain]) -> Plain:
     state = record.state
-    return Cycle(
-        t_s=round(record.t_s, _TIME_DIGITS),
-        objectives={each.function: each.status for each in state.objectives},
-        groundings=dict(state.groundings),
-        components=dict(state.components),
-        measured={name: round(float(value), 3) for name, value in state.measurements},
-        inferred=inferred,
-        decided=tuple(decided),
-    )
+    return {
+        "t_s": round(record.t_s, _TIME_DIGITS),
+        "objectives": {each.function: each.status for each in state.objectives},
+        "groundings": dict(state.groundings),
+        "components": dict(state.components),
+        "measured": {name: round(float(value), 3) for name, value in state.measurements},
+        "inferred": inferred,
+        "decided": decided,
+    }
 
 
-def _step(derivation: Derivation) -> Step:
-    bindings = tuple((name, _shown(value)) for name, value in derivation.bindings)
-    because = tuple(map(_step, derivation.premises))
-    return Step(str(derivation.fact), derivation.source, derivation.rule, bindings, because)
+def _step(derivation: Derivation) -> Plain:
+    return {
+        "fact": str(derivation.fact),
+        "source": derivation.source,
+        "rule": derivation.rule,
+        "bindings": [(name, _shown(value)) for name, value in derivation.bindings],
+        "because": list(map(_step, derivation.premises)),
+    }
 
 
 def _shown(value: object) -> str:
@@ -241,30 +174,26 @@ def adaptation_rules(record: MissionRecord) -> Rules:
     known = explain_cycles(recorded(record))
     found = {}
     for each in adaptations(record):
-        cycle = _decided_in(known.cycles, each.t_s, each.function, each.after)
-        if cycle is not None and cycle.inferred >= 0:
-            found[each.t_s, each.function] = _rules(known, cycle, each.function, each.before)
+        cycle = _decided_in(known["cycles"], each.t_s, each.function, each.after)
+        if cycle is not None and cycle["inferred"] >= 0:
+            words = each.before.removeprefix("fd_"), each.function.removeprefix("f_")
+            facts = known["inferences"][cycle["inferred"]]["facts"]
+            steps = [step for step in facts if any(word in step["fact"] for word in words)]
+            found[each.t_s, each.function] = tuple(dict.fromkeys(rule for step in steps for rule in _rules_of(step)))
     return found
 
 
-def _decided_in(cycles: Sequence[Cycle], t_s: float, function: str, design: str) -> Cycle | None:
+def _decided_in(cycles: Sequence[Plain], t_s: float, function: str, design: str) -> Plain | None:
     """Return the last cycle before a time that chose a design for a function in place of another."""
-
-    def chose(cycle: Cycle) -> bool:
-        return any(each.function == function and each.before != each.chosen == design for each in cycle.decided)
-
-    return next((cycle for cycle in reversed(cycles) if cycle.t_s <= t_s and chose(cycle)), None)
-
-
-def _rules(known: Cycles, cycle: Cycle, function: str, before: str) -> tuple[str, ...]:
-    """Return the rules behind what was inferred of a function's objective or of the design that it had."""
-    words = before.removeprefix("fd_"), function.removeprefix("f_")
-    steps = [step for step in known.inferences[cycle.inferred].facts if any(word in step.fact for word in words)]
-    return tuple(dict.fromkeys(rule for step in steps for rule in _rules_of(step)))
+    for cycle in reversed(cycles):
+        for each in cycle["decided"] if cycle["t_s"] <= t_s else ():
+            if each["function"] == function and each["before"] != each["chosen"] == design:
+                return cycle
+    return None
 
 
-def _rules_of(step: Step) -> Iterator[str]:
-    for premise in step.because:
+def _rules_of(step: Plain) -> Iterator[str]:
+    for premise in step["because"]:
         yield from _rules_of(premise)
-    if step.rule is not None:
-        yield step.rule
+    if step["rule"] is not None:
+        yield step["rule"]

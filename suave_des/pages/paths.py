@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas
@@ -22,75 +22,49 @@ _TOLERANCE_S = 1e-3
 _EVENTS = ("mode_requested", "component_status", "pipeline_detected")
 
 
-@dataclass(frozen=True)
-class MissionPath:
-    """The way of one mission.
-
-    Attributes:
-        group: number of its group of missions.
-        run: number of the run.
-        t_s: times; x_m, y_m: where it was; altitude_m: above the sea bed; visibility_m: as measured.
-        modes: times at which the mode of the function that moves it changed, with its name.
-        events: times of mode requests, component reports and the first sight, with their detail.
-    """
-
-    group: int
-    run: int
-    t_s: Sequence[float]
-    x_m: Sequence[float]
-    y_m: Sequence[float]
-    altitude_m: Sequence[float]
-    visibility_m: Sequence[float | None]
-    modes: Sequence[tuple[float, str]]
-    events: Sequence[tuple[float, str, str]]
+def no_paths(note: str) -> dict[str, Any]:
+    """Return what paths_of does where there are none, with a note why."""
+    return {"pipeline": [], "paths": [], "note": note}
 
 
-@dataclass(frozen=True)
-class Paths:
-    """Paths of some missions.
-
-    Attributes:
-        pipeline: vertices, x and y in m.
-        paths: in the order of groups and runs.
-        note: why there are none, or fewer; empty: there are.
-    """
-
-    pipeline: Sequence[tuple[float, float]] = ()
-    paths: Sequence[MissionPath] = ()
-    note: str = ""
-
-
-def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Paths:
+def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> dict[str, Any]:
     """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
 
     `groups` are managers in the order of the page's groups; `runs` is how many runs of each: 0 for none.
+
+    Returns:
+        pipeline: vertices, x and y in m; paths: in the order of groups and runs; note: why there are none, or empty. A
+        path has group (its number), run, t_s, x_m, y_m, altitude_m (above the sea bed), visibility_m (as measured),
+        modes (times at which the mode of the function that moves it changed, with its name), and events (times of mode
+        requests, component reports and the first sight, with kind and detail).
     """
     if runs == 0:
-        return Paths(note="Paths and timelines are left out; suave-des report --paths N adds those of N runs")
+        return no_paths("Paths and timelines are left out; suave-des report --paths N adds those of N runs")
     try:
         opened = opened_campaign(folder)
         vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
         paths = list(_paths(opened, frame, groups, runs))
-        return Paths(vertices, paths, "" if paths else "No mission could be run again as it was")
     except SuaveDesError as error:
-        return Paths(note=f"Paths and timelines are left out: {getattr(error, 'problem', error)}")
+        return no_paths(f"Paths and timelines are left out: {getattr(error, 'problem', error)}")
+    note = "" if paths else "No mission could be run again as it was"
+    return {"pipeline": vertices, "paths": paths, "note": note}
 
 
-def _paths(opened: MissionRunner, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Iterator[MissionPath]:
-    wanted = representative_runs(frame, groups, runs)
+def _paths(
+    opened: MissionRunner, frame: pandas.DataFrame, groups: Sequence[str], runs: int
+) -> Iterator[dict[str, Any]]:
     known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
+    is_swept = opened.campaign.variation.sweep.points > 1
     for number, manager in enumerate(groups):
-        for run in wanted:
+        for run in _representative_runs(frame, groups, runs):
             if (manager, run) in known.index:
                 _, result = opened.run(manager, run)
-                is_same = opened.campaign.variation.sweep.points > 1 or (
-                    abs(result.metrics.search_time_s - float(known[manager, run])) < _TOLERANCE_S
-                )
-                if is_same:
-                    yield _path(number, run, result)
+                off_s = result.metrics.search_time_s - float(known[manager, run])
+                if is_swept or abs(off_s) < _TOLERANCE_S:
+                    yield {"group": number, "run": run, **_path(result)}
 
 
-def representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
+def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
     """Choose runs to look at: those in which each manager was quickest, in the middle and slowest, and the first."""
     chosen: dict[int, None] = {}
     for manager in groups:
@@ -102,19 +76,17 @@ def representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: in
     return sorted(list(chosen)[:runs])
 
 
-def _path(group: int, run: int, result: MissionResult) -> MissionPath:
+def _path(result: MissionResult) -> dict[str, Any]:
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]
     x_m, y_m, altitude_m = np.round([(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2).T.tolist()
-    return MissionPath(
-        group,
-        run,
-        [round(each.t_s, 1) for each in some],
-        x_m,
-        y_m,
-        altitude_m,
-        [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
-        [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
-        [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
-    )
+    return {
+        "t_s": [round(each.t_s, 1) for each in some],
+        "x_m": x_m,
+        "y_m": y_m,
+        "altitude_m": altitude_m,
+        "visibility_m": [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
+        "modes": [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
+        "events": [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
+    }

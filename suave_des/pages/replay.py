@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any, Final
 
@@ -12,7 +11,7 @@ from suave_des import __version__
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.managed.follow import InspectionPath
 from suave_des.monitor.diagnostics import FAILED
-from suave_des.pages.decisions import Cycles, explain_cycles
+from suave_des.pages.decisions import explain_cycles
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
 from suave_des.results.mission import adaptations, details, mode_spans
@@ -22,38 +21,6 @@ from suave_des.world.pipeline import sample_points
 _DECIMALS: Final = 3
 STYLES: Final = ("common.css", "replay.css")
 SCRIPTS: Final = ("common.js", "scene_geometry.js", "scene.js", "views.js", "panel.js", "replay.js")
-
-
-@dataclass(frozen=True)
-class MissionOnPage:
-    """A mission as the replay plays it; times in s, lengths in m.
-
-    Attributes:
-        name: scenario, manager, run and seed.
-        metrics: its row of runs.csv.
-        track: columns of trajectory.csv.
-        modes: by function: times at which modes took effect, with their names.
-        thrusters: times at which thrusters were reported, with their number from 1 and whether they work.
-        adaptations: times at which the mode of a function in use changed.
-        events: time, source, event and detail.
-        inspected: times at which points of the way along the pipeline were reached, with the point's number and the
-            distance until then.
-        way: that way, from the point seen first: x and y of each point.
-        seen: time of the first sight, x and y of the point; None: the pipeline was not found.
-        cycles: reasoning cycles.
-    """
-
-    name: str
-    metrics: Mapping[str, Any]
-    track: Mapping[str, Sequence[Any]]
-    modes: Mapping[str, Sequence[tuple[float, str]]]
-    thrusters: Sequence[tuple[float, int, bool]]
-    adaptations: Sequence[float]
-    events: Sequence[tuple[float, str, str, str]]
-    inspected: Sequence[tuple[float, int, float]]
-    way: Sequence[tuple[float, float]]
-    seen: tuple[float, float, float] | None
-    cycles: Cycles
 
 
 def replay_page(missions: Sequence[Recorded]) -> str:
@@ -78,14 +45,23 @@ def replay_page(missions: Sequence[Recorded]) -> str:
             "thrusters": len(THRUSTER_NAMES),
             "station": _station(scenario),
         },
-        "missions": [asdict(mission_on_page(each)) for each in missions],
+        "missions": [mission_on_page(each) for each in missions],
     }
     title = " and ".join(dict.fromkeys(each.record.name for each in missions))
     return page("replay.html", f"Replay: {title}", content, STYLES, SCRIPTS)
 
 
-def mission_on_page(mission: Recorded) -> MissionOnPage:
-    """Prepare a mission for the page."""
+def mission_on_page(mission: Recorded) -> dict[str, Any]:
+    """Return a mission as the page plays it; times in s, lengths in m.
+
+    Returns:
+        name: scenario, manager, run and seed; metrics: its row of runs.csv; track: columns of trajectory.csv; modes: by
+        function, times at which they took effect, with their names; thrusters: times of reports, with the number from 1
+        and whether it works; adaptations: their times; events: time, source, event and detail; inspected: times at
+        which points of the way along the pipeline were reached, with the point's number and the distance until then;
+        way: that way from the point seen first, x and y; seen: time, x and y of the first sight, or None; cycles: see
+        explain_cycles.
+    """
     record, metrics = mission.record, mission.record.metrics
     modes = {function: [(span.begin_s, span.what) for span in spans] for function, spans in mode_spans(record).items()}
     thrusters: list[tuple[float, int, bool]] = []
@@ -97,19 +73,19 @@ def mission_on_page(mission: Recorded) -> MissionOnPage:
     events = record.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
     x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))
-    return MissionOnPage(
-        name=record.name,
-        metrics=metrics,
-        track={str(name): _rounded(values.tolist()) for name, values in record.trajectory.items()},
-        modes=modes,
-        thrusters=thrusters,
-        adaptations=sorted({each.t_s for each in adaptations(record)}),
-        events=[(round(t_s, 2), *words) for t_s, *words in events],
-        inspected=_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
-        way=[] if way is None else [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y, _ in way.points_m.tolist()],
-        seen=None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
-        cycles=explain_cycles(mission),
-    )
+    return {
+        "name": record.name,
+        "metrics": metrics,
+        "track": {str(name): _rounded(values.tolist()) for name, values in record.trajectory.items()},
+        "modes": modes,
+        "thrusters": thrusters,
+        "adaptations": sorted({each.t_s for each in adaptations(record)}),
+        "events": [(round(t_s, 2), *words) for t_s, *words in events],
+        "inspected": _inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
+        "way": [] if way is None else way.points_m[:, :2].round(_DECIMALS).tolist(),
+        "seen": None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
+        "cycles": explain_cycles(mission),
+    }
 
 
 def _station(scenario: Scenario) -> list[float] | None:

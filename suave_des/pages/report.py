@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -17,7 +17,7 @@ import pandas
 from suave_des import __version__
 from suave_des.errors import InputError
 from suave_des.pages.page import compressed, page
-from suave_des.pages.paths import Paths, paths_of
+from suave_des.pages.paths import no_paths, paths_of
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.store import read_manifest
 from suave_des.results.assisted import compare_assisted
@@ -40,88 +40,7 @@ _CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
 """Metrics in charts."""
 
 
-PlainTable = tuple[Sequence[str], Sequence[Sequence[str]]]
-"""Headings and rows."""
-
-
-@dataclass(frozen=True)
-class Section:
-    """Tables of one metric, as headings and rows of text.
-
-    Attributes:
-        title: metric with its unit.
-        tables: each with a title, which may be empty.
-        conclusions: what follows from each difference.
-    """
-
-    title: str
-    tables: Sequence[tuple[str, PlainTable]]
-    conclusions: Sequence[str]
-
-
-@dataclass(frozen=True)
-class ChartColumns:
-    """Missions as columns, for the page's charts.
-
-    Attributes:
-        groups: names of the groups of missions, as the tables have them.
-        looks: number of the look of each group, the same as in figures.
-        titles: of the metrics, by column.
-        columns: group number, run, seed, and each metric and swept parameter; None where there is no value.
-        swept: names of the swept parameters.
-        every: 1, or n if only each nth run is there.
-        missions: of all groups.
-        is_paired: whether runs of the same seed and number share their random numbers.
-    """
-
-    groups: Sequence[str]
-    looks: Sequence[int]
-    titles: Mapping[str, str]
-    columns: Mapping[str, Sequence[Any]]
-    swept: Sequence[str]
-    every: int
-    missions: int
-    is_paired: bool
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """How a campaign was made.
-
-    Attributes:
-        folder: its folder, as given.
-        facts: name and value of what decides its results.
-        command: that repeats it; empty: not known.
-        inputs: SHA-256 of each input file.
-        versions: of the software.
-    """
-
-    folder: str
-    facts: Sequence[tuple[str, str]] = ()
-    command: str = ""
-    inputs: Mapping[str, str] = field(default_factory=dict)
-    versions: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class ReportContent:
-    """All that a report shows of results.
-
-    Attributes:
-        conclusion: in one sentence.
-        notes: what a reader should know of the data.
-        sections: tables by metric.
-        needed: how many runs an interval needs; None without a comparison.
-        remarks: how it was compared.
-        drawn: the missions.
-    """
-
-    conclusion: str
-    notes: Sequence[str]
-    sections: Sequence[Section]
-    needed: PlainTable | None
-    remarks: Sequence[str]
-    drawn: ChartColumns
+_FACTS: Final = ("scenario", "managers", "runs", "seed", "reasoner", "machine")
 
 
 def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[Path, Path] | None = None) -> str:
@@ -137,10 +56,10 @@ def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[P
     """
     library = plotly_script()
     missions = read_missions(folders)
-    results = results_of(missions)
+    results = _results(missions)
     if assisted_by is not None:
-        results = replace(results, sections=[*_assisted(folders, *assisted_by), *results.sections])
-    ways = Paths(note="Paths and timelines are in the report of one campaign's folder only")
+        results["sections"] = [*_assisted(folders, *assisted_by), *results["sections"]]
+    ways = no_paths("Paths and timelines are in the report of one campaign's folder only")
     if len(folders) == 1 and folders[0].is_dir() and missions.frame["run"].notna().all():
         managers = list(dict.fromkeys(missions.frame["manager"]))
         fitting = max(1, min(runs, _MOST_WAYS // len(managers))) if runs else 0
@@ -151,9 +70,9 @@ def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[P
         "version": __version__,
         "title": ", ".join(scenarios) or ", ".join(str(folder) for folder in folders),
         "folders": [str(folder) for folder in folders],
-        "made": [asdict(provenance_of(folder)) for folder in folders],
-        "results": asdict(results),
-        "ways": asdict(ways),
+        "made": [_made(folder) for folder in folders],
+        "results": results,
+        "ways": ways,
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
     check_page_size(text, LIMIT_BYTES)
@@ -187,58 +106,80 @@ def check_page_size(text: str, limit_bytes: int) -> None:
         raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
 
 
-def results_of(missions: Missions) -> ReportContent:
-    """Compare missions, and prepare them for the page.
+def _results(missions: Missions) -> dict[str, Any]:
+    """Compare missions, and prepare what follows for the page.
 
     Raises:
         InputError: they cannot be compared.
     """
     found = compare(missions)
-    needed = _plain_table(found.runs_needed()) if found.differences else None
-    sections = [
-        Section(capital(title), [(table.title, _plain_table(table)) for table in tables], conclusions)
-        for title, tables, conclusions in found.sections()
-    ]
-    return ReportContent(found.conclusion, found.notes, sections, needed, found.remarks(), chart_columns(missions))
+    most, replay = found.largest_differences()
+    return {
+        "conclusion": found.conclusion,
+        "notes": found.notes,
+        "sections": [_section(capital(title), tables, conclusions) for title, tables, conclusions in found.sections()],
+        "needed": _plain_table(found.runs_needed()) if found.differences else None,
+        "largest": (capital(most.title), _plain_table(most), replay),
+        "remarks": found.remarks(),
+        "drawn": chart_columns(missions),
+    }
 
 
-def _assisted(real: Sequence[Path], same: Path, population: Path) -> Iterator[Section]:
+def _assisted(real: Sequence[Path], same: Path, population: Path) -> Iterator[dict[str, Any]]:
     """Yield a section for each metric of real missions that simulated ones assist."""
     found = compare_assisted(real, same, population)
     for metric, table in zip(found.metrics, found.tables(), strict=True):
         own = found.estimates[found.estimates["metric"] == metric.name]
+        remarks = found.remarks() if metric == found.metrics[-1] else []  # of all metrics, said once
         title = f"{table.title}, real missions assisted by simulated ones"
-        yield Section(title, [("", _plain_table(table))], [*own["conclusion"], *found.remarks()])
+        yield _section(title, [replace(table, title="")], [*own["conclusion"], *remarks])
 
 
-def _plain_table(table: Table) -> PlainTable:
+def _section(title: str, tables: Sequence[Table], conclusions: Sequence[str]) -> dict[str, Any]:
+    return {"title": title, "tables": [(each.title, _plain_table(each)) for each in tables], "conclusions": conclusions}
+
+
+def _plain_table(table: Table) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
     return table.headings, table.rows
 
 
-def chart_columns(missions: Missions) -> ChartColumns:
-    """Put missions into columns, at most MOST_DRAWN of them."""
+def chart_columns(missions: Missions) -> dict[str, Any]:
+    """Put missions into columns for the page's charts, at most MOST_DRAWN of them.
+
+    Returns:
+        groups: their names, as the tables have them, and the numbers of their looks, as in figures; titles of the
+        metrics by column; columns: group number, run, seed, and each metric and swept parameter, None where there is no
+        value; swept: names of parameters; every: 1, or n if only each nth run is there; missions: how many there are;
+        is_paired: whether runs of the same seed and number share their random numbers.
+    """
     groups, _ = grouped(missions)
-    numbers = missions.frame.groupby(["manager", "source"], sort=False).ngroup()  # as grouped() orders them
     frame = missions.frame
+    numbers = frame.groupby(["manager", "source"], sort=False).ngroup()  # as grouped() orders them
     every = max(1, math.ceil(len(frame) / MOST_DRAWN))
     has_runs = bool(frame["run"].notna().all())
     if every > 1:
         place = frame["run"] if has_runs else pandas.Series(range(len(frame)), frame.index)
         frame = frame[(place % every) == (1 if has_runs else 0)]
-    columns: dict[str, list[Any]] = {"group": numbers[frame.index].tolist()}
-    columns["run"] = _plain(frame["run"]) if has_runs else list(range(1, len(frame) + 1))
-    columns["seed"] = frame["seed"].astype(str).tolist()
-    if len(set(columns["seed"])) == 1:
-        columns["seed"] = columns["seed"][:1]
-    known = [name for name in _CHARTED if name in frame and frame[name].notna().any()]
-    titles = {name: METRICS[name].heading for name in known}
-    found = frame["pipeline_found"].astype(float)
-    columns["found"] = [None if value != value else int(value) for value in found.tolist()]
-    for name in (*titles, *missions.swept):
-        columns[name] = _plain(frame[name])
-    is_paired = has_runs and bool((frame["seed"] != "").all()) and len(groups) > 1
+    seeds = frame["seed"].astype(str).tolist()
+    columns = {
+        "group": numbers[frame.index].tolist(),
+        "run": _plain(frame["run"]) if has_runs else list(range(1, len(frame) + 1)),
+        "seed": seeds[:1] if len(set(seeds)) == 1 else seeds,
+        "found": _plain(frame["pipeline_found"].astype(float)),
+    }
+    titles = {name: METRICS[name].heading for name in _CHARTED if name in frame and frame[name].notna().any()}
+    columns |= {name: _plain(frame[name]) for name in (*titles, *missions.swept)}
     names = [each.name for each in groups]
-    return ChartColumns(names, looks(names), titles, columns, missions.swept, every, len(missions.frame), is_paired)
+    return {
+        "groups": names,
+        "looks": looks(names),
+        "titles": titles,
+        "columns": columns,
+        "swept": missions.swept,
+        "every": every,
+        "missions": len(missions.frame),
+        "is_paired": has_runs and bool((frame["seed"] != "").all()) and len(groups) > 1,
+    }
 
 
 def _plain(column: pandas.Series) -> list[Any]:
@@ -249,23 +190,23 @@ def _plain(column: pandas.Series) -> list[Any]:
     return [None if not math.isfinite(value) else int(value) if value.is_integer() else value for value in values]
 
 
-def provenance_of(folder: Path) -> Provenance:
+def _made(folder: Path) -> dict[str, Any]:
     """Read how the campaign in a folder was made; little is known of other folders."""
+    known: dict[str, Any] = {"folder": str(folder), "facts": [], "command": "", "inputs": {}, "versions": {}}
     try:
         manifest = read_manifest(folder)
-        return Provenance(
-            str(folder),
-            list(_facts(manifest)),
-            shlex.join(map(str, manifest.get("command", ()))),
-            dict(manifest.get("inputs_sha256", {})),
-            dict(manifest.get("versions", {})),
-        )
+        return known | {
+            "facts": list(_facts(manifest)),
+            "command": shlex.join(map(str, manifest.get("command", ()))),
+            "inputs": dict(manifest.get("inputs_sha256", {})),
+            "versions": dict(manifest.get("versions", {})),
+        }
     except (InputError, ValueError, AttributeError, TypeError):
-        return Provenance(str(folder))
+        return known
 
 
 def _facts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for key in ("scenario", "managers", "runs", "seed", "reasoner", "machine"):
+    for key in _FACTS:
         if key in manifest:
             value = manifest[key]
             yield key, ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -151,8 +151,11 @@ class AssistedComparison:
 
     def latex(self) -> str:
         """Write the tables for LaTeX with booktabs."""
-        remarks = [f"% {line}" for line in self.remarks()]
-        return "\n".join([r"% needs \usepackage{booktabs}", *remarks, *(each.latex() for each in self.tables())]) + "\n"
+        tables = list(self.tables())
+        labels = [f"tab:{metric.name}" for metric in self.metrics if len(self.estimates)] + ["tab:plan"]
+        notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
+        parts = [each.latex(label=label, note=note) for each, label, note in zip(tables, labels, notes, strict=False)]
+        return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
 
     def csv(self) -> str:
         """Write the estimates as CSV; without any, the plan."""

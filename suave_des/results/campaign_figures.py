@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +13,19 @@ import numpy as np
 import pandas
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from suave_des.errors import InputError
-from suave_des.estimates import CONFIDENCE, mean_of, percent
+from suave_des.estimates import mean_of, percent
 from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS, SEARCH_TIME
 from suave_des.results import style
-from suave_des.results.missions import Group, Missions, first_alike, runs_sharing_draw, time_limit_s
+from suave_des.results.missions import Group, Missions, first_alike, first_and_last, runs_sharing_draw, time_limit_s
 from suave_des.results.statistics import Sample
 from suave_des.results.style import folded, key_words, value_words
 
@@ -39,10 +40,19 @@ _DOTS = 400
 """More missions are drawn as so many, evenly taken in the order of their values."""
 _DENSITY_BINS = 3_000
 """Values are counted in so many bins before their density is estimated."""
-_CURVE_POINTS = 2_000
-"""A curve over more runs is drawn through so many of them: it looks the same, and is written at once."""
+_EACH_WITH_EACH = 4
+"""More groups have too many pairs for one figure."""
 _FEWEST = 5
-"""Values for a density, or for an interval of a mean."""
+"""Values for a density."""
+_MEAN: dict[str, Any] = {
+    "fmt": "D",
+    "ms": 3,
+    "mfc": "white",
+    "mew": 0.8,
+    "elinewidth": 1.2,
+    "capsize": 2.5,
+    "color": "k",
+}
 _TIME_BIN_S = 5.0
 _LEGEND_SHARE = 0.1
 _FAR_APART = 50.0
@@ -151,47 +161,62 @@ def _jitter(number: int, height: float) -> NDArray[np.floating]:
     return places
 
 
-def draw_convergence(groups: Sequence[Group]) -> style.Picture:
-    """Draw the mean of the first n runs and its 95% interval over n, a curve for each group."""
-    labels = [*map(_label, groups), "95% interval of the mean"]
-    figure = _figure(labels)
-    for axes, metric, title in _metric_panels(figure):
-        for number, group in _looks(groups):
-            frame = group.frame.sort_values("run", kind="stable")
-            n, means, halves = running_means(frame[metric].dropna().to_numpy(float))
-            look = style.line(number)
-            (line,) = axes.plot(n, means, label=_label(group), **look)
-            if len(n) == 1:
-                line.set(marker=style.marker(number), ms=5, clip_on=False)
-            low, high = means - halves, means + halves
-            axes.fill_between(n, low, high, where=n >= _FEWEST, color=look["color"], alpha=0.18, lw=0)
-        shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
-        axes.set(xlabel=f"number of {'draws' if shares else 'runs'}", ylabel=f"mean {title}")
-        axes.set_xlim(left=1.0)
-        axes.set_ylim(bottom=0.0)
-        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
-        axes.xaxis.set_major_formatter("{x:,.0f}")
-    _legend(figure, [*figure.axes[0].lines, Patch(color=style.GREY, alpha=0.3)], labels)
+def draw_differences(groups: Sequence[Group]) -> style.Picture:
+    """Draw the differences between groups run by run: each run, and the mean with its 95% interval.
+
+    With more than four groups each is compared with the first one only.
+
+    Raises:
+        InputError: no two groups have runs that share their random numbers.
+    """
+    pairs = [(one, groups[0]) for one in groups[1:]]
+    if len(groups) <= _EACH_WITH_EACH:
+        pairs = list(combinations(groups, 2))
+    colours = {group.name: style.line(number)["color"] for number, group in _looks(groups)}
+    rows = []
+    for one, other in pairs:
+        parts = [(one.by_run(metric), other.by_run(metric)) for metric in PAPER_METRICS]
+        apart = [(x - y).dropna() for x, y in parts if x is not None and y is not None]
+        if len(apart) == len(parts) and all(map(len, apart)):
+            rows.append((one, other, apart))
+    if not rows:
+        problem = "no two of these have runs that share their random numbers"
+        raise InputError(problem, place="kind", remedy="give campaigns of two managers or more with the same seed")
+    height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
+    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
+    for place, (axes, _, title) in enumerate(_metric_panels(figure, sharey=True)):
+        axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
+        for row, (one, _, apart) in enumerate(rows):
+            _draw_row_of_differences(axes, row, apart[place], colours[one.name], has_numbers=not shares)
+        axes.set_xlabel(f"difference in {title}")
+        axes.margins(x=0.22)
+        axes.grid(axis="y", visible=False)
+    left = figure.axes[0]
+    names = [f"{one.name}\n\N{MINUS SIGN} {other.name} (n = {len(apart[0]):,})" for one, other, apart in rows]
+    left.set_yticks(range(len(rows)), [style.text(folded(name)) for name in names])
+    left.set_ylim(len(rows) - 0.4, -0.6)
+    handles: list[Artist] = [
+        Line2D([], [], lw=1.2, marker="D", ms=3, mfc="white", color=style.BLACK, label="mean, 95% interval"),
+        Line2D([], [], color=style.GREY, marker="o", ms=2.5, lw=0, label="draw" if shares else "run"),
+    ]
+    _legend(figure, handles, [str(handle.get_label()) for handle in handles])
     return figure
 
 
-def running_means(values: Sample) -> tuple[NDArray[np.int_], Sample, Sample]:
-    """Return sample sizes n, the means of the first n values, and half their 95% intervals by Student's t.
-
-    Of many values only some sizes are there, the first and the last among them, as dense at the beginning as a figure
-    over all shows them.
-    """
-    n = np.arange(1, len(values) + 1)
-    off = values - values[0]  # which is rounded less than the values
-    means = np.cumsum(off) / n
-    with np.errstate(divide="ignore", invalid="ignore"):  # one value has no spread
-        variances = np.maximum(np.cumsum(off**2) - n * means**2, 0.0) / (n - 1)
-        halves = stdtrit(n - 1, (1.0 + CONFIDENCE) / 2.0) * np.sqrt(variances / n)
-    shown = n
-    if len(n) > _CURVE_POINTS:
-        half = _CURVE_POINTS // 2
-        shown = np.unique(np.r_[np.geomspace(1, len(n), half), np.linspace(1, len(n), half)].round().astype(int))
-    return shown, values[0] + means[shown - 1], halves[shown - 1]
+def _draw_row_of_differences(
+    axes: Axes, row: int, apart: pandas.Series[float], colour: str, *, has_numbers: bool
+) -> None:
+    values = apart.sort_values(kind="stable").to_numpy()
+    rain = values[np.unique(np.linspace(0, len(values) - 1, _DOTS).astype(int))]
+    axes.plot(rain, row + 0.08 + _jitter(len(rain), 0.24), "o", color=colour, ms=2.4, alpha=0.6, mew=0)
+    found = mean_of(values.tolist())
+    errors = [[found.value - found.low], [found.high - found.value]] if found.has_interval else None
+    axes.errorbar(found.value, row - 0.1, xerr=errors, **_MEAN)
+    sides = (("right", -4), ("left", 4))
+    for (value, run), (side, shift) in zip(first_and_last(apart), sides, strict=True) if has_numbers else ():
+        look: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
+        axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **look)
 
 
 def draw_assisted(found: AssistedComparison) -> style.Picture:
@@ -360,6 +385,8 @@ def _text_width_in(label: str) -> float:
 # Sweeps
 
 _MOST_PARAMETERS, _COLUMNS = 9, 3
+_MOST_CELLS = 10
+"""Values of a parameter in a heat map."""
 _MOST_VALUES = 16
 """A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
 _BINS = 8
@@ -400,11 +427,12 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     height_in = 4.0 * blocks + 0.2 * math.ceil((len(managers) + 1) / 3)
     figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
     panels = figure.subplots(len(PAPER_METRICS) * blocks, columns, sharey="row", squeeze=False)
+    counts: list[int] = []
     for place, parameter in enumerate(parameters):
         block, column = divmod(place, columns)
         for row, metric in enumerate(PAPER_METRICS):
             axes = panels[len(PAPER_METRICS) * block + row, column]
-            _draw_panel(axes, frame, names, parameter, metric)
+            counts += _draw_panel(axes, frame, names, parameter, metric)
             axes.tick_params(labelbottom=row == len(PAPER_METRICS) - 1)
             if column == 0:
                 axes.set_ylabel(f"mean {METRICS[metric].heading}")
@@ -421,7 +449,80 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     labels.append("95% interval of the mean")
     ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
     figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
+    if len(parameters) == len(missions.swept) > 1:
+        write_below(figure, f"{_averaged(counts, ())}, each averaged over the parameters of the other panels")
+    else:
+        write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))
     return figure
+
+
+def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.Picture:
+    """Draw means over two swept parameters as numbers in a grid, a row of panels for each manager.
+
+    Args:
+        missions: of a sweep; other swept parameters are averaged over.
+        parameters: across and up; empty: the two that are swept.
+
+    Raises:
+        InputError: one of them is not swept, there are not two, or their values are too many for numbers.
+    """
+    parameters = list(parameters or missions.swept)
+    missions.check_swept(parameters, "parameters")
+    if len(parameters) != 2:
+        problem = f"a heat map is of two swept parameters, and there are {len(parameters)}: {', '.join(parameters)}"
+        raise InputError(problem, place="parameters", remedy="choose two with --parameters")
+    across, up = parameters
+    frame = missions.frame
+    names = _names(frame)
+    managers = list(dict.fromkeys(names))
+    means = {metric: frame.groupby([names, up, across], sort=False)[metric].mean() for metric in PAPER_METRICS}
+    columns, rows = (list(pandas.unique(frame[name])) for name in (across, up))
+    rows, columns = (sorted(each) if not isinstance(each[0], str) else each for each in (rows, columns))
+    if max(len(rows), len(columns)) > _MOST_CELLS:
+        problem = f"{len(columns)} by {len(rows)} means are too many for numbers"
+        raise InputError(
+            problem, place="parameters", remedy=f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
+        )
+    height = len(managers) * (0.24 * len(rows) + 0.3) + 0.9
+    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
+    for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
+        low, high = means[metric].min(), means[metric].max()
+        for axes, manager in zip(of_metric, managers, strict=True):
+            grid = means[metric][manager].unstack(across).reindex(index=rows, columns=columns)
+            image = axes.imshow(grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
+            for (row, column), value in np.ndenumerate(grid.to_numpy(float)):
+                ink = "white" if value < (low + high) / 2.0 else style.BLACK
+                number = METRICS[metric].number(value) if np.isfinite(value) else ""
+                axes.text(column, row, number, color=ink, ha="center", va="center", fontsize=6.5)
+            axes.set_title(style.text(folded(manager)))
+            axes.grid(visible=False)
+        figure.colorbar(image, ax=of_metric, label=f"mean {METRICS[metric].heading}")
+        of_metric[-1].set_xlabel(_folded(key_words(across)))
+        for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
+            axis.set_ticks(range(len(values)), [_folded(style.text(_value_text(each)), 14) for each in values])
+    for axes in panels[:, 0]:
+        axes.set_ylabel(_folded(key_words(up)))
+    counts = frame.groupby([names, up, across])["run"].nunique().tolist()
+    others = [name for name in missions.swept if name not in parameters]
+    write_below(figure, _averaged(counts, others))
+    return figure
+
+
+def _value_text(value: object) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else value_words(value)
+
+
+def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:
+    """Say of how many runs means are, and what they are averaged over besides."""
+    low, high = min(counts), max(counts)
+    of = f"means of n = {low if low == high else f'{low} to {high}'} run{'s' * (high > 1)}"
+    return f"{of}, each averaged over {', '.join(map(key_words, others))}" if others else of
+
+
+def write_below(figure: Figure, text: str) -> None:
+    """Write what a figure shows below it."""
+    figure.supxlabel(fill(text, int(16 * figure.get_figwidth())), fontsize=7.5, color="#555555")
 
 
 def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
@@ -431,14 +532,18 @@ def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
     return frame["manager"]
 
 
-def _draw_panel(axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], parameter: str, metric: str) -> None:
+def _draw_panel(
+    axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], parameter: str, metric: str
+) -> list[int]:
+    """Draw the means of each manager over a parameter, and return of how many runs they are."""
+    counts = []
     places, words = _places(frame[parameter])
     apart = _APART * float(places.max() - places.min())
     managers = list(dict.fromkeys(names))
     for place, (number, manager) in enumerate(zip(style.looks(managers), managers, strict=True)):
         own = names == manager
         beside = (place - (len(managers) - 1) / 2) * apart
-        _draw_means(axes, frame[own].assign(place=places[own]), metric, beside, number, manager)
+        counts += _draw_means(axes, frame[own].assign(place=places[own]), metric, beside, number, manager)
     if words:
         shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
         long = max(map(len, words)) > 6 and len(words) > 2
@@ -448,6 +553,7 @@ def _draw_panel(axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], 
         axes.set_xticks(values, [f"{value:g}" for value in values])
     else:
         axes.xaxis.set_major_locator(MaxNLocator(4))
+    return counts
 
 
 def _fit_as_ticks(values: Sample) -> bool:
@@ -463,17 +569,18 @@ def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
     return pandas.Series(codes, parameter.index, dtype=float), [str(word) for word in words]
 
 
-def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str) -> None:
+def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str) -> list[int]:
     """Draw the mean at each place; of very many places, those of equally many missions at their mean place."""
     key = frame["place"]
     if key.nunique() > _MOST_VALUES:
         key = pandas.qcut(key.rank(method="first"), _BINS, labels=False)
-    found, middles = [], []
+    found, middles, counts = [], [], []
     for _, part in frame.groupby(key):
         has_runs = part["run"].notna().all()
         runs = first_alike(part, runs_sharing_draw(part))
         by_run = part.groupby(["seed", runs])[metric].mean() if has_runs else part[metric]
         found.append(mean_of(by_run.dropna().tolist()))
+        counts.append(int(by_run.count()))
         middles.append(float(part["place"].mean()) + beside)
     means = np.array([each.value for each in found])
     low, high = np.array([each.interval or (each.value, each.value) for each in found]).T
@@ -488,6 +595,7 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
         elinewidth=0.8,
         **style.line(number),
     )
+    return counts
 
 
 def _folded(text: str, width: int = 26) -> str:

@@ -6,6 +6,7 @@ Groups are compared run by run where runs share their random numbers, and else a
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -29,6 +30,7 @@ from suave_des.results.missions import (
     caveats,
     chosen_metrics,
     counted,
+    first_and_last,
     grouped,
     listed,
     missions_of,
@@ -180,7 +182,36 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
     means = {each.group: each.mean.value for each in summaries if each.metric == metrics[0].name and each.n}
     sentence = " ".join(_conclusions(groups, metrics[0], differences, means))
     notes = [*missions.notes, *notes, *caveats(groups, metrics), *_worse_paired(differences)]
-    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups))
+    largest = () if unpaired else tuple(_largest(pairs, metrics[0], missions.folders))
+    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups), largest)
+
+
+def _largest(
+    pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]
+) -> Iterator[dict[str, Any]]:
+    """Yield the runs with the least and the greatest difference of each pair, and the command that replays one."""
+    for first, second in pairs:
+        x, y = first.by_run(metric.name), second.by_run(metric.name)
+        if x is None or y is None or not (first.is_of_missions and second.is_of_missions):
+            continue
+        apart = (x - y).dropna()
+        if not apart.any():
+            continue
+        least, greatest = first_and_last(apart)
+        row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
+        for name, (value, number) in (("least", least), ("greatest", greatest)):
+            row |= {name: value, f"{name}_run": number}
+        managers, sources = (
+            list(dict.fromkeys(str(group.frame[name].iloc[0]) for group in (first, second)))
+            for name in ("manager", "source")
+        )
+        row["replay"] = ""
+        if not first.point and 1 in (len(managers), len(sources)) and all(source in folders for source in sources):
+            run = row["greatest_run" if row["greatest"] > -row["least"] else "least_run"]
+            places = [str(folders[source]) for source in sources]
+            chosen = "--run", str(run), "--managers", ",".join(managers)
+            row["replay"] = shlex.join(["suave-des", "replay", *places, *chosen])
+        yield row
 
 
 def _conclusions(

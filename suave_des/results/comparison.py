@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from textwrap import fill
 from typing import Any
@@ -150,6 +150,8 @@ class Comparison:
         notes: what a reader should know about the data.
         metrics: the compared metrics.
         counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
+        largest: of each pair the runs whose missions differ most in the first metric: group, other, metric, least and
+            greatest (differences), least_run and greatest_run, and the command that replays one, where it is known.
     """
 
     conclusion: str
@@ -158,6 +160,7 @@ class Comparison:
     notes: tuple[str, ...]
     metrics: tuple[Metric, ...] = field(repr=False)
     counted: str = field(default="mission", repr=False)
+    largest: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)
 
     def summary_frame(self) -> pandas.DataFrame:
         """Return a row for each group and metric, with the columns of Summary.row()."""
@@ -186,6 +189,25 @@ class Comparison:
         metrics = {metric.name: metric for metric in self.metrics}
         rows = [_runs_row(each, metrics[each.metric]) for each in self.differences if not math.isnan(each.half_width)]
         return Table(("difference", "for ±", "paired", "not paired", "variance ratio"), rows)
+
+    def largest_differences(self) -> tuple[Table, str]:
+        """Return the runs in which two managers differ most, and the command that replays one; empty: none is known."""
+        metric = self.metrics[0]
+        rows = [
+            (
+                f"{each['group']} - {each['other']}",
+                *(
+                    text
+                    for end in ("least", "greatest")
+                    for text in (metric.number(each[end]), str(each[f"{end}_run"]))
+                ),
+            )
+            for each in self.largest
+        ]
+        title = f"runs that differ most: {metric.heading}"
+        known = [each for each in self.largest if each["replay"]]
+        most = max(known, key=lambda each: max(each["greatest"], -each["least"]), default={"replay": ""})
+        return Table(("difference", "least", "run", "greatest", "run"), rows, title), most["replay"]
 
     def remarks(self) -> list[str]:
         """Describe how missions were compared and why, and what to know about the data."""
@@ -221,6 +243,9 @@ class Comparison:
                 parts.append("\n".join(folded(f"- {each}", width) for each in conclusions))
         if (needed := self.runs_needed()).rows:
             parts.append(f"runs of each manager that an interval of the difference needs\n{needed.text(width)}")
+        most, replay = self.largest_differences()
+        if most.rows:
+            parts.append(f"{most.title}\n{most.text(width)}" + (f"\nTo see both missions: {replay}" if replay else ""))
         parts.append("\n".join(folded(line, width) for line in self.remarks()))
         return "\n\n".join(parts) + "\n"
 
@@ -240,6 +265,13 @@ class Comparison:
                 parts.append("\n".join(f"- {markdown_text(each)}" for each in conclusions))
         if self.differences:
             parts += ["### Runs needed", self.runs_needed().markdown()]
+        most, replay = self.largest_differences()
+        if most.rows:
+            parts += [
+                f"### {capital(most.title)}",
+                most.markdown(),
+                *([f"To see both missions: `{replay}`"] if replay else []),
+            ]
         return "\n\n".join([*parts, *map(markdown_text, self.remarks())]) + "\n"
 
     def _repr_markdown_(self) -> str:
@@ -254,14 +286,17 @@ class Comparison:
                 if each.metric == metric.name:
                     cells = metric.number(each.mean.value), metric.number(each.std)
                     by_group.setdefault(each.group, [each.group]).extend(cells)
-        means = Table(("Manager", *("Mean", "Std") * len(metrics)), list(by_group.values()), self._sizes())
+        shown = [row for row in by_group.values() if any(row[1:])]
+        means = Table(("Manager", *("Mean", "Std") * len(metrics)), shown, "Means and standard deviations.")
         lines = [r"% needs \usepackage{booktabs}", *(f"% Note: {note}." for note in self.notes)]
-        lines.append(means.latex([capital(metric.heading) for metric in metrics], label="tab:means"))
+        lines.append(
+            means.latex([capital(metric.heading) for metric in metrics], label="tab:means", note=self._sizes())
+        )
         if self.differences:
             rows: list[tuple[str, ...]] = []
             for metric in self.metrics:
-                rows.append((capital(metric.heading),))
-                tested = (each for each in self.differences if each.metric == metric.name and each.test)
+                tested = [each for each in self.differences if each.metric == metric.name and each.test]
+                rows += [(capital(metric.heading),)] if tested else []
                 cells_of = (_difference_row(each, metric) for each in tested)
                 rows += [(name, mean, interval, effect, p) for name, _, mean, interval, _, p, effect in cells_of]
             headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
@@ -291,6 +326,7 @@ class Comparison:
             "notes": list(self.notes),
             "summaries": [each.row() for each in self.summaries],
             "differences": [each.row() for each in self.differences],
+            "largest_differences": self.largest,
         }
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import pandas
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-AUTO, SWEEP, PATHS, MAP, TIMELINE = "auto", "sweep", "paths", "map", "timeline"
+AUTO, SWEEP, HEAT_MAP, PATHS, MAP, TIMELINE = "auto", "sweep", "heatmap", "paths", "map", "timeline"
 _PUBLISHED_SCENARIO = "seams2023"
 
 
@@ -41,14 +40,14 @@ CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
     "distributions": campaign_figures.draw_distributions,
     "raincloud": lambda groups: campaign_figures.draw_rainclouds(groups, {}),
     "detections": campaign_figures.draw_detections,
-    "convergence": campaign_figures.draw_convergence,
+    "differences": campaign_figures.draw_differences,
     "reactions": campaign_figures.draw_reactions,
 }
 """Figures of a campaign's missions by their names."""
-_OF_MEANS = "convergence"
-"""What shows means, with their intervals: of runs, as all points of a sweep share a run's random numbers. The others
-show missions, and means over the points would be what no mission did."""
-KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, PATHS)
+_OF_MEANS = "differences"
+"""What has intervals of means: of runs, as points of a sweep share a run's random numbers. The others show missions;
+means over the points would be what no mission did."""
+KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, HEAT_MAP, PATHS)
 """All figures by their names."""
 
 
@@ -177,10 +176,11 @@ def draw_assisted(found: AssistedComparison) -> Figure:
 
 
 def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:
-    if kind == SWEEP or (kind == AUTO and missions.swept):
+    if kind in (SWEEP, HEAT_MAP) or (kind == AUTO and missions.swept):
         if not missions.swept:
             raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")
-        return campaign_figures.draw_sweep(missions, parameters)
+        draw = campaign_figures.draw_heat_map if kind == HEAT_MAP else campaign_figures.draw_sweep
+        return draw(missions, parameters)
     if parameters:
         raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
     name = "distributions" if kind == AUTO else kind
@@ -194,6 +194,5 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     if missions.swept:
         shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)
-        width = int(16 * figure.get_figwidth())
-        figure.supxlabel(fill(f"{shown_are} all points of the sweep: {swept}", width), fontsize=7.5, color="#555555")
+        campaign_figures.write_below(figure, f"{shown_are} all points of the sweep: {swept}")
     return figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -43,11 +43,13 @@ class Missions:
             `runs_sharing_draw` where that is known.
         swept: columns that a sweep varies.
         notes: what readers of the comparison should know about the files.
+        folders: of the campaigns that can be run again, by source.
     """
 
     frame: pandas.DataFrame
     swept: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    folders: Mapping[str, Path] = field(default_factory=dict)
 
     @property
     def managers(self) -> list[str]:
@@ -93,10 +95,12 @@ def read_missions(paths: Sequence[Path]) -> Missions:
         if resolved[place] in resolved[:place]:
             raise InputError("is given twice", file=path, remedy="name each folder of results once")
     sources = [_read_source(path) for path in paths]
-    frames = [each.frame.assign(source=name) for each, name in zip(sources, _short_names(paths), strict=True)]
+    names = _short_names(paths)
+    frames = [each.frame.assign(source=name) for each, name in zip(sources, names, strict=True)]
     swept = tuple(dict.fromkeys(name for source in sources for name in source.swept))
     notes = tuple(note for source in sources for note in source.notes)
-    return Missions(pandas.concat(frames, ignore_index=True), swept, notes)
+    folders = {name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()}
+    return Missions(pandas.concat(frames, ignore_index=True), swept, notes, folders)
 
 
 def missions_of(frame: pandas.DataFrame) -> Missions:
@@ -271,6 +275,13 @@ class Group:
     @cached_property
     def _runs(self) -> pandas.MultiIndex:
         return pandas.MultiIndex.from_frame(self.frame[["seed", "run"]])
+
+
+def first_and_last(values: pandas.Series[float]) -> tuple[tuple[float, int], tuple[float, int]]:
+    """Return the least and the greatest of values by (seed, run), each with its run."""
+    runs = values.index.get_level_values("run").astype(int)
+    known = list(zip(values.tolist(), runs.tolist(), strict=True))
+    return min(known, key=lambda each: each[0]), max(known, key=lambda each: each[0])
 
 
 def counted(groups: Sequence[Group]) -> str:

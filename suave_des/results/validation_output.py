@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -38,6 +39,39 @@ _KINDS = {
     "condition_std": "std ratio within conditions",
 }
 _SIDES = ("published", "simulated")
+_INTERVAL = "95% interval"
+
+
+class _Number(float):
+    """A number of a row, written as nothing where it is missing; the styles "p" and "share" are our own."""
+
+    def __format__(self, style: str) -> str:
+        if self != self:
+            return ""
+        if style == "share":
+            return percent(self)
+        if style == "p":
+            style = ".3f" if self >= 0.001 else ".0e"
+        return format(float(self), style)
+
+
+def _table(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
+    """Fill a table with the rows of a frame; each column has a heading and a template for its cells."""
+    rows = []
+    for row in _rows(frame):
+        values = {
+            name: each if isinstance(each, str) else _Number(math.nan if each is None else each)
+            for name, each in row.items()
+        }
+        values["brief"] = METRICS[row["metric"]].brief if "metric" in row else ""
+        cells = (template.format_map(values) for _, template in columns)
+        rows.append(["" if cell == " to " else cell for cell in cells])
+    return Table([heading for heading, _ in columns], rows, title, align)
+
+
+def _interval(name: str, style: str) -> tuple[str, str]:
+    low, high = interval_names(name)
+    return _INTERVAL, f"{{{low}:{style}}} to {{{high}:{style}}}"
 
 
 def tables(validation: Validation, real: str) -> Iterator[Table]:
@@ -48,53 +82,49 @@ def tables(validation: Validation, real: str) -> Iterator[Table]:
         real: what the real missions are called: "published" or "real".
     """
     runs = "real runs" if real == "real" else real
-    cells, side, interval = _rows(validation.cells), ("n", "mean", "std", "median"), "95% interval"
-    conditions = [each for each in _rows(validation.conditions) if each["metric"] in PAPER_METRICS]
-    found = (
-        Table(
-            ("metric", "manager", *side, *side),
-            [(*_head(each), *_sample(each, "published"), *_sample(each, "simulated")) for each in cells],
-            f"Samples: {runs}, then simulated",
-            "ll",
-        ),
-        Table(
-            ("metric", "manager", "difference of means", interval, "std ratio", interval, "KS p", "AD p"),
-            [(*_head(each), *_difference(each)) for each in cells],
-            f"Simulated compared with {runs} (difference = simulated - {real})",
-            "ll",
-        ),
-        Table(
-            ("metric", "first, second", real, "simulated", f"{real}: better", "simulated agrees"),
-            [_pair(each) for each in _rows(validation.pairs)],
-            f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size",
-            "ll",
-        ),
-        Table(
-            ("manager", "share", real, interval, "simulated", ""),
-            [_share(each) for each in _rows(validation.shares)],
-            f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)",
-            "llrrrl",
-        ),
-        Table(
-            ("metric", "manager", "condition", "n", "median", "std", "median", "std", "difference"),
-            [_condition(each) for each in conditions],
-            f"Condition by condition: {runs}, then simulated",
-            "ll",
-        ),
-        Table(
-            ("metric", "manager", "|difference|", f"std: {real}", "simulated", "ratio"),
-            [(*_head(each), *_over_conditions(each)) for each in _rows(over_conditions(validation.conditions))],
-            "Within conditions: medians over the conditions",
-            "ll",
-        ),
-        _places(validation, real),
-        Table(
-            ("of", "what", "simulated", "must be", ""),
-            [_target(each) for each in _rows(validation.targets)],
-            "Targets",
-            "llrrl",
-        ),
+    head = ("metric", "{brief}"), ("manager", "{manager}")
+    numbers = [
+        [(name, f"{{{side}_{name}:{'.0f' if name == 'n' else '.2f'}}}") for name in ("n", "mean", "std", "median")]
+        for side in _SIDES
+    ]
+    title = f"Samples: {runs}, then simulated"
+    found = [_table(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])]
+    title = f"Simulated compared with {runs} (difference = simulated - {real})"
+    columns: tuple[tuple[str, str], ...] = (
+        ("difference of means", "{difference_of_means:+.2f}"),
+        _interval("difference_of_means", "+.1f"),
     )
+    ratio = ("std ratio", "{std_ratio:.2f}"), _interval("std_ratio", ".2f")
+    tests = ("KS p", "{ks_p:p}"), ("AD p", "{ad_p:p}")
+    found.append(_table(validation.cells, title, "ll", *head, *columns, *ratio, *tests))
+    title = f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size"
+    columns = (head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}"))
+    better = (f"{real}: better", "{published_better}"), ("simulated agrees", "{agreement:share}")
+    found.append(_table(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better))
+    title = f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)"
+    shares = validation.shares
+    if len(shares):
+        low, high = (shares[name].astype(float) for name in interval_names("published_share"))
+        share = shares["simulated_share"].astype(float)
+        shares = shares.assign(mark=np.where((share < low) | (share > high), "*", ""))
+    count = real, "{published_count:.0f} of {published_n:.0f}"
+    simulated = ("simulated", "{simulated_share:share}"), ("", "{mark}")
+    interval = _interval("published_share", ".0%")
+    found.append(_table(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated))
+    conditions = validation.conditions
+    if len(conditions):
+        conditions = conditions[conditions["metric"].isin(PAPER_METRICS)]
+    sides = [(name, f"{{{side}_{name}:.2f}}") for side in ("real", "simulated") for name in ("median", "std")]
+    counts = ("condition", "{condition:.0f}"), ("n", "{real_n:.0f}")
+    columns = (*head, *counts, *sides, ("difference", "{difference_of_medians:+.2f}"))
+    found.append(_table(conditions, f"Condition by condition: {runs}, then simulated", "ll", *columns))
+    stds = (f"std: {real}", "{real_std:.2f}"), ("simulated", "{simulated_std:.2f}"), ("ratio", "{std_ratio:.2f}")
+    columns = (*head, ("|difference|", "{difference:.2f}"), *stds)
+    within = over_conditions(validation.conditions)
+    found.append(_table(within, "Within conditions: medians over the conditions", "ll", *columns))
+    found.append(_places(validation, real))
+    rows = [_target(each) for each in _rows(validation.targets)]
+    found.append(Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl"))
     yield from (table for table in found if table.rows)
 
 
@@ -129,73 +159,24 @@ def _power(validation: Validation, real: str) -> Iterator[str]:
         yield f"A KS p of {SIGNIFICANCE} or more does not show that distributions are equal: {rest}."
 
 
-def number(value: float | None, style: str = ".2f") -> str:
-    """Write a number of a row; empty for a missing one."""
-    return "" if value is None or value != value else f"{value:{style}}"
-
-
 def _rows(frame: pandas.DataFrame) -> list[dict[Any, Any]]:
     return frame.to_dict("records")
-
-
-def _head(each: Mapping[str, Any]) -> tuple[str, str]:
-    return METRICS[each["metric"]].brief, each["manager"]
-
-
-def _sample(each: Mapping[str, Any], side: str) -> tuple[str, ...]:
-    return str(each[f"{side}_n"]), *(number(each[f"{side}_{name}"]) for name in ("mean", "std", "median"))
-
-
-def _interval(each: Mapping[str, Any], name: str, style: str) -> str:
-    ends = [number(each[f"{name}_ci95_{end}"], style) for end in ("low", "high")]
-    return " to ".join(ends) if all(ends) else ""
-
-
-def _difference(each: Mapping[str, Any]) -> tuple[str, ...]:
-    apart = number(each["difference_of_means"], "+.2f"), _interval(each, "difference_of_means", "+.1f")
-    return *apart, number(each["std_ratio"]), _interval(each, "std_ratio", ".2f"), _p(each["ks_p"]), _p(each["ad_p"])
-
-
-def _p(p: float) -> str:
-    return number(p, ".3f" if p >= 0.001 else ".0e")
-
-
-def _pair(each: Mapping[str, Any]) -> tuple[str, ...]:
-    superiority = (number(each[f"{side}_superiority"]) for side in _SIDES)
-    pair = f"{each['first']}, {each['second']}"
-    return METRICS[each["metric"]].brief, pair, *superiority, each["published_better"], percent(each["agreement"])
-
-
-def _share(each: Mapping[str, Any]) -> tuple[str, ...]:
-    share, low, high = (each[name] for name in ("simulated_share", *interval_names("published_share")))
-    is_outside = None not in (low, share) and (share < low or share > high)
-    counted = f"{each['published_count']} of {each['published_n']}"
-    interval = _interval(each, "published_share", ".0%")
-    shown = "" if share is None else percent(share)
-    return each["manager"], each["name"], counted, interval, shown, "*" if is_outside else ""
-
-
-def _condition(each: Mapping[str, Any]) -> tuple[str, ...]:
-    sides = (number(each[f"{side}_{name}"]) for side in ("real", "simulated") for name in ("median", "std"))
-    counts = str(each["condition"]), str(each["real_n"])
-    return *_head(each), *counts, *sides, number(each["difference_of_medians"], "+.2f")
-
-
-def _over_conditions(each: Mapping[str, Any]) -> Iterator[str]:
-    return (number(each[name]) for name in ("difference", "real_std", "simulated_std", "std_ratio"))
 
 
 def _places(validation: Validation, real: str) -> Table:
     """Return the places of detection, with managers across."""
     known = {(each["manager"], each["detection_x_m"]): each for each in _rows(validation.positions)}
+    none = {"published_n": 0, "simulated_share": None}
     rows = []
     for x_m in sorted({x_m for _, x_m in known}):
         row = [f"{x_m:.1f}"]
         for manager in validation.managers:
-            found = known.get((manager, x_m))
-            counted = "" if found is None or not found["published_n"] else str(found["published_count"])
-            share = None if found is None else found["simulated_share"]
-            row += [counted, "" if share is None else percent(share)]
+            found = known.get((manager, x_m), none)
+            share = found["simulated_share"]
+            row += [
+                str(found["published_count"]) if found["published_n"] else "",
+                "" if share is None else percent(share),
+            ]
         rows.append(row)
     headings = ["x, m", *(heading for manager in validation.managers for heading in (manager, "simulated"))]
     title = f"Places of detection, by x of the point seen first: {real} number, simulated share"
@@ -203,12 +184,12 @@ def _places(validation: Validation, real: str) -> Table:
 
 
 def _target(each: Mapping[str, Any]) -> tuple[str, ...]:
-    kind, low, high = each["kind"], each["low"], each["high"]
+    kind = each["kind"]
     what = f"{METRICS[each['what']].brief}: {_KINDS[kind]}" if kind in _KINDS else each["what"]
     style = ".0%" if kind in ("conclusion", "share") else ".2f"
-    ends = number(low, style), number(high, style)
-    must_be = "" if not ends[0] else f"{ends[0]} to {ends[1]}" if ends[1] else f"at least {ends[0]}"
-    return each["subject"], what, number(each["value"], style), must_be, _VERDICTS[each["met"]]
+    value, low, high = (format(_Number(each[name]), style) for name in ("value", "low", "high"))
+    must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else ""
+    return each["subject"], what, value, must_be, _VERDICTS[each["met"]]
 
 
 # Figures

@@ -45,23 +45,27 @@ def test_what_was_inspected_adds_up_to_the_metric_of_the_mission(tmp_path):
     run_mission("seams2023", "none", 1, 1, tmp_path / "mission")
     there = recorded(read_mission(tmp_path / "mission"))
     page = mission_on_page(there)
-    _, _, distance_m = page.inspected[-1]
+    _, _, distance_m = page["inspected"][-1]
     assert distance_m == pytest.approx(there.record.metrics["distance_inspected_m"], abs=1.5)
-    assert [t_s for t_s, _, _ in page.inspected] == sorted(t_s for t_s, _, _ in page.inspected)
+    assert [t_s for t_s, _, _ in page["inspected"]] == sorted(t_s for t_s, _, _ in page["inspected"])
 
 
 def test_decisions_of_metacontrol_are_explained_as_they_were_made(tmp_path):
     run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "mission")
     page = mission_on_page(recorded(read_mission(tmp_path / "mission")))
-    decided = [(each.function, each.before, each.chosen) for cycle in page.cycles.cycles for each in cycle.decided]
-    grounded = [detail for _, _, event, detail in page.events if event == "adaptation"]
+    decided = [
+        (each["function"], each["before"], each["chosen"])
+        for cycle in page["cycles"]["cycles"]
+        for each in cycle["decided"]
+    ]
+    grounded = [detail for _, _, event, detail in page["events"] if event == "adaptation"]
     changes = {(function, before, chosen) for function, before, chosen in decided if before != chosen}
     for detail in grounded:
         function, _, change = detail.partition(": ")
         before, _, rest = change.partition(" -> ")
         assert (function, None if before == "ungrounded" else before, rest.partition(":")[0]) in changes
-    rules = {fact.rule for inferred in page.cycles.inferences for fact in inferred.facts if fact.rule}
-    assert rules <= page.cycles.rules.keys()
+    rules = {fact["rule"] for each in page["cycles"]["inferences"] for fact in each["facts"] if fact["rule"]}
+    assert rules <= page["cycles"]["rules"].keys()
 
 
 def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_path):
@@ -71,8 +75,8 @@ def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_pat
     record["scenario"]["knowledge"]["ontologies"] = ["gone.owl"]
     (folder / "mission.json").write_text(json.dumps(record), encoding="utf-8")
     page = mission_on_page(recorded(read_mission(folder)))
-    assert "gone.owl" in page.cycles.note
-    assert page.cycles.cycles[0].measured
+    assert "gone.owl" in page["cycles"]["note"]
+    assert page["cycles"]["cycles"][0]["measured"]
 
 
 def test_two_missions_are_written_side_by_side(mission, tmp_path, capsys):

@@ -286,6 +286,19 @@ class TestHeadlines:
         assert not any("larger, not smaller" in note for note in compare_frame(runs(a=times, b=times)).notes)
 
 
+def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(campaign: Path) -> None:
+    times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+    comparison = compare_folders([campaign], managers=["bt", "none"])
+    apart = times["bt"] - times["none"]
+    (found,) = comparison.largest
+    assert (found["least_run"], found["greatest"]) == (apart.idxmin(), apart.max())
+    assert str(comparison).count(f"suave-des replay {campaign} --run {apart.abs().idxmax()} --managers bt,none") == 1
+    frame = compare_frame(pandas.read_csv(campaign / "runs.csv"))
+    assert frame.largest and "replay" not in str(frame)
+    for unpaired in (compare_folders([published_runs()]), compare_folders([campaign], unpaired=True)):
+        assert not unpaired.largest
+
+
 class TestFewValues:
     def test_one_run_has_a_mean_and_no_interval(self) -> None:
         comparison = compare_frame(runs(a=[100.0], b=[120.0]))

@@ -20,6 +20,7 @@ from suave_des.results import style
 from suave_des.results.campaign_figures import (
     draw_detections,
     draw_distributions,
+    draw_heat_map,
     draw_rainclouds,
     draw_reactions,
     draw_sweep,
@@ -254,7 +255,7 @@ def test_adaptations_are_bars_where_missions_have_that_number_and_quick_reaction
     assert figure.axes[1].get_xscale() == "log"
 
 
-@pytest.mark.parametrize("kind", CAMPAIGN_KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in CAMPAIGN_KINDS if kind != "differences"])
 def test_every_kind_is_drawn_of_a_single_mission_of_a_manager_with_an_awkward_name(kind: str, tmp_path: Path) -> None:
     text = "scenario,manager,run,seed,search_time_s,distance_inspected_m,pipeline_found,detection_x_m,adaptations\n"
     (tmp_path / "runs.csv").write_text(text + "a,_$x^<b>&\\,1,1,300,0,False,,3\n")
@@ -383,17 +384,44 @@ def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(kind: str,
     assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
 
 
-def test_the_convergence_of_a_sweep_says_that_it_is_of_means_of_runs(two_limits: pandas.DataFrame) -> None:
-    texts = texts_of(draw_frame(two_limits, "convergence"))
-    assert "none (n = 2)" in texts
-    assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
+class TestDifferences:
+    """Differences between managers, run by run."""
+
+    def test_show_each_run_the_mean_and_the_runs_at_the_ends(self) -> None:
+        frame = sweep_frame(1, 5).drop(columns=["start.x_m", "start.y_m"])
+        other = frame.assign(manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0])
+        axes = draw_frame(pandas.concat([frame, other]), "differences").axes[0]
+        rain = next(line for line in axes.get_lines() if len(line.get_xdata()) == 5)
+        assert sorted(rain.get_xdata()) == [1.0, 2.0, 3.0, 4.0, 40.0]
+        assert [text.get_text() for text in axes.texts] == ["run 1", "run 5"]
+        low, high = axes.containers[0][2][0].get_segments()[0][:, 0]
+        assert (low, high) == pytest.approx(mean_of([1.0, 2.0, 3.0, 4.0, 40.0]).interval)
+
+    def test_of_a_sweep_are_of_means_of_runs(self, two_limits: pandas.DataFrame) -> None:
+        both = pandas.concat([two_limits, two_limits.assign(manager="other")])
+        texts = texts_of(draw_frame(both, "differences"))
+        assert any(text.endswith("other (n = 2)") for text in texts)
+        assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
+
+    def test_need_runs_with_the_same_random_numbers(self) -> None:
+        with pytest.raises(InputError, match="share their random numbers"):
+            draw_folder_of_published("differences")
 
 
-def test_the_convergence_of_a_single_run_is_a_mark(campaign: Path) -> None:
-    frame = read_missions([campaign]).frame
-    for runs, marked in ((1, True), (2, False)):
-        line = draw_frame(frame[frame["run"] <= runs], "convergence").axes[0].lines[0]
-        assert (line.get_marker() not in ("None", None)) is marked
+def draw_folder_of_published(kind: str) -> Figure:
+    return draw_frame(read_missions([published_runs()]).frame, kind)
+
+
+def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs() -> None:
+    frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
+    figure = draw_heat_map(missions_of(frame), ["depth", "start.y_m"])
+    assert [text.get_text() for text in figure.axes[0].texts] == ["115.00"] * 4
+    assert "means of n = 2 runs, each averaged over start: x (m)" in texts_of(figure)
+    with pytest.raises(InputError, match="of two swept parameters, and there are 3"):
+        draw_heat_map(missions_of(frame))
+    assert "means of n = 2 runs, each averaged over the parameters of the other panels" in texts_of(
+        draw_sweep(missions_of(frame))
+    )
 
 
 def test_no_bubble_of_detections_hides_the_share_of_those_not_found(campaign: Path, tmp_path: Path) -> None:

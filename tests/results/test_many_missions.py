@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pandas
-import pytest
 from scipy.stats import gaussian_kde
 
-from suave_des.estimates import mean_of
 from suave_des.results import campaign_figures, style
 from suave_des.results.campaign_figures import (
-    draw_convergence,
+    draw_differences,
     draw_distributions,
     draw_rainclouds,
     draw_reactions,
-    running_means,
 )
 from suave_des.results.missions import grouped, missions_of
 
@@ -25,29 +20,6 @@ def _times_s(n: int) -> np.ndarray:
     """Make search times in clusters, as turns of the spiral make them."""
     rng = np.random.default_rng(7)
     return np.abs(rng.choice((60.0, 110.0, 190.0), n) + rng.normal(0.0, 8.0, n))
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 2_000, 30_000])
-def test_a_thinned_curve_has_the_ends_and_values_of_the_whole_one(n: int) -> None:
-    values = _times_s(n)
-    numbers, means, halves = running_means(values)
-    assert (numbers[0], numbers[-1]) == (1, n)
-    assert means[0] == values[0]
-    assert math.isnan(halves[0])
-    for place in {len(numbers) - 1, len(numbers) // 2} - {0}:
-        found = mean_of(values[: numbers[place]].tolist())
-        assert means[place] == pytest.approx(found.value)
-        assert halves[place] == pytest.approx(found.high - found.value)
-
-
-def test_few_runs_are_drawn_one_by_one_and_many_are_not() -> None:
-    assert running_means(_times_s(2_000))[0].tolist() == list(range(1, 2_001))
-    assert len(running_means(_times_s(30_000))[0]) <= 2_000
-
-
-def test_thinning_leaves_no_gap_that_a_reader_sees() -> None:
-    numbers = running_means(_times_s(1_000_000))[0]
-    assert (np.diff(numbers) <= np.maximum(1, np.minimum(1_100, 0.02 * numbers[:-1] + 1))).all()
 
 
 def test_a_density_from_counts_is_that_from_values() -> None:
@@ -63,8 +35,8 @@ def test_figures_of_many_missions_are_written_from_few_points() -> None:
     frame = pandas.DataFrame(
         {"manager": "none", "run": np.arange(1, n + 1), "seed": 1, "search_time_s": _times_s(n)}
     ).assign(distance_inspected_m=20.0, pipeline_found=True, scenario="seams2023")
-    groups, _ = grouped(missions_of(frame))
-    for figure in (draw_convergence(groups), draw_rainclouds(groups, {})):
+    groups, _ = grouped(missions_of(pandas.concat([frame, frame.assign(manager="bt")])))
+    for figure in (draw_differences(groups), draw_rainclouds(groups, {})):
         for axes in figure.axes:
             assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
             assert all(len(path.vertices) <= 5_000 for each in axes.collections for path in each.get_paths())
@@ -74,7 +46,7 @@ def test_a_legend_of_long_names_stays_within_the_figure() -> None:
     names = [f"a manager with a long name {number}" for number in range(4)]
     frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
     groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)))
-    for draw in (draw_convergence, draw_distributions, draw_reactions):
+    for draw in (draw_differences, draw_distributions, draw_reactions):
         with style.publication():
             figure = draw(groups)
             figure.draw_without_rendering()

@@ -74,7 +74,7 @@ def test_a_comparison_takes_the_draws_for_independent(folder: Path) -> None:
         tuple(stats.ttest_rel(means["none"], means["bt"]).confidence_interval())
     )
     assert any("4 runs that share each draw" in note for note in comparison.notes)
-    assert r"\caption{6 draws for each manager.}" in comparison.latex()
+    assert "footnotesize 6 draws for each manager." in comparison.latex()
 
 
 def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder: Path, tmp_path: Path) -> None:
@@ -111,10 +111,11 @@ def test_so_does_that_of_a_data_frame() -> None:
     assert compare_frame(both).differences[0].n == 4
 
 
-def test_the_convergence_is_drawn_over_draws() -> None:
-    frame = api.run_campaign("seams2023", ["none"], runs=8, progress=False, **VARIED)
-    figure = draw_frame(frame, "convergence")
-    assert figure.axes[0].get_xlabel() == "number of draws"
+def test_differences_are_drawn_of_draws() -> None:
+    frame = api.run_campaign("seams2023", ["none", "bt"], runs=8, progress=False, **VARIED)
+    figure = draw_frame(frame, "differences")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["mean, 95% interval", "draw"]
+    assert figure.axes[0].get_yticklabels()[0].get_text().endswith("(n = 2)")
 
 
 def test_runs_without_perturbations_are_independent(tmp_path: Path) -> None:

@@ -322,6 +322,11 @@ function writeText() {
   if (results.needed) {
     byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'Runs needed for an interval'), tableOf(results.needed)));
   }
+  const [most, apart, replay] = results.largest;
+  if (apart[1].length) {
+    byId('tables').append(element('details', { class: 'block' }, element('summary', {}, most), tableOf(apart),
+      replay ? element('div', {}, element('p', {}, 'To see both missions:'), element('pre', {}, element('code', {}, replay))) : null));
+  }
   byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'How it was compared'),
     element('ul', {}, ...results.remarks.map((each) => element('li', {}, each)))));
   byId('how').append(element('h2', {}, 'How it was made'), ...made.map((each) => element('details', { class: 'block', open: '' },

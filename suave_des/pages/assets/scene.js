@@ -2,10 +2,10 @@
 
 const { pipeline: PIPELINE, sea_bed_z_m: BED, view_tangent: TANGENT, station: STATION } = DATA.scenario;
 
-/** Colours under water, the same in light and dark. */
+/** Colours under water, the same in light and dark; in grey they differ by their lightness. */
 const SEA_MODES = {
-  fd_spiral_low: '#b49bff', fd_spiral_medium: '#52b6ff', fd_spiral_high: '#43ecc4', fd_follow_pipeline: '#ffb938',
-  fd_unground: '#9db3bb', '': '#9db3bb', fd_generate_recharge_path: '#ff8fd0', __DEFAULT__: '#ff8fd0',
+  fd_spiral_low: '#a68cff', fd_spiral_medium: '#63bdff', fd_spiral_high: '#d8fff3', fd_follow_pipeline: '#ffcb5c',
+  fd_unground: '#3c5560', '': '#3c5560', fd_generate_recharge_path: '#ff8fd0', __DEFAULT__: '#ff8fd0',
 };
 const SPARE_SEA_MODES = ['#ff9e7a', '#d7f06b', '#ff8fd0', '#f4e2a0'];
 function seaColour(mode) {
