@@ -36,8 +36,7 @@ class Finding:
         file: where.
         line: in the file.
         rule: name of the rule, if it is about one.
-        column: in the line for rules as text, in the rule's own text (as `kb rules --format json` gives it) for rules
-            of ontologies.
+        column: in the line, for rules as text.
         remedy: how to correct it.
     """
 

@@ -96,17 +96,6 @@ def measured_values(loaded: LoadedScenario, attribute: str) -> tuple[Sequence[An
             return loaded.tables[attribute][1], signal.noise
 
 
-def measured_ranges(loaded: LoadedScenario) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the greatest value that each attribute's monitor can measure, where that is known."""
-    ranges = {}
-    for name in measured_attributes(loaded.scenario):
-        values, noise = measured_values(loaded, name)
-        numbers = [float(value) for value in values if isinstance(value, float | int)]
-        if noise == 0.0 and len(numbers) == len(values):
-            ranges[name] = min(numbers), max(numbers)
-    return ranges
-
-
 def subject_of(loaded: LoadedScenario) -> Subject:
     """Return what `kb check` checks of a scenario: its knowledge base, and what missions have to do with it."""
     from suave_des.knowledge.checks import Subject  # which missions do not need
@@ -123,7 +112,6 @@ def subject_of(loaded: LoadedScenario) -> Subject:
         operators=loaded.scenario.revision.comparison_operators,
         reported=REPORTED_STATUSES,
         measured=measured_attributes(loaded.scenario),
-        ranges=measured_ranges(loaded),
     )
 
 

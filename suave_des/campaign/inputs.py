@@ -218,7 +218,7 @@ def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
 
     This takes some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
     """
-    from suave_des.knowledge.checks import static_findings
+    from suave_des.knowledge.checks import findings_in
     from suave_des.scenario_knowledge import subject_of
 
     logger = logging.getLogger(MISTAKES_LOGGER)
@@ -230,7 +230,7 @@ def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     if checked in _told or not logger.isEnabledFor(logging.WARNING):
         return
     _told.add(checked)
-    findings = ordered(static_findings(subject_of(loaded), base.sources))
+    findings = ordered(findings_in(base, subject_of(loaded)))
     if lines := [str(each) for each in findings if each.level is not Level.INFO]:
         for line in lines[:MISTAKES_SHOWN]:
             logger.warning("%s", line)

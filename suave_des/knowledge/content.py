@@ -76,11 +76,13 @@ class Content:
         triples: about named things and with named things or literals as values, without those of rules.
         structure: all others, with blank nodes in them (class expressions), as N-Triples.
         rules: the rules of all files, disabled ones included.
+        replaced: rules that those of the same name in a later file of rules have replaced, each with its replacement.
     """
 
     triples: tuple[Triple, ...]
     structure: tuple[str, ...]
     rules: tuple[Rule, ...]
+    replaced: tuple[tuple[Rule, Rule], ...] = ()
 
     @property
     def enabled_rules(self) -> tuple[Rule, ...]:
@@ -174,10 +176,11 @@ def with_rules(content: Content, more: Iterable[Sequence[Rule]], disabled: Colle
     Raises:
         KnowledgeError: there is no rule of a name to disable.
     """
-    rules = list(content.rules)
+    rules, replaced = list(content.rules), list[tuple[Rule, Rule]]()
     for group in more:
-        names = {rule.name for rule in group}
-        rules = [rule for rule in rules if rule.name not in names] + list(group)
+        new = {rule.name: rule for rule in group}
+        replaced += [(rule, new[rule.name]) for rule in rules if rule.name in new]
+        rules = [rule for rule in rules if rule.name not in new] + list(group)
     known = {rule.name for rule in rules}
     for name in sorted(set(disabled) - known):
         raise KnowledgeError(
@@ -186,7 +189,7 @@ def with_rules(content: Content, more: Iterable[Sequence[Rule]], disabled: Colle
             remedy=nearest(name, known) or f"rules: {', '.join(sorted(known)) or 'none'}",
         )
     rules = [replace(rule, enabled=rule.enabled and rule.name not in disabled) for rule in rules]
-    return replace(content, rules=_in_order(rules))
+    return replace(content, rules=_in_order(rules), replaced=tuple(replaced))
 
 
 def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -12,8 +11,8 @@ from suave_des import run_campaign
 from suave_des.campaign.inputs import MISTAKES_SHOWN
 from suave_des.errors import MISTAKES_LOGGER
 from suave_des.findings import Finding
-from suave_des.knowledge.checks import Subject, static_findings
-from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.checks import Subject, findings_in
+from suave_des.knowledge.ontology import Ontology
 from tests.helpers.command import command_here, suave_des_command
 
 STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
@@ -71,7 +70,7 @@ def test_quiet_campaigns_do_not_tell(tmp_path: Path, wrong_rule: str, caplog: py
 
 @pytest.mark.parametrize("scenario", ["seams2023", "extended"])
 def test_shipped_files_are_not_even_checked(scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.knowledge.checks.static_findings", lambda *_: pytest.fail("checked"))
+    monkeypatch.setattr("suave_des.knowledge.checks.findings_in", lambda *_: pytest.fail("checked"))
     campaign(tmp_path, scenario=scenario, managers="metacontrol")
 
 
@@ -80,11 +79,11 @@ def test_the_same_files_are_checked_once_and_changed_ones_again(
 ) -> None:
     checks: list[Subject] = []
 
-    def counted(subject: Subject, sources: Sequence[OntologyFile]) -> list[Finding]:
+    def counted(base: Ontology, subject: Subject) -> list[Finding]:
         checks.append(subject)
-        return static_findings(subject, sources)
+        return findings_in(base, subject)
 
-    monkeypatch.setattr("suave_des.knowledge.checks.static_findings", counted)
+    monkeypatch.setattr("suave_des.knowledge.checks.findings_in", counted)
     for status, number in (("False", 1), ("False", 1), ("FALSE", 2), ("Flase", 3), ("False", 3)):
         (tmp_path / wrong_rule).write_text(f'Late: c_status(?c, "{status}") -> Role(?c)\n', encoding="utf-8")
         run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])

@@ -16,7 +16,7 @@ from rdflib import URIRef
 from suave_des.domain import DEFAULT_MODE, UNGROUND_MODE
 from suave_des.errors import KnowledgeError, nearest, with_article
 from suave_des.findings import Level
-from suave_des.knowledge.checks.registry import Found, Material, Scope, check
+from suave_des.knowledge.checks.registry import Found, Material, check
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import OPERATORS, Model, assumption, wrong_values
 from suave_des.knowledge.ontology import Ontology
@@ -51,14 +51,14 @@ _PROPERTIES: Final = ("object property", "data property", "annotation property")
 _ATTRIBUTE: Final = TOMASYS + "QualityAttributeType"
 
 
-@check(Level.ERROR, Scope.MODEL)
+@check(Level.ERROR)
 def values(material: Material) -> Iterator[Found]:
     """Find the values that no state can be compared with, or that contradict one another."""
     for subject, problem, remedy in wrong_values(material.base.stated):
         yield local_name(subject), None, f"{local_name(subject)}: {problem}", remedy
 
 
-@check(Level.ERROR, Scope.MODEL)
+@check(Level.ERROR)
 def undefined_names(material: Material) -> Iterator[Found]:
     """Find the classes, properties and individuals that are used and defined nowhere: most are misspelt.
 
@@ -95,13 +95,13 @@ def undefined_names(material: Material) -> Iterator[Found]:
             yield local_name(subject), None, problem, remedy
 
 
-@check(Level.ERROR, Scope.MISSIONS)
+@check(Level.ERROR)
 def missing_functions(material: Material) -> Iterator[Found]:
     """Find the functions that the mission needs and that are not there, or have no design."""
     return ((name, None, problem, remedy) for name, problem, remedy in material.base.unsolved(material.subject.needed))
 
 
-@check(Level.WARN, Scope.MODEL)
+@check(Level.WARN)
 def functions_without_design(material: Material) -> Iterator[Found]:
     """Find the other functions that have no design."""
     others = material.base.model.functions.keys() - {*material.subject.needed}
@@ -115,7 +115,7 @@ def _designs_and_modes(material: Material) -> Iterator[tuple[str, set[str], set[
         yield function, {*material.base.designs(function)}, modes
 
 
-@check(Level.ERROR, Scope.MISSIONS)
+@check(Level.ERROR)
 def designs_without_mode(material: Material) -> Iterator[Found]:
     """Find the function designs that no mode has the name of."""
     otherwise = "add a mode of this name to the System Modes file, or remove the design"
@@ -125,7 +125,7 @@ def designs_without_mode(material: Material) -> Iterator[Found]:
             yield design, None, problem, nearest(design, modes - designs) or otherwise
 
 
-@check(Level.INFO, Scope.MISSIONS)
+@check(Level.INFO)
 def modes_without_design(material: Material) -> Iterator[Found]:
     """Note the modes that metacontrol never chooses, such as those of behaviour trees."""
     for function, designs, modes in _designs_and_modes(material):
@@ -136,7 +136,7 @@ def modes_without_design(material: Material) -> Iterator[Found]:
             yield function, None, problem, None
 
 
-@check(Level.WARN, Scope.MISSIONS)
+@check(Level.WARN)
 def attributes_that_do_not_fit(material: Material) -> Iterator[Found]:
     """Find quality attributes that missions measure and ontologies lack, or compare with nothing."""
     model, measured = material.base.model, material.subject.measured
@@ -161,7 +161,7 @@ def without_operator(content: Content, model: Model, measured: Collection[str]) 
     return sorted(name for name in expected.intersection(measured) if model.attributes[name] not in compared)
 
 
-@check(Level.WARN, Scope.MODEL)
+@check(Level.WARN)
 def attributes_declared_twice(material: Material) -> Iterator[Found]:
     """Find the quality attribute types that several files declare: what each of them says of one holds."""
     for name, iri in material.base.model.attributes.items():
@@ -172,7 +172,7 @@ def attributes_declared_twice(material: Material) -> Iterator[Found]:
             yield path, None, problem, "declare it in one of them"
 
 
-@check(Level.INFO, Scope.MISSIONS)
+@check(Level.INFO)
 def unknown_to_missions(material: Material) -> Iterator[Found]:
     """Note the components that nothing reports, the attributes that nothing measures, and what is assumed."""
     content, subject = material.content, material.subject

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from enum import Enum
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -42,7 +41,6 @@ class Subject:
         revision: the scenario's, for messages.
         reported: the statuses that the simulation reports, by component; None: that is not checked.
         measured: the quality attributes that the scenario measures; None: that is not checked.
-        ranges: the smallest and the greatest value of measured attributes, where they are known.
         time_limit_s: for Pellet.
     """
 
@@ -57,21 +55,12 @@ class Subject:
     revision: str = ""
     reported: Mapping[str, Collection[str]] | None = None
     measured: Collection[str] | None = None
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     time_limit_s: float = TIME_LIMIT_S
 
     @property
     def given(self) -> list[Path]:
         """The ontologies, or the shipped one."""
         return list(self.ontologies) or [shipped_folder("ontology") / "suave.owl"]
-
-
-class Scope(Enum):
-    """What a check is about: rules, the model that ontologies describe, or what missions have to do with both."""
-
-    RULES = "rules"
-    MODEL = "model"
-    MISSIONS = "missions"
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,27 +118,25 @@ class Material:
 #: With what something is wrong (a rule, a thing by its name, a file), where in the rule, in words, and the remedy.
 Found = tuple[Rule | str | Path, Place | None, str, str | None]
 Check = Callable[[Material], Iterable[Found]]
-CHECKS: Final[list[tuple[Scope, Level, Check]]] = []
+CHECKS: Final[list[tuple[Level, Check]]] = []
 
 
-def check(level: Level, scope: Scope) -> Callable[[Check], Check]:
+def check(level: Level) -> Callable[[Check], Check]:
     """Add a function to the checks.
 
-    @check(Level.WARN, Scope.RULES)
+    @check(Level.WARN)
     def no_effect(material: Material) -> Iterator[Found]:
         for rule in material.rules:
             ...
     """
 
     def register(function: Check) -> Check:
-        CHECKS.append((scope, level, function))
+        CHECKS.append((level, function))
         return function
 
     return register
 
 
-def run_checks(material: Material, *scopes: Scope) -> Iterator[Finding]:
-    """Run the checks of some scopes."""
-    for scope, level, function in CHECKS:
-        if scope in scopes:
-            yield from (material.finding(level, found) for found in function(material))
+def run_checks(material: Material) -> Iterator[Finding]:
+    """Run all checks."""
+    return (material.finding(level, found) for level, function in CHECKS for found in function(material))

@@ -19,14 +19,11 @@ from suave_des.knowledge.checks.model import (
     undeclared_differences,
     unmeasured_rules,
 )
-from suave_des.knowledge.checks.registry import Found, Material, Scope, Subject, check, run_checks
+from suave_des.knowledge.checks.registry import Found, Material, Subject, check, run_checks
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import is_metamodel
 from suave_des.knowledge.rdf import (
     C_STATUS,
-    HAS_QA_VALUE,
-    HAS_VALUE,
-    IS_QA_TYPE,
     NUMERIC,
     TOMASYS,
     XSD,
@@ -62,7 +59,7 @@ _COMPARE: Final[Mapping[str, Callable[[float, float], bool]]] = {
 }
 
 
-@check(Level.ERROR, Scope.RULES)
+@check(Level.ERROR)
 def mistakes_that_pellet_ignores(material: Material) -> Iterator[Found]:
     """Find what Pellet would drop or ignore without a word."""
     skipped = set(map(id, rules_for_other_models(material)))
@@ -72,7 +69,7 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Found]:
             yield rule, place, each.message, each.remedy
 
 
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def shared_names(material: Material) -> Iterator[Found]:
     """Find rules of one name, other than those of TOMASys and mros."""
     names = Counter(rule.name for rule in material.content.rules)
@@ -84,7 +81,7 @@ def shared_names(material: Material) -> Iterator[Found]:
             yield rule, None, f"{names[rule.name]} rules have this name", "rename one"
 
 
-@check(Level.INFO, Scope.RULES)
+@check(Level.INFO)
 def for_other_models(material: Material) -> Iterator[Found]:
     """Note the rules of TOMASys and mros that need what this model does not have, a file in one line."""
     by_file: dict[Path, list[str]] = defaultdict(list)
@@ -94,7 +91,7 @@ def for_other_models(material: Material) -> Iterator[Found]:
         yield file, None, f"rules for other models, which never fire in this one: {', '.join(names)}", None
 
 
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def never_fires(material: Material) -> Iterator[Found]:
     """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
     content, model = material.content, material.base.model
@@ -106,7 +103,7 @@ def never_fires(material: Material) -> Iterator[Found]:
             yield rule, atom.place(), f"can never fire: {problem}", remedy
 
 
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def equal_individuals(material: Material) -> Iterator[Found]:
     """Find rules that ask for different individuals, where nothing makes any different."""
     remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
@@ -115,7 +112,7 @@ def equal_individuals(material: Material) -> Iterator[Found]:
         yield rule, atom.place(), problem, remedy
 
 
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def things_of_two_kinds(material: Material) -> Iterator[Found]:
     """Find variables and individuals that a rule would have to be of two kinds at once."""
     kinds = Kinds(material.content, material.base.model)
@@ -131,26 +128,11 @@ def things_of_two_kinds(material: Material) -> Iterator[Found]:
                 reported.add(term)
                 thing = f"?{term.name}" if isinstance(term, Variable) else local_name(getattr(term, "iri", ""))
                 first = with_article(local_name(before)) + (f" in {by}" if by else "")
-                yield (
-                    rule,
-                    atom.place(),
-                    f"{thing} is {first}, but {with_article(local_name(kind))} in {name}",
-                    _use(atom, kinds),
-                )
+                problem = f"{thing} is {first}, but {with_article(local_name(kind))} in {name}"
+                yield rule, atom.place(), problem, None
 
 
-def _use(atom: Atom, kinds: Kinds) -> str | None:
-    """What a property is for."""
-    subject, value = (kinds.wanted.get((atom.predicate, number)) for number in (0, 1))
-    name = local_name(atom.predicate)
-    if subject is None:
-        return None
-    if value is None:
-        return f"{name} is a property of {with_article(local_name(subject))}"
-    return f"{name} leads from {with_article(local_name(subject))} to {with_article(local_name(value))}"
-
-
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def misspelt_variables(material: Material) -> Iterator[Found]:
     """Find variables that occur once, and whose name is nearly that of another."""
     for rule in material.rules:
@@ -172,32 +154,19 @@ def misspelt_variables(material: Material) -> Iterator[Found]:
 
 
 def are_near(one: str, other: str) -> bool:
-    """Whether one name is probably a misspelling of the other: in its capitals, or in a letter inside it.
+    """Whether one name is probably a misspelling of the other: in its capitals, or in letters inside it.
 
-    Names that differ in a digit, in their first letter or in a letter or two at their end are often meant:
-    ?speed1 and ?speed2, ?xpos and ?ypos, ?design and ?design_b.
+    Names that differ in a digit, in their first letter or in their last one are often meant: ?speed1 and ?speed2,
+    ?xpos and ?ypos, ?design and ?design_b.
     """
     if one.casefold() == other.casefold():
         return one != other
-    short, long = sorted((one, other), key=len)
-    start = _same_letters(short, long)
-    end = _same_letters(short[start:][::-1], long[start:][::-1])
-    a, b = short[start : len(short) - end], long[start : len(long) - end]
-    if not start or not (a + b).islower() or not (a + b).isalpha():
-        return False
-    if sorted(a) == sorted(b):  # letters are exchanged
-        return len(a) == 2
-    is_inside = end > 0 or (not a and b == long[start - 1])
-    return len(a) <= 1 and len(b) == 1 and is_inside and len(short) >= (4 if a else 3)
+    has_same_ends = one[0] == other[0] and (one[-1] == other[-1] or sorted(one) == sorted(other))
+    is_word = (one + other).isalpha() and (one + other).islower() and min(len(one), len(other)) > 2
+    return has_same_ends and is_word and similar(one, [other], cutoff=0.8) is not None
 
 
-def _same_letters(one: str, other: str) -> int:
-    """Count the letters with which both begin."""
-    pairs = zip(one, other, strict=False)
-    return next((place for place, (a, b) in enumerate(pairs) if a != b), min(len(one), len(other)))
-
-
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def two_values(material: Material) -> Iterator[Found]:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
     for rule in material.rules:
@@ -223,30 +192,7 @@ def _same(one: Term, other: Term) -> bool:
     return one == other or (isinstance(one, Lit) and isinstance(other, Lit) and canonical(one) == canonical(other))
 
 
-@check(Level.WARN, Scope.RULES)
-def compared_with_itself(material: Material) -> Iterator[Found]:
-    """Find comparisons of a value with itself, by one variable or by two."""
-    for rule in material.rules:
-        holders: dict[Term, tuple[str, Term]] = {}
-        for atom in rule.body:
-            if atom.predicate in material.functional and atom.kind == "data":
-                holders.setdefault(atom.arguments[-1], (atom.predicate, atom.arguments[0]))
-        for atom in rule.body:
-            sign = COMPARISONS.get(atom.predicate)
-            terms = [term for term in atom.arguments if isinstance(term, Variable)]
-            if sign is None or len(terms) != 2:
-                continue
-            one, other = terms
-            holds = "always" if sign in ("=", "<=", ">=") else "never"
-            if one == other:
-                yield rule, atom.place(), f"{write_atom(atom)} compares ?{one.name} with itself: it {holds} holds", None
-            elif one in holders and holders[one] == holders.get(other):
-                name = local_name(holders[one][0])
-                problem = f"?{one.name} and ?{other.name} are the same {name}: {write_atom(atom)} {holds} holds"
-                yield rule, atom.place(), problem, "they need two different individuals"
-
-
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def no_effect(material: Material) -> Iterator[Found]:
     """Find rules that conclude that a design is realisable, which no decision asks."""
     is_asked = any(atom.predicate == _FD_REALISABILITY for rule in material.rules for atom in rule.body)
@@ -258,7 +204,7 @@ def no_effect(material: Material) -> Iterator[Found]:
                 yield rule, atom.place(), problem, "write the opposite condition, and conclude false"
 
 
-@check(Level.WARN, Scope.RULES)
+@check(Level.WARN)
 def comparisons_that_decide_nothing(material: Material) -> Iterator[Found]:
     """Find comparisons that no value satisfies, alone or together, and those with a text that none is."""
     vocabulary = material.base.vocabulary
@@ -305,44 +251,7 @@ def _is_possible(asked: Iterable[tuple[str, float, str]]) -> bool:
     return any(all(_COMPARE[sign](each, number) for sign, number, _ in asked) for each in tried)
 
 
-@check(Level.WARN, Scope.MISSIONS)
-def comparisons_decided_by_signals(material: Material) -> Iterator[Found]:
-    """Find the user's comparisons of a measured value with a number beyond all that missions measure."""
-    ranges = material.subject.ranges
-    if material.content.head_properties() & {HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE}:
-        return  # groundings have values from elsewhere, too
-    for rule in filter(material.is_own, material.rules):
-        measured = _measured(rule)
-        for atom, name, sign, value in _comparisons(rule):
-            number = number_in(value)
-            if number is None or measured.get(name) not in ranges:
-                continue
-            low, high = ranges[measured[name]]
-            tried = (low, high, min(max(float(number), low), high))
-            outcomes = {_COMPARE[sign](each, float(number)) for each in tried}
-            if len(outcomes) == 1:
-                outcome, reach = "always" if outcomes.pop() else "never", f"is between {low:g} and {high:g}"
-                problem = f"{write_atom(atom)} {outcome} holds in this scenario: {measured[name]} {reach}"
-                yield rule, atom.place(), problem, "check the number and its unit"
-
-
-def _measured(rule: Rule) -> dict[str, str]:
-    """Return the variables of a rule that stand for the number of a grounding's value, with its quality attribute."""
-    pairs = [(atom.predicate, *atom.arguments) for atom in rule.body if len(atom.arguments) == 2]
-    held = {term for predicate, _, term in pairs if predicate == HAS_QA_VALUE}
-    types = {
-        value: local_name(attribute.iri)
-        for predicate, value, attribute in pairs
-        if predicate == IS_QA_TYPE and value in held and isinstance(attribute, Named)
-    }
-    return {
-        number.name: types[value]
-        for predicate, value, number in pairs
-        if predicate == HAS_VALUE and value in types and isinstance(number, Variable)
-    }
-
-
-@check(Level.WARN, Scope.MISSIONS)
+@check(Level.WARN)
 def misspelt_statuses(material: Material) -> Iterator[Found]:
     """Find the user's rules that ask for a component's status that is nearly one that the simulation reports.
 
@@ -367,7 +276,7 @@ def misspelt_statuses(material: Material) -> Iterator[Found]:
                     yield rule, atom.place(1), problem, f'did you mean "{by_capitals[meant]}"?'
 
 
-@check(Level.INFO, Scope.RULES)
+@check(Level.INFO)
 def status_updatable(material: Material) -> Iterator[Found]:
     """Note the rules that conclude the status UPDATABLE."""
     for rule, atom in rules_of_2023(material.content):
@@ -388,4 +297,4 @@ def findings_on_rule(
     """
     files = [rule.file for rule in base.rules if rule.name == name]
     material = Material(Subject(rules=files, reported=reported, measured=measured), base)
-    return (each for each in run_checks(material, Scope.RULES, Scope.MISSIONS) if each.rule == name)
+    return (each for each in run_checks(material) if each.rule == name)

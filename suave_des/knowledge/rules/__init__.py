@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
@@ -127,7 +127,7 @@ class Rule:
         enabled: false when swrla:isRuleEnabled says so; Pellet itself ignores that mark.
         node: its node in the graph.
         triples: its RDF.
-        body: atoms that must hold, each with its place: in the text for a rule from a graph, else in its file.
+        body: atoms that must hold; those of a file of rules as text have their places.
         head: atoms that then hold.
         place: "line 12" in a file of rules as text; None for a rule of an ontology.
     """
@@ -273,31 +273,15 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
     return f"{start}\n    " + "\n    ^ ".join(sides[0]) + "\n    -> " + "\n    ^ ".join(sides[1]) + "\n"
 
 
-def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> tuple[str, tuple[Atom, ...], tuple[Atom, ...]]:
-    """Write a rule on one line, body -> head; also return body and head with the places of their atoms in it."""
-    text = ""
-    placed: list[list[Atom]] = [[], []]
-    for side, atoms in enumerate((body, head)):
-        for number, atom in enumerate(atoms):
-            text += " ^ " if number else (" -> " if side and body else "-> " if side else "")
-            places = [Place(1, len(text) + 1)]
-            text += f"{_predicate(atom, local_name)}("
-            for count, argument in enumerate(atom.arguments):
-                text += ", " if count else ""
-                places.append(Place(1, len(text) + 1))
-                text += _term(argument, local_name)
-            text += ")"
-            placed[side].append(replace(atom, places=tuple(places)))
-    return text, tuple(placed[0]), tuple(placed[1])
+def rule_text(body: Sequence[Atom], head: Sequence[Atom]) -> str:
+    """Write a rule without its name on one line: body -> head."""
+    return f"{' ^ '.join(map(write_atom, body))} -> {' ^ '.join(map(write_atom, head))}".strip()
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:
     """Write one atom."""
-    return f"{_predicate(atom, named)}({', '.join(_term(term, named) for term in atom.arguments)})"
-
-
-def _predicate(atom: Atom, named: Naming) -> str:
-    return named(atom.predicate) if atom.predicate else "nothing"
+    predicate = named(atom.predicate) if atom.predicate else "nothing"
+    return f"{predicate}({', '.join(_term(term, named) for term in atom.arguments)})"
 
 
 def _term(term: Term, named: Naming) -> str:

@@ -32,7 +32,7 @@ from suave_des.knowledge.rules import (
     Term,
     Variable,
     distinct_variables,
-    line_of_rule,
+    rule_text,
 )
 from suave_des.knowledge.rules.checks import Vocabulary, first_error
 from suave_des.knowledge.rules.parser import ParsedRules, parse_rule, parse_rules
@@ -125,8 +125,7 @@ def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Ru
         RuleError: a name is unknown or ambiguous; with line and column.
     """
     body, head = (tuple(_resolved(atom, vocabulary, file) for atom in side) for side in (parsed.body, parsed.head))
-    text, _, _ = line_of_rule(body, head)
-    place = f"line {parsed.place.line}"
+    text, place = rule_text(body, head), f"line {parsed.place.line}"
     return with_triples(Rule(parsed.name, text, file, parsed.enabled, BNode(), (), body, head, place))
 
 
@@ -212,30 +211,17 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
 
 @lru_cache(maxsize=4)  # as many as there are graphs in the cache of those: their rules are read again and again
 def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
-    found = sorted(
-        ((line_of_rule(*_sides(graph, node)), node) for node in graph.subjects(RDF.type, IMP)),
-        key=lambda rule: (rule[0][0], str(rule[1])),
-    )
-    unnamed = 0
-    rules = []
-    for (text, body, head), node in found:
+    rules, unnamed = list[Rule](), 0
+    found = [(node, _sides(graph, node)) for node in graph.subjects(RDF.type, IMP)]
+    texts = [(rule_text(*sides), node, sides) for node, sides in found]
+    for text, node, (body, head) in sorted(texts, key=lambda each: (each[0], str(each[1]))):
         label = graph.value(node, RDFS.label)
         name = str(label) if label is not None else local_name(str(node))
         if label is None and isinstance(node, BNode):
             unnamed += 1
             name = f"rule {unnamed} {WITHOUT_NAME}"
-        rules.append(
-            Rule(
-                name=name,
-                text=text,
-                file=path,
-                enabled=str(graph.value(node, ENABLED)).strip().lower() not in ("false", "0"),
-                node=node,
-                triples=tuple(_closure(graph, node)),
-                body=body,
-                head=head,
-            )
-        )
+        enabled = str(graph.value(node, ENABLED)).strip().lower() not in ("false", "0")
+        rules.append(Rule(name, text, path, enabled, node, tuple(_closure(graph, node)), body, head))
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
 
 
@@ -266,18 +252,19 @@ def _items(graph: Graph, start: Node | None) -> Iterator[Node]:
             yield from graph.items(start)
 
 
-def _sides(graph: Graph, rule: Node) -> list[tuple[Atom, ...]]:
+def _sides(graph: Graph, rule: Node) -> tuple[tuple[Atom, ...], tuple[Atom, ...]]:
     """Body and head, with short names for variables."""
-    sides = [
+    body, head = (
         [_read_atom(graph, atom) for atom in _items(graph, graph.value(rule, URIRef(SWRL + side)))]
         for side in ("body", "head")
-    ]
-    names = distinct_variables((*sides[0], *sides[1]))
+    )
+    names = distinct_variables((*body, *head))
 
-    def renamed(term: Term) -> Term:
-        return Variable(names[term.name]) if isinstance(term, Variable) else term
+    def renamed(atom: Atom) -> Atom:
+        terms = (Variable(names[each.name]) if isinstance(each, Variable) else each for each in atom.arguments)
+        return replace(atom, arguments=tuple(terms))
 
-    return [tuple(replace(atom, arguments=tuple(map(renamed, atom.arguments))) for atom in side) for side in sides]
+    return tuple(map(renamed, body)), tuple(map(renamed, head))
 
 
 def _read_atom(graph: Graph, node: Node) -> Atom:
