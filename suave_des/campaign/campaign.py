@@ -39,10 +39,7 @@ from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario
 
 __all__ = ["CampaignInterrupted", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
-_MORE_MANAGERS = (
-    "for other managers, run a second campaign with the same seed into another folder:"
-    " suave-des compare {} FOLDER pairs their runs by number"
-)
+_MORE_MANAGERS = "for other managers, run a campaign with the same seed into another folder: compare pairs their runs"
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -72,22 +69,11 @@ def run_campaign(
 
     The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
     mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
-    the others are kept.
-
-    Example:
-        result = run_campaign("seams2023", ["none", "metacontrol"], runs=100, workers=2)
-        print(result.frame().groupby("manager")["search_time_s"].mean())
-
-    Args:
-        scenario, managers, runs, seed, out, options: see CampaignSpec and load_scenario.
-        workers: None: 2, or 1 for few missions of built-in managers.
-        on_progress: called when missions are done.
+    the others are kept. `on_progress` is called when missions are done.
 
     Raises:
-        InputError: something given cannot be used; nothing is written then.
-        WorkerError: worker processes end again and again; finished missions are kept.
-        StoreError: the disk is full, or the folder was removed.
         CampaignInterrupted: Ctrl-C; finished missions are kept.
+        InputError, WorkerError, StoreError: as suave_des.run_campaign.
     """
     if managers is not None:
         several = managers if isinstance(managers, Iterable) and not isinstance(managers, str | type) else [managers]
@@ -124,11 +110,7 @@ def resume_campaign(
     """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it has.
 
     Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
-
-    Args:
-        folder, runs, scheduler, managers, confirmed: see suave_des.resume_campaign.
-        workers: as in run_campaign; the number may differ.
-        on_progress: called when missions are done.
+    `on_progress` is called when missions are done.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
@@ -164,13 +146,7 @@ def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: 
 def _stored(
     folder: Path, changed: Mapping[str, Any], named: Collection[str], *, confirmed: bool
 ) -> Iterator[tuple[Store, Campaign]]:
-    """Open the campaign in a folder, and check that its code is trusted.
-
-    Args:
-        folder: the campaign's.
-        changed: options that differ from the stored ones.
-        named, confirmed: see check_trusted.
-    """
+    """Open the campaign in a folder, with options that differ from the stored ones; check that its code is trusted."""
     if not has_campaign(folder):
         raise InputError("there is no campaign in it", file=folder, remedy="give the --out folder of a campaign")
     with closing(Store(folder / STORE_FILE)) as store:
@@ -186,7 +162,7 @@ def _stored(
             for name in named:
                 if name not in known:
                     problem = f"the campaign has no manager {name!r}, and cannot be given new ones"
-                    remedy = f"{did_you_mean(name, known, 'its managers')}; {_MORE_MANAGERS.format(folder)}"
+                    remedy = f"{did_you_mean(name, known, 'its managers')}; {_MORE_MANAGERS}"
                     raise InputError(problem, file=folder, remedy=remedy)
             check_trusted(campaign, named, folder, confirmed=confirmed)
         except InputError as error:
@@ -203,7 +179,7 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
         raise InputError(
             "the output folder is not empty: it has a campaign in it",
             file=folder,
-            remedy=f"--resume {folder} continues it, --overwrite replaces it; {_MORE_MANAGERS.format(folder)}",
+            remedy=f"--resume {folder} continues it, --overwrite replaces it; {_MORE_MANAGERS}",
         )
 
 
@@ -221,7 +197,7 @@ def _run(
         spec: the whole specification.
         read: reads the campaign.
         store: of the campaign that is resumed; None: it is new.
-        on_progress: called when missions are done.
+        on_progress: as of run_campaign.
     """
     executor: Executor = in_process
     spec.check()

@@ -52,12 +52,7 @@ _told: set[Hashable] = set()
 
 
 def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None) -> Campaign:
-    """Read the scenario of a campaign and what varies, without running any code of the user's.
-
-    Args:
-        request: what was given of the specification.
-        file: the campaign file, if there is one.
-        loaded: the scenario; None: it is read.
+    """Read the scenario of a campaign, unless it is given, and what varies, without running any code of the user's.
 
     Raises:
         InputError: an input is invalid.
@@ -129,10 +124,7 @@ def _own(folder: Path, name: str) -> Path | None:
 
 
 def check_campaign(campaign: Campaign) -> dict[str, str]:
-    """Check the inputs of a campaign; runs code of its managers and functions.
-
-    Returns:
-        SHA-256 of each further file that decides.
+    """Check the inputs of a campaign, and return the SHA-256 of each further file that decides; runs the user's code.
 
     Raises:
         InputError: an input is invalid.
@@ -263,13 +255,7 @@ _INSTALLED = (
 def code_files(managers: Sequence[str], functions: Sequence[type]) -> dict[str, Path]:
     """Find the files that decide what managers and functions do, and that are not the project's own.
 
-    Args:
-        managers: names, or module:Class.
-        functions: classes of user-defined functions.
-
-    Returns:
-        Each file by its place below a folder of modules, such as "package/module.py": those of user_modules, and of a
-        class that a package has installed its module.
+    They are those of user_modules, and of a class that a package has installed its module.
     """
     found = user_modules(managers, functions)
     for module in _defining(managers, functions):
@@ -295,7 +281,7 @@ def user_modules(managers: Iterable[str], functions: Iterable[type]) -> dict[str
     Imports are read from the source, so that one inside a function counts too; one by a computed name does not.
 
     Returns:
-        Each file by its place below a folder of modules; a script is at MAIN.
+        Each file by its place below a folder of modules, such as "package/module.py"; a script is at MAIN.
     """
     found: dict[str, Path] = {}
     names = _defining(managers, functions)
@@ -379,10 +365,7 @@ def code_versions() -> dict[str, str]:
 def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
     """Return versions, machine, command line and input files; no time of day, so that equal work gives equal files.
 
-    Args:
-        loaded: the scenario with its files.
-        inputs: SHA-256 of each input file that is not among those of the scenario, by its name as shown to the user.
-        command: the command line, program first; empty when called from Python.
+    `inputs` has the SHA-256 of files that are not among those of the scenario; `command` is empty in Python.
     """
     return {
         "versions": versions(),
@@ -394,12 +377,7 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
 
 
 def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """Return everything that determines a campaign's results, as plain data.
-
-    Args:
-        campaign: the campaign.
-        inputs: SHA-256 of each further file, as check_campaign returns it.
-    """
+    """Return everything that determines a campaign's results, as plain data; `inputs` are those of check_campaign."""
     spec, loaded = campaign.spec, campaign.loaded
     # The scenario's own files are compared by their content: another comment in them decides nothing.
     modes = shown_name(loaded.modes_path)

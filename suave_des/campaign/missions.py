@@ -88,8 +88,7 @@ class Campaign:
     def missions(self, settled: Callable[[int, int], Collection[int]]) -> Iterator[MissionKey]:
         """Yield the missions that have yet to be run, in order.
 
-        Args:
-            settled: returns the runs of a manager at a point that need not be run; called when their turn comes.
+        `settled` returns the runs of a manager at a point that need not be run; it is called when their turn comes.
         """
         for point, manager in product(range(self.variation.sweep.points), range(len(self.spec.managers))):
             known = settled(point, manager)
@@ -144,12 +143,7 @@ class MissionRunner:
         self._too_long, self._in_time = Counter[int](), set[int]()
 
     def run(self, manager: str, run: int, point: int = 0) -> tuple[LoadedScenario, MissionResult]:
-        """Run a mission again, with its record; return its scenario and result.
-
-        Args:
-            manager: one of the campaign's.
-            run: number of the run.
-            point: of its sweep, 0 without one.
+        """Run a mission of the campaign again, with its record; return its scenario and result.
 
         Raises:
             InputError: the campaign has no such run or point.

@@ -153,10 +153,7 @@ class CampaignResult:
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
 
     def write(self, provenance: Mapping[str, Any]) -> None:
-        """Write the campaign's files into its folder, replacing those of an earlier campaign.
-
-        Args:
-            provenance: versions, machine, command line and input files, for the manifest.
+        """Write the campaign's files, with its provenance in the manifest, into its folder, replacing earlier ones.
 
         Raises:
             InputError: they cannot be written; nothing half-written stays.
@@ -217,13 +214,7 @@ class CampaignResult:
 
 
 def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]) -> CampaignResult:
-    """Summarise the outcomes of a campaign's missions.
-
-    Args:
-        campaign: the campaign.
-        outcomes: reads the outcomes that were kept.
-        remarks: remarks about managers for users.
-    """
+    """Summarise the outcomes of a campaign's missions, with remarks about managers for users."""
     spec, variation = campaign.spec, campaign.variation
     failures: list[MissionFailure] = []
     found: dict[tuple[int, ...], Row] = {}

@@ -118,8 +118,6 @@ class CampaignSpec(CampaignKeys):
     """Run missions on the workers of this Dask scheduler; results are the same."""
     overwrite: bool = False
     """Replace results of the same kind in the output folder."""
-    confirmed: Annotated[bool, Option(flag="--yes")] = False
-    """With --resume: trust the code that DIR names."""
     command: tuple[str, ...] = ()
     """The command line, for the manifest."""
     folder: str = ""
@@ -153,7 +151,7 @@ class CampaignSpec(CampaignKeys):
 
     def stored(self) -> dict[str, Any]:
         """Return what a resumed campaign needs, as plain data: not how and where it runs, which may differ then."""
-        how = {"out", "workers", "scheduler", "overwrite", "confirmed"}
+        how = {"out", "workers", "scheduler", "overwrite"}
         return self.model_dump(mode="json", exclude_unset=True, exclude=how)
 
     def with_file(self, file: CampaignFile | None) -> Self:

@@ -259,13 +259,6 @@ def vary(
 ) -> tuple[LoadedScenario, Variation]:
     """Put the distributions of perturbations into a scenario; return it with the variation.
 
-    Args:
-        loaded: the scenario.
-        sweep: values by key path; or a mapping with grid, zip and sample.
-        perturbations: distribution by key path.
-        runs_per_draw: number of consecutive runs that share a draw.
-        seed: the campaign's.
-
     Raises:
         InputError: a key path leads nowhere, a value is not allowed there, or the sweep has no points; its place is
             the key path within what was given.

@@ -19,6 +19,7 @@ from suave_des.cli.options import (
     Given,
     ManagerOptions,
     Quiet,
+    Trusted,
     check_no_use,
     command_line,
     complete_scenarios,
@@ -40,7 +41,7 @@ _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
 _NARROW = 8
 """A heading is broken into lines of about this width where the summary is too wide otherwise."""
-_MAY_CHANGE = ("managers", "runs", "workers", "scheduler", "confirmed")
+_MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
 """Options of a campaign that is resumed, too."""
 
 
@@ -71,6 +72,7 @@ def campaign(
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
     ] = None,
+    yes: Trusted = False,
     form: Annotated[
         list[ResultFormat] | None,
         typer.Option(
@@ -96,13 +98,15 @@ def campaign(
     elif scenario is None or "out" not in options:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
+    else:
+        check_no_use({"--yes": yes}, "without --resume")
     from suave_des.campaign.campaign import resume_campaign, run_campaign
     from suave_des.campaign.spec import managers_of
 
     with progress(str(resume or scenario), quiet=quiet) as show:
         settings: Given = {"workers": None, **options}
         if resume is not None:
-            result = resume_campaign(resume, on_progress=show, **settings)
+            result = resume_campaign(resume, on_progress=show, confirmed=yes, **settings)
         else:
             assert scenario is not None
             managers = options.get("managers") or (managers_of(scenario) if manager_option else ())

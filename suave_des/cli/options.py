@@ -85,6 +85,7 @@ ManagersInData = Annotated[
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings about rules and ontologies.")]
+Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
 ManagerOptions = Annotated[
     list[str] | None,

@@ -13,6 +13,7 @@ from suave_des.cli.options import (
     Files,
     Results,
     SeedIfNew,
+    Trusted,
     check_no_use,
     comma_separated,
     complete_managers,
@@ -267,7 +268,7 @@ def replay(
         typer.Option(metavar="FILE", help="Page to write.", show_default="replay.html, in DIR or the current folder"),
     ] = None,
     show: Open = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")] = False,
+    yes: Trusted = False,
     *,
     files: Files,
 ) -> None:

@@ -144,12 +144,6 @@ def test_the_interval_of_a_difference_is_over_draws_not_over_the_runs_that_share
     )
 
 
-def test_a_member_without_a_difference_is_neither_above_nor_below():
-    ensemble = Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,)))
-    (found,) = differences(rows_of({0: [1.0] * 3, 1: [1.0, 0.0, 3.0]}), ["none", "bt"], {"x": 0}, ensemble)
-    assert (found["members_above_0"], found["members_below_0"]) == (1, 1)
-
-
 def test_a_run_that_one_manager_lacks_is_left_out():
     ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
     rows = [row for row in rows_of({0: [1.0, 2.0], 1: [1.0, 5.0]}) if row[0] != MissionKey(0, 0, 1)]

@@ -13,7 +13,7 @@ from suave_des.errors import MISTAKES_LOGGER
 from suave_des.findings import Finding
 from suave_des.knowledge.checks import Subject, findings_in
 from suave_des.knowledge.ontology import Ontology
-from tests.helpers.command import command_here, suave_des_command
+from tests.helpers.command import command_here
 
 STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
 
@@ -45,12 +45,6 @@ def test_a_mistaken_rule_is_told_in_the_words_of_kb_check(
     assert finding == f"WARN   mine.swrl: line 1, rule Late, column 20: {STATUS}"
     assert finding in command_here("kb", "check", "--rules", wrong_rule, cwd=tmp_path).stdout.splitlines()
     assert "suave-des kb check" in pointer
-
-
-def test_it_is_told_on_standard_error(tmp_path: Path, wrong_rule: str) -> None:
-    ran = suave_des_command("run", "seams2023", "--rules", wrong_rule, "--manager", "none", cwd=tmp_path)
-    assert STATUS in ran.stderr
-    assert "c_status" not in ran.stdout
 
 
 def test_it_changes_no_result(tmp_path: Path, wrong_rule: str, monkeypatch: pytest.MonkeyPatch) -> None:

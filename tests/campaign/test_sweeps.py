@@ -151,11 +151,8 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
     [
         ("campaign: 2\nscenario: seams2023\n", "line 1, campaign: a campaign file of version 2"),
         ("campaign: 1\n", "scenario: is missing"),
-        ("campaign: 1\nscenario: nowhere.yaml\n", "line 2, scenario: no such file"),
         (HEAD + "sweeps: {}\n", "line 6, sweeps: unknown key 'sweeps' (did you mean 'sweep'?"),
-        (HEAD + "sweep: [1]\n", "line 6, sweep: [1] should be a mapping"),
         (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
-        (HEAD + "sweep:\n  visibility.period_s: []\n", "line 7, sweep.visibility.period_s: [] "),
         (HEAD + "sweep:\n  visibility.period_s: 40\n", "line 7, sweep.visibility.period_s: 40 should be a list"),
         (HEAD + "sweep:\n  visibility.period_s: [40, 40]\n", "40 is given twice"),
         (
@@ -167,14 +164,11 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: cannot stand beside grid"),
         (HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n", "start.x_m has 1, start.y_m has 2"),
         (HEAD + "sweep:\n  sample: {method: sobol, points: 6, ranges: {start.x_m: [1, 2]}}\n", "give 4 or 8"),
-        (HEAD + "sweep:\n  sample: {method: sobol, points: 8}\n", "sweep.sample: ranges: is missing"),
         (
             HEAD + "sweep:\n  sample: {method: sobol, points: 8, ranges: {start.x_m: [2, 1]}}\n",
             "[2.0, 1.0] is no range",
         ),
-        (HEAD + "runs_per_draw: 0\n", "line 6, runs_per_draw: 0 "),
         (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: expected a distribution, got 3"),
-        (HEAD + f"perturbations:\n  start.q_m: {UNIFORM % (1, 2)}\n", "did you mean 'z_m'?"),
         (
             HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n",
             "is drawn at each use, not once per run",
