@@ -50,10 +50,9 @@ def _address(scheduler: str) -> str:
 
 
 class Option(NamedTuple):
-    """How a field is given on the command line, as far as it is not --NAME-OF-FIELD with a value of its type."""
+    """How a field is shown on the command line."""
 
     metavar: str | None = None
-    flag: str = ""
     default: str = ""
     """As shown, where the field itself has none."""
 
@@ -67,9 +66,7 @@ class CampaignKeys(Strict):
     """Missions for each manager, at each point of a sweep."""
     seed: Annotated[Whole, Field(ge=0, le=SEED_LIMIT)] = 1
     """Random seed."""
-    time_out_s: Annotated[
-        Real, Field(gt=0, le=1e6), Option("SECONDS", "--time-out", "120; with the reasoner owlready2 1800")
-    ] = 120.0
+    time_out_s: Annotated[Real, Field(gt=0, le=1e6), Option("SECONDS", "120; with the reasoner owlready2 1800")] = 120.0
     """Wall-clock limit for a mission, in s."""
     sweep: dict[str, Any] = Field(default_factory=dict)
     """Lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the same), `zip`

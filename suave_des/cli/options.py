@@ -116,24 +116,23 @@ class Fields:
 
     def parameters(self) -> Iterator[inspect.Parameter]:
         """Yield an option for each field."""
-        from suave_des.campaign.spec import CampaignSpec
+        from suave_des.campaign.spec import CampaignSpec, Option
         from suave_des.scenario.schema import field_docs
 
         texts = field_docs(CampaignSpec)
         for name in self.names:
             declared = CampaignSpec.model_fields[name]
-            option, kind = _option(name), next(each for each in _KINDS if each in _types_in(declared.annotation))
-            help_text = self.help.get(name) or " ".join(texts[name].split())
-            default = self.default.get(name) or option.default or _written(declared.default)
+            shown_as = next((each for each in declared.metadata if isinstance(each, Option)), Option())
+            kind: Any = next(each for each in _KINDS if each in _types_in(declared.annotation))
             given = typer.Option(
-                option.flag,
-                metavar=option.metavar,
-                help=help_text,
-                show_default=default or False,
+                _flag(name),
+                metavar=shown_as.metavar,
+                help=self.help.get(name) or " ".join(texts[name].split()),
+                show_default=self.default.get(name) or shown_as.default or _written(declared.default) or False,
                 autocompletion=complete_managers if name == "managers" else None,
             )
-            annotation: Any = Annotated[bool if kind is bool else kind | None, given]
-            yield _keyword(name, False if kind is bool else None, annotation)
+            default, accepted = (False, bool) if kind is bool else (None, kind | None)
+            yield _keyword(name, default, Annotated[accepted, given])
 
     def taken(self, given: dict[str, Any]) -> Given:
         """Take what is given from a command's arguments; of names, there may be several, with commas between them."""
@@ -147,12 +146,8 @@ class Fields:
 _KINDS = (bool, int, float, Path, str)
 
 
-def _option(name: str) -> Any:
-    from suave_des.campaign.spec import CampaignSpec, Option
-
-    declared = CampaignSpec.model_fields[name].metadata
-    option = next((each for each in declared if isinstance(each, Option)), Option())
-    return option._replace(flag=option.flag or f"--{name.replace('_', '-')}")
+def _flag(name: str) -> str:
+    return f"--{name.removesuffix('_s').replace('_', '-')}"
 
 
 def _types_in(annotation: Any) -> set[Any]:
@@ -167,7 +162,7 @@ def _written(default: Any) -> str:
 
 def flags(given: Given) -> dict[str, Any]:
     """Name what is given by its options: {"--time-out": 60.0}."""
-    return {_option(name).flag: value for name, value in given.items()}
+    return {_flag(name): value for name, value in given.items()}
 
 
 @dataclass(frozen=True)
@@ -188,7 +183,8 @@ class KnowledgeFiles:
     set: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="KEY=VALUE", help="Override a scenario value, such as mission.time_limit_s=400; repeatable."
+            metavar="KEY=VALUE",
+            help="Override a scenario value, its key as in a sweep: visibility.period_s=40; repeatable.",
         ),
     ] = None
 

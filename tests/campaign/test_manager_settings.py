@@ -69,6 +69,8 @@ def test_a_sweep_varies_a_managers_own_setting_which_the_scenario_need_not_have(
 
 def test_values_by_key_path_are_those_of_the_scenario() -> None:
     assert load_scenario("seams2023", values={"mission.time_limit_s": 120}).scenario.mission.time_limit_s == 120.0
+    by_sweeps_name = load_scenario("seams2023", values={"visibility.period_s": 40})
+    assert by_sweeps_name.scenario.signals["water_visibility"].period_s == 40.0
     with pytest.raises(InputError, match=r"--set: mission\.time_limit: unknown key"):
         load_scenario("seams2023", values={"mission.time_limit": 120})
 
