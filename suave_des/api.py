@@ -57,7 +57,7 @@ class RecordedMission(MissionResult):
         """
         from suave_des.results.figures import draw_mission
 
-        return draw_mission(record_of(self, self.loaded.scenario, self.loaded.inputs), kind)
+        return draw_mission(record_of(self, self.loaded), kind)
 
 
 @plain_arguments(lambda: Replacements.__annotations__)
@@ -107,7 +107,7 @@ def run_mission(
     result = Simulator(loaded).run(name, run, seed, record=True)
     if folder is not None:
         make_output_folder(folder)
-        files = mission_files(result, loaded.scenario, provenance(loaded, inputs, command))
+        files = mission_files(result, loaded, provenance(loaded, inputs, command))
         write_files(folder, files, stale=(KNOWLEDGE_FILE,))
     return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
 

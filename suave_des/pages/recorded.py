@@ -41,7 +41,7 @@ class Recorded:
 
 def recorded_result(loaded: LoadedScenario, result: MissionResult) -> Recorded:
     """Take a mission that was just run, with its record."""
-    return Recorded(record_of(result, loaded.scenario, loaded.inputs), loaded.scenario, loaded)
+    return Recorded(record_of(result, loaded), loaded.scenario, loaded)
 
 
 def recorded(record: MissionRecord) -> Recorded:

@@ -13,7 +13,7 @@ from suave_des.files import csv_text, json_text, opened, read_json
 from suave_des.metrics.result import Event, KnowledgeRecord, MissionResult, TrajectoryPoint
 from suave_des.records.knowledge import KNOWLEDGE_FILE, knowledge_text, read_knowledge
 from suave_des.records.metrics import COLUMNS, further_of, row_of
-from suave_des.scenario.models import Scenario
+from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:
     import pandas
@@ -40,6 +40,7 @@ class MissionRecord:
         trajectory: trajectory.csv; mode is empty before the first one, other missing values are nan.
         knowledge: the states that its manager reasoned about.
         inputs: SHA-256 of each input file, by its name.
+        search_altitudes_m: of the search modes.
     """
 
     metrics: Mapping[str, Any]
@@ -48,6 +49,7 @@ class MissionRecord:
     trajectory: pandas.DataFrame
     knowledge: tuple[KnowledgeRecord, ...] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
+    search_altitudes_m: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -61,12 +63,12 @@ class MissionRecord:
         return float(self.trajectory["t_s"].iloc[-1])
 
 
-def mission_files(result: MissionResult, scenario: Scenario, provenance: Mapping[str, Any]) -> dict[str, str]:
+def mission_files(result: MissionResult, loaded: LoadedScenario, provenance: Mapping[str, Any]) -> dict[str, str]:
     """Return the content of each file of a mission's folder, by its name.
 
     Args:
         result: of the mission, with its record.
-        scenario: the mission's.
+        loaded: the mission's scenario.
         provenance: further keys of mission.json, which say how it was made.
     """
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
@@ -74,7 +76,8 @@ def mission_files(result: MissionResult, scenario: Scenario, provenance: Mapping
     mission = {
         "metrics": _metrics(result),
         "drawn": dict(sorted(result.drawn.items())),
-        "scenario": scenario.model_dump(mode="json"),
+        "scenario": loaded.scenario.model_dump(mode="json"),
+        "search_altitudes_m": loaded.modes.search_altitudes_m,
         **provenance,
     }
     files = {
@@ -89,10 +92,11 @@ def _metrics(result: MissionResult) -> dict[str, Any]:
     return dict(zip((*COLUMNS, *result.further), (*row_of(result.metrics), *further_of(result)), strict=True))
 
 
-def record_of(result: MissionResult, scenario: Scenario, inputs: Mapping[str, str]) -> MissionRecord:
+def record_of(result: MissionResult, loaded: LoadedScenario) -> MissionRecord:
     """Return the record of a mission that was just run, as its folder would have it."""
     frames = result.events_frame(), result.trajectory_frame()
-    return MissionRecord(_metrics(result), scenario.model_dump(mode="json"), *frames, result.knowledge, inputs)
+    scenario, altitudes_m = loaded.scenario.model_dump(mode="json"), loaded.modes.search_altitudes_m
+    return MissionRecord(_metrics(result), scenario, *frames, result.knowledge, loaded.inputs, altitudes_m)
 
 
 def read_mission(folder: Path) -> MissionRecord:
@@ -107,6 +111,7 @@ def read_mission(folder: Path) -> MissionRecord:
     mission = read_json(path)
     try:
         metrics, scenario, inputs = mission["metrics"], mission["scenario"], dict(mission.get("inputs_sha256", {}))
+        altitudes_m = {mode: float(value) for mode, value in mission.get("search_altitudes_m", {}).items()}
         np.array(scenario["pipeline"]["vertices_m"], dtype=float)
         _check_columns(path, _METRICS, metrics)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -116,7 +121,7 @@ def read_mission(folder: Path) -> MissionRecord:
     trajectory = trajectory.assign(**{name: 0.0 for name in _ANGLES if name not in trajectory})
     states = folder / KNOWLEDGE_FILE
     knowledge = read_knowledge(states) if states.is_file() else ()
-    return MissionRecord(metrics, scenario, events, trajectory, knowledge, inputs)
+    return MissionRecord(metrics, scenario, events, trajectory, knowledge, inputs, altitudes_m)
 
 
 def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from suave_des.domain import DEFAULT_MODE, FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, UNGROUND_MODE
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, UNGROUND_MODE
 from suave_des.records.mission_folder import MissionRecord
 from suave_des.results import style
 from suave_des.results.mission import (
@@ -301,7 +301,6 @@ _LISTED = 26
 _COLUMN_LETTERS = 66
 """Longest line of which two stand side by side."""
 _FAILED, _TASK, _ON = style.VERMILION, "#D9D9D9", "#9ECAE1"
-_SPIRAL_ALTITUDES_M = {"fd_spiral_low": 1.0, "fd_spiral_medium": 2.0, "fd_spiral_high": 3.0, DEFAULT_MODE: 1.0}
 
 Rules = Mapping[tuple[float, str], Sequence[str]]
 """Names of the rules that made a function be adapted, by time (s) and function."""
@@ -393,7 +392,7 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
         if function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
             asked.pop(function, None)
             if not is_off(function, mode):
-                spiral_m = _SPIRAL_ALTITUDES_M.get(mode, np.nan)
+                spiral_m = record.search_altitudes_m.get(mode, np.nan)
                 asked[function] = spiral_m if function == GENERATE_SEARCH_PATH else follow_m
             times_s.append(t_s)
             altitudes_m.append(next(reversed(asked.values()), np.nan))
@@ -403,12 +402,12 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
 def _lines(record: MissionRecord) -> Iterator[_Line]:
     """Yield the lines of the chart: tasks, the modes of each function, and failures."""
     yield _Line("task", [(span, _TASK, plain(span.what)) for span in task_spans(record)])
-    colours = mode_colours(record) | style.MODE_COLOURS
+    colours = style.MODE_COLOURS | mode_colours(record)
     for function, spans in mode_spans(record).items():
         bars = []
         for span in spans:
             if not is_off(function, span.what):
-                is_moving = span.what in style.MODE_COLOURS and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
+                is_moving = span.what in colours and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
                 colour = colours[span.what] if is_moving else _ON if "recover" not in span.what else style.ORANGE
                 bars.append((span, colour, function_mode_words(function, span.what)))
         yield _Line(function_words(function), bars)
