@@ -186,12 +186,9 @@ class FigureKind(StrEnum):
     TIMELINE = "timeline"
     DISTRIBUTIONS = "distributions"
     RAINCLOUD = "raincloud"
-    DETECTIONS = "detections"
     DIFFERENCES = "differences"
-    REACTIONS = "reactions"
     SWEEP = "sweep"
     HEATMAP = "heatmap"
-    PATHS = "paths"
 
 
 def figure(
@@ -202,8 +199,8 @@ def figure(
     kind: Annotated[
         FigureKind,
         typer.Option(
-            help="For a mission: map, timeline; for several: paths; for a campaign: distributions, raincloud,"
-            " detections, differences, reactions; for a sweep: sweep, heatmap."
+            help="For a mission: map, timeline; for a campaign: distributions, raincloud, differences;"
+            " for a sweep: sweep, heatmap."
         ),
     ] = FigureKind.AUTO,
     parameters: Annotated[
@@ -212,8 +209,7 @@ def figure(
 ) -> None:
     """Draw a mission's map or a campaign's results.
 
-    By default the contents of DIR decide: the map of a mission, the paths of several, a campaign's distributions, or
-    the means of a sweep.
+    By default the contents of DIR decide: the map of a mission, a campaign's distributions, or the means of a sweep.
     """
     from suave_des.results.figures import draw_results
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from textwrap import fill
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -18,12 +19,12 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.textpath import TextPath
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, PercentFormatter
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError
-from suave_des.estimates import mean_of, percent
-from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS, SEARCH_TIME
+from suave_des.estimates import mean_of
+from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
 from suave_des.results import style
 from suave_des.results.missions import Group, Missions, first_alike, first_and_last, runs_sharing_draw, time_limit_s
 from suave_des.results.statistics import Sample
@@ -53,17 +54,15 @@ _MEAN: dict[str, Any] = {
     "capsize": 2.5,
     "color": "k",
 }
-_TIME_BIN_S = 5.0
-_LEGEND_SHARE = 0.1
-_FAR_APART = 50.0
-"""Reaction times that differ by more than this factor are drawn on a logarithmic axis."""
 
 
 def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
     labels = [*map(_label, groups), "marks at 0%: means"]
-    figure = _figure(labels)
-    for axes, metric, title in _metric_panels(figure, sharey=True):
+    rows = math.ceil(len(labels) / _legend_columns(labels))
+    legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
+    for axes, metric, title in _metric_panels(figure):
         end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
         for number, group in _looks(groups):
             values = np.sort(group.known_values(metric))
@@ -76,7 +75,8 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     _mark_limit(figure.axes[0], groups)
     figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
-    handles = [*_handles(groups), Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
+    curves = [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
+    handles = [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
     _legend(figure, handles, labels)
     return figure
 
@@ -90,7 +90,7 @@ def _mark_limit(axes: Axes, groups: Sequence[Group]) -> None:
         axes.text(limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
 
 
-def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> style.Picture:
+def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group] = MappingProxyType({})) -> style.Picture:
     """Draw for each group a cloud (density), a box (quartiles, median, mean) and rain (missions).
 
     Args:
@@ -99,7 +99,7 @@ def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> 
     """
     height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
-    for axes, metric, title in _metric_panels(figure, sharey=True):
+    for axes, metric, title in _metric_panels(figure):
         for row, (number, group) in enumerate(_looks(groups)):
             _raincloud(axes, row, number, group, metric, published.get(group.name))
         axes.set_xlabel(title)
@@ -185,7 +185,7 @@ def draw_differences(groups: Sequence[Group]) -> style.Picture:
     height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
-    for place, (axes, _, title) in enumerate(_metric_panels(figure, sharey=True)):
+    for place, (axes, _, title) in enumerate(_metric_panels(figure)):
         axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
         for row, (one, _, apart) in enumerate(rows):
             _draw_row_of_differences(axes, row, apart[place], colours[one.name], has_numbers=not shares)
@@ -246,104 +246,9 @@ def draw_assisted(found: AssistedComparison) -> style.Picture:
     return figure
 
 
-def draw_detections(groups: Sequence[Group]) -> style.Picture:
-    """Draw when missions found the pipeline against the point of it that they saw first, a panel for each group.
-
-    Areas are shares of the group's missions; the bars above are shares by that point.
-    """
-    columns = style.columns(len(groups))
-    rows = math.ceil(len(groups) / columns)
-    width = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
-    figure = style.Picture(figsize=(width, 2.6 * rows + 0.4), layout="constrained")
-    parts = figure.subfigures(rows, columns, squeeze=False).ravel()
-    known = pandas.concat([group.frame.loc[group.frame["detection_x_m"].notna()] for group in groups])
-    ends = (
-        [float(known["detection_x_m"].min()) - 0.7, float(known["detection_x_m"].max()) + 0.7] if len(known) else [0, 1]
-    )
-    top_s = max(float(group.known_values(SEARCH_TIME).max()) for group in groups) * 1.2
-    bars = []
-    for place, (part, (number, group)) in enumerate(zip(parts, _looks(groups), strict=False)):
-        above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
-        _draw_detections(above, below, number, group)
-        bars.append(above)
-        above.set_title(_label(group, 26), fontsize=8)
-        below.set(xlim=ends, ylim=(0.0, top_s), xlabel="x of the point seen first (m)")
-        if place % columns == 0:
-            below.set_ylabel("search time (s)")
-            above.set_ylabel("share")
-    top = max(above.get_ylim()[1] for above in bars)
-    for above in bars:
-        above.set_ylim(0.0, top)  # shares of one panel are to be compared with those of another
-    area = Line2D([], [], lw=0, marker="o", ms=style.bubble_size(_LEGEND_SHARE), color=style.GREY, alpha=0.6, mew=0)
-    figure.legend([area], [f"area: {percent(_LEGEND_SHARE)} of a manager's missions"], loc="outside lower right")
-    return figure
-
-
-def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> None:
-    frame = group.frame[group.frame["detection_x_m"].notna()]
-    colour, n = style.line(number)["color"], len(group.frame)
-    x_m = frame["detection_x_m"].round(2)
-    shares = x_m.value_counts() / n
-    above.bar(shares.index.to_numpy(float), shares.to_numpy(float), width=0.4, color=colour, lw=0)
-    above.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
-    above.yaxis.set_major_locator(MaxNLocator(2))
-    look = {"color": colour, "alpha": 0.6, "lw": 0}
-    style.bubbles(below, group.frame, "detection_x_m", SEARCH_TIME, (0.01, _TIME_BIN_S), look)
-    lost = 1.0 - len(frame) / n
-    below.set_title(f"not found: {percent(lost)}", fontsize=7.5, fontweight="normal", pad=3)  # above all bubbles
-
-
-def draw_reactions(groups: Sequence[Group]) -> style.Picture:
-    """Draw the number of adaptations per mission as bars, and the reaction times as a curve for each group."""
-    labels = list(map(_label, groups))
-    figure = _figure(labels)
-    left, right = figure.subplots(1, 2)
-    width = 0.85 / len(groups)
-    for place, (number, group) in enumerate(_looks(groups)):
-        look = style.line(number)
-        if "adaptations" in group.frame and len(counts := group.known_values("adaptations")):
-            numbers, missions = np.unique(counts, return_counts=True)
-            across = numbers + width * (place - (len(groups) - 1) / 2)
-            filled = {"color": look["color"], "hatch": style.hatch(number), "edgecolor": "white", "lw": 0.4}
-            left.bar(across, missions / len(counts), width, **filled)
-        times_s = np.sort(group.known_values("mean_reaction_time_s"))
-        if len(times_s):
-            shares = np.arange(1, len(times_s) + 1) / len(times_s)
-            right.step([times_s[0], *times_s], [0.0, *shares], where="post", **look)
-        else:
-            right.plot([], [], **look)
-    left.set(xlabel="adaptations in a mission", ylabel="share of missions")
-    left.set_ylim(bottom=0.0)
-    left.yaxis.set_major_formatter(PercentFormatter(1.0))
-    left.xaxis.set_major_locator(MaxNLocator(8, integer=True))
-    left.set_title("a   Adaptations")
-    right.set(
-        xlabel="mean reaction time, where there was one (s)", ylabel="share of missions at or below", ylim=(0.0, 1.02)
-    )
-    known = np.concatenate([group.known_values("mean_reaction_time_s") for group in groups])
-    if len(known) and known.min() > 0.0 and known.max() > _FAR_APART * known.min():
-        right.set_xscale("log")  # else the curves of quick managers would all be at the left edge
-        right.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        right.xaxis.set_major_formatter("{x:g}")
-        right.xaxis.set_minor_formatter(NullFormatter())
-    else:
-        right.set_xlim(left=0.0)
-    right.yaxis.set_major_formatter(PercentFormatter(1.0))
-    right.set_title("b   Reaction time")
-    _legend(figure, _handles(groups), labels)
-    return figure
-
-
-def _figure(labels: Sequence[str]) -> style.Picture:
-    """Make a figure of one row of panels, with room for a legend above them."""
-    rows = math.ceil(len(labels) / _legend_columns(labels))
-    legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
-    return style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
-
-
-def _metric_panels(figure: style.Picture, *, sharey: bool = False) -> Iterator[tuple[Axes, str, str]]:
+def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
     """Make the panels a and b for the metrics of the paper's table; yield each with its metric, and the axis' title."""
-    panels = figure.subplots(1, 2, sharey=sharey)
+    panels = figure.subplots(1, 2, sharey=True)
     for axes, letter, metric in zip(panels, "ab", PAPER_METRICS, strict=True):
         axes.set_title(f"{letter}   {METRICS[metric].title.capitalize()}")
         yield axes, metric, METRICS[metric].heading
@@ -352,11 +257,6 @@ def _metric_panels(figure: style.Picture, *, sharey: bool = False) -> Iterator[t
 def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
     """Yield each group with the number of its look."""
     return zip(style.looks([group.name for group in groups]), groups, strict=True)
-
-
-def _handles(groups: Sequence[Group]) -> list[Artist]:
-    """Make the lines with markers that a legend shows for each group."""
-    return [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
 
 
 def _label(group: Group, width: int = 40) -> str:

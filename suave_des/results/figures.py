@@ -15,7 +15,7 @@ from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.results import campaign_figures, style
-from suave_des.results.mission_figures import Rules, draw_map, draw_paths, draw_timeline
+from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
 from suave_des.results.missions import Group, Missions, grouped, missions_of, read_missions
 from suave_des.results.paper import published_runs
 from suave_des.results.style import key_words
@@ -25,29 +25,20 @@ if TYPE_CHECKING:
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-AUTO, SWEEP, HEAT_MAP, PATHS, MAP, TIMELINE = "auto", "sweep", "heatmap", "paths", "map", "timeline"
+AUTO, SWEEP, HEAT_MAP, MAP, TIMELINE = "auto", "sweep", "heatmap", "map", "timeline"
 _PUBLISHED_SCENARIO = "seams2023"
-
-
-def _rainclouds(groups: Sequence[Group]) -> Figure:
-    scenarios = {name for group in groups if "scenario" in group.frame for name in group.frame["scenario"].unique()}
-    published = grouped(read_missions([published_runs()]))[0] if scenarios == {_PUBLISHED_SCENARIO} else []
-    names = [group.name for group in groups]
-    return campaign_figures.draw_rainclouds(groups, {group.name: group for group in published if group.name in names})
 
 
 CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
     "distributions": campaign_figures.draw_distributions,
-    "raincloud": lambda groups: campaign_figures.draw_rainclouds(groups, {}),
-    "detections": campaign_figures.draw_detections,
+    "raincloud": campaign_figures.draw_rainclouds,
     "differences": campaign_figures.draw_differences,
-    "reactions": campaign_figures.draw_reactions,
 }
 """Figures of a campaign's missions by their names."""
 _OF_MEANS = "differences"
 """What has intervals of means: of runs, as points of a sweep share a run's random numbers. The others show missions;
 means over the points would be what no mission did."""
-KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, HEAT_MAP, PATHS)
+KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, HEAT_MAP)
 """All figures by their names."""
 
 
@@ -67,10 +58,9 @@ def draw_results(
     """Draw the contents of results folders, and write the picture.
 
     Args:
-        folders: of missions (trajectory.csv), or of campaigns (runs.csv) and files like these.
+        folders: one of a mission (trajectory.csv), or of campaigns (runs.csv) and files like these.
         out: picture to write; its ending says which kind.
-        kind: one of KINDS; "auto": of one mission its map, of several their paths, of a campaign the distributions, of
-            a sweep the means.
+        kind: one of KINDS; "auto": of a mission its map, of a campaign the distributions, of a sweep the means.
         parameters: of a sweep: those to draw; empty: all.
         rules_of: finds the rules behind the adaptations of a mission, for its timeline.
 
@@ -80,21 +70,18 @@ def draw_results(
     check_picture(out)
     if kind not in KINDS:
         raise InputError(f"there is no figure {shown(kind)}", place="kind", remedy=did_you_mean(kind, KINDS))
-    missions = [folder for folder in folders if (folder / TRAJECTORY_FILE).is_file()]
+    is_mission, wants_mission = (folders[0] / TRAJECTORY_FILE).is_file(), kind in (MAP, TIMELINE)
+    if is_mission and len(folders) > 1:
+        raise InputError("has a mission, of which one is drawn at a time", file=folders[0], remedy="give one folder")
+    if is_mission != wants_mission and (wants_mission or kind != AUTO):
+        of, command = ("a mission", "run") if wants_mission else ("a campaign", "campaign")
+        remedy = f"give the --out folder of suave-des {command}"
+        raise InputError(f"the figure {kind} is of {of}", file=folders[0], remedy=remedy)
     with style.publication():
-        if len(missions) == len(folders) and kind in (AUTO, MAP, TIMELINE, PATHS):
-            figure = _of_records([read_mission(folder) for folder in folders], kind, rules_of)
-        elif missions:
-            problem = "has a mission, where the figure needs missions of a campaign"
-            raise InputError(problem, file=missions[0], remedy="give folders of suave-des campaign")
-        elif kind in (MAP, TIMELINE, PATHS):
-            problem = f"has no {TRAJECTORY_FILE}: the figure needs a mission"
-            raise InputError(problem, file=folders[0], remedy="give a folder of suave-des run")
+        if is_mission:
+            record = read_mission(folders[0])
+            figure: Figure = draw_timeline(record, rules_of(record)) if kind == TIMELINE else draw_map(record)
         else:
-            for folder in folders:
-                if folder.is_dir() and not list(folder.glob("*.csv")):
-                    remedy = "give the --out folder of suave-des run, campaign or reproduce"
-                    raise InputError(f"has neither {TRAJECTORY_FILE} nor runs.csv", file=folder, remedy=remedy)
             figure = _of_missions(read_missions(folders), kind, parameters)
         write_picture(figure, out)
 
@@ -133,15 +120,6 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
             temporary.unlink()
 
 
-def _of_records(records: Sequence[MissionRecord], kind: str, rules_of: Callable[[MissionRecord], Rules]) -> Figure:
-    if kind == PATHS or (kind == AUTO and len(records) > 1):
-        return draw_paths(records)
-    if len(records) > 1:
-        problem = f"the figure {kind} is of one mission, and {len(records)} are given"
-        raise InputError(problem, remedy=f"give one of them, or --kind {PATHS}")
-    return draw_timeline(records[0], rules_of(records[0])) if kind == TIMELINE else draw_map(records[0])
-
-
 def draw_mission(record: MissionRecord, kind: str = MAP) -> Figure:
     """Draw a mission.
 
@@ -156,7 +134,7 @@ def draw_mission(record: MissionRecord, kind: str = MAP) -> Figure:
         remedy = did_you_mean(kind, (MAP, TIMELINE))
         raise InputError(f"there is no figure {shown(kind)} of a mission", place="kind", remedy=remedy)
     with style.publication():
-        return _of_records([record], kind, lambda record: {})
+        return draw_timeline(record) if kind == TIMELINE else draw_map(record)
 
 
 def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
@@ -187,10 +165,14 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     if name not in CAMPAIGN_KINDS:
         raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
     groups = grouped(missions, averages=name == _OF_MEANS)[0]
-    is_published = (
-        name == "raincloud" and not missions.swept
-    )  # real missions belong beside those of their scenario only
-    figure = _rainclouds(groups) if is_published else CAMPAIGN_KINDS[name](groups)
+    scenarios = set(missions.frame["scenario"])
+    if name == "raincloud" and scenarios == {_PUBLISHED_SCENARIO} and not missions.swept:
+        names, real = [group.name for group in groups], grouped(read_missions([published_runs()]))[0]
+        figure: Figure = campaign_figures.draw_rainclouds(
+            groups, {group.name: group for group in real if group.name in names}
+        )
+    else:
+        figure = CAMPAIGN_KINDS[name](groups)
     if missions.swept:
         shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)

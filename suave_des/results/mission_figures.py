@@ -1,4 +1,4 @@
-"""Figures of missions: a map with altitude over time, the paths of many, and all that happened in one over time."""
+"""Figures of a mission: a map with altitude over time, and all that happened in it over time."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from suave_des.results.mission import (
 from suave_des.results.style import component_words, function_mode_words, function_words, is_off, mode_words, plain
 
 _IDLE_MODES = ("", UNGROUND_MODE, "inactive")
-_ZOOM_MARGIN_M, _PATHS_MARGIN_M = 0.6, 1.0
+_ZOOM_MARGIN_M = 0.6
 _PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
 _VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
 _BATTERY_COLOUR = style.GREEN
@@ -140,20 +140,15 @@ def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across
 
 def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
     """Draw what both maps have: pipeline, path, start and recharge station."""
-    _draw_pipeline(axes, record)
+    x_m, y_m = np.array(record.scenario["pipeline"]["vertices_m"])[:, :2].T
+    axes.plot(x_m, y_m, **_PIPELINE, solid_capstyle="round", zorder=1.5)
+    axes.set_aspect("equal")
     _draw_way(axes, record, colours, "x_m", record.trajectory["y_m"].to_numpy())
     start = record.trajectory.iloc[0]
     axes.plot(start["x_m"], start["y_m"], "o", color=style.BLACK, ms=4)
     if battery := record.scenario.get("battery"):
         axes.plot(battery["station_x_m"], battery["station_y_m"], "P", color=_BATTERY_COLOUR, ms=5, zorder=3)
     axes.set(xlabel="x, east (m)", ylabel="y, north (m)")
-
-
-def _draw_pipeline(axes: Axes, record: MissionRecord) -> None:
-    """Draw the pipeline, from above."""
-    x_m, y_m = np.array(record.scenario["pipeline"]["vertices_m"])[:, :2].T
-    axes.plot(x_m, y_m, **_PIPELINE, solid_capstyle="round", zorder=1.5)
-    axes.set_aspect("equal")
 
 
 def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
@@ -182,16 +177,11 @@ def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
 
 def _search_frame(record: MissionRecord) -> Bbox:
     """Return the frame around the vehicle's path until detection and the detected point, with a margin."""
-    search = _search(record)
-    if record.metrics["pipeline_found"]:
-        search = np.vstack([search, [record.metrics["detection_x_m"], record.metrics["detection_y_m"]]])
+    way, metrics = record.trajectory, record.metrics
+    search = way.loc[way["t_s"] <= metrics["search_time_s"], ["x_m", "y_m"]].to_numpy(float)
+    if metrics["pipeline_found"]:
+        search = np.vstack([search, [metrics["detection_x_m"], metrics["detection_y_m"]]])
     return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
-
-
-def _search(record: MissionRecord) -> NDArray[np.float64]:
-    """Return the vehicle's path until it found the pipeline, or the mission ended; shape (n, 2)."""
-    way = record.trajectory
-    return np.asarray(way.loc[way["t_s"] <= record.metrics["search_time_s"], ["x_m", "y_m"]], dtype=float)
 
 
 def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str) -> None:
@@ -243,51 +233,6 @@ def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:
         last_s[row : row + 1] = [mark.t_s]
         rows.append(row)
     return rows
-
-
-def draw_paths(records: Sequence[MissionRecord]) -> style.Picture:
-    """Draw the paths of missions, a panel for each manager, over the part of the sea bed that they search.
-
-    The pipeline is that of the first.
-    """
-    managers = list(dict.fromkeys(str(record.metrics["manager"]) for record in records))
-    columns = style.columns(len(managers))
-    rows = -(-len(managers) // columns)
-    searches = [_search(record) for record in records]
-    low = np.min([search.min(axis=0) for search in searches], axis=0) - _PATHS_MARGIN_M
-    high = np.max([search.max(axis=0) for search in searches], axis=0) + _PATHS_MARGIN_M
-    shape = (high[1] - low[1]) / (high[0] - low[0])
-    height = rows * (style.WIDTH_IN / columns * shape * 0.93 + 0.55) + 0.3
-    figure = style.Picture(figsize=(style.WIDTH_IN, min(height, 9.5)), layout="constrained")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in panels.ravel()[len(managers) :]:
-        axes.set_visible(False)
-    for axes, manager, number in zip(panels.ravel(), managers, style.looks(managers), strict=False):
-        own = [place for place, record in enumerate(records) if str(record.metrics["manager"]) == manager]
-        _draw_pipeline(axes, records[0])
-        for place in own:
-            x_m, y_m = searches[place].T
-            colour = style.line(number)["color"]
-            axes.plot(x_m, y_m, color=colour, lw=0.7, alpha=max(0.12, min(0.9, 4.0 / len(own))))
-        found = [metrics for place in own if (metrics := records[place].metrics)["pipeline_found"]]
-        seen = np.array([[each["detection_x_m"], each["detection_y_m"]] for each in found], dtype=float).reshape(-1, 2)
-        axes.plot(*seen.T, "o", color=style.BLACK, ms=3, mew=0, alpha=0.6, zorder=4)
-        starts = np.array([searches[place][0] for place in own])
-        axes.plot(*starts.T, "s", color=style.BLACK, mfc="white", ms=3, mew=0.7, zorder=4)
-        axes.set_title(style.text(f"{manager}: {len(found)} of {len(own)} found it"))
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    for axes in panels[-1]:
-        axes.set_xlabel("x, east (m)")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("y, north (m)")
-    handles = [
-        Line2D([], [], color=style.GREY, lw=0.9, label="way until the pipeline was found"),
-        Line2D([], [], **_PIPELINE, label="pipeline"),
-        Line2D([], [], color=style.BLACK, lw=0, marker="s", ms=3, mfc="white", label="start"),
-        Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=3, label="point seen first"),
-    ]
-    figure.legend(handles=handles, loc="outside upper right", ncols=4)
-    return figure
 
 
 # Over time

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 from typing import Any
 
 import matplotlib
-import numpy as np
-import pandas
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from suave_des.domain import (
@@ -89,11 +86,6 @@ def looks(names: Sequence[str]) -> list[int]:
     return [_KNOWN_MANAGERS.index(name) if name in _KNOWN_MANAGERS else next(others) for name in names]
 
 
-def columns(panels: int) -> int:
-    """Return the number of columns in which panels are arranged."""
-    return 2 if panels == 4 else min(panels, 3)
-
-
 def line(number: int) -> dict[str, Any]:
     """Return the look of the curve of a manager, by its number from 0: no two of thirty are alike, nor six in grey."""
     return {"color": CYCLE[number % len(CYCLE)], "linestyle": _DASHES[number % len(_DASHES)]}
@@ -112,33 +104,6 @@ def hatch(number: int) -> str:
 def text(name: str) -> str:
     """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a leading underscore."""
     return (f" {name}" if name.startswith("_") else name).replace("$", r"\$")
-
-
-_LARGEST_AREA, _SMALLEST_AREA = 900.0, 1.5
-"""Areas of a marker, in square points: that of all missions of a manager, and the least."""
-
-
-def bubbles(
-    axes: Axes, missions: pandas.DataFrame, across: str, up: str, bins: tuple[float, float], look: Mapping[str, Any]
-) -> None:
-    """Draw how many missions are at each place: areas are shares of them; those without a place are left out.
-
-    Args:
-        axes: to draw on.
-        missions: a row for each.
-        across: column of the horizontal place; likewise up.
-        bins: to whose multiples these are rounded.
-        look: of the markers.
-    """
-    places = [(missions[name] / step).round() * step for name, step in zip((across, up), bins, strict=True)]
-    counts = missions.groupby(places).size()
-    areas = np.maximum(counts.to_numpy(float) / max(1, len(missions)) * _LARGEST_AREA, _SMALLEST_AREA)
-    axes.scatter(counts.index.get_level_values(0), counts.index.get_level_values(1), s=areas, **look)
-
-
-def bubble_size(share: float) -> float:
-    """Return the diameter, in points, of the marker of a share of missions."""
-    return float((share * _LARGEST_AREA) ** 0.5)
 
 
 class Picture(Figure):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
@@ -162,8 +162,7 @@ def validate(
     )
     counted = compare_shares(shares, real, ours, managers)
     conditions = compare_conditions(real, ours, managers, COMPARED)
-    found = list(_targets(cells, pairs, counted, over_conditions(conditions), limits))
-    targets = pandas.DataFrame(found, columns=_TARGET).astype({"met": object})
+    targets = _judged(_targets(cells, pairs, counted, over_conditions(conditions), limits))
     places = compare_places(real, ours, managers)
     return Validation(tuple(managers), cells, pairs, counted, places, conditions, targets, not_found_s)
 
@@ -197,27 +196,28 @@ def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
     return runs.loc[runs["manager"] == manager, metric].dropna().to_numpy(dtype=float)
 
 
-def described(name: str, sample: Sample, *, intervals: bool = True) -> dict[str, Any]:
-    """Describe a sample by the columns of a file, which begin with a name: n, mean, std and median, with intervals."""
+def _described(name: str, sample: Sample) -> dict[str, Any]:
+    """Describe a sample by columns that begin with a name: n, mean, std and median; the first two with intervals."""
     values = sample.tolist()
     row = mean_of(values).columns(f"{name}_mean") | std_of(values).columns(f"{name}_std")
-    left_out = () if intervals else (*interval_names(f"{name}_mean"), *interval_names(f"{name}_std"))
-    row = {column: value for column, value in row.items() if column not in left_out}
     return {f"{name}_n": len(values), **row, f"{name}_median": float(np.median(sample)) if values else None}
+
+
+def _without_intervals(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    left_out = {end for name in names for end in interval_names(name)}
+    return {name: value for name, value in row.items() if name not in left_out}
 
 
 def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Generators) -> dict[str, Any]:
     """Compare the real and the simulated sample of a manager."""
     real, ours = samples
-    simulated = described("simulated", ours)  # their spread is known so well that nothing needs its interval
-    std_interval = {"simulated_std_ci95_low", "simulated_std_ci95_high"}
     rng, ks = generators(f"bootstrap/{manager}/{metric}"), statistics.kolmogorov_smirnov(real, ours)
     ad = statistics.anderson_darling(real, ours, generators(f"permutations/{manager}/{metric}"))
     return {
         "manager": manager,
         "metric": metric,
-        **described("published", real),
-        **{name: value for name, value in simulated.items() if name not in std_interval},
+        **_described("published", real),
+        **_without_intervals(_described("simulated", ours), "simulated_std"),  # known so well that nothing needs it
         **statistics.difference_interval(ours, real).columns("difference_of_means"),
         **statistics.ratio_interval(real, ours, rng).columns("std_ratio"),
         **dict(zip(("ks_distance", "ks_p", "ad_statistic", "ad_p"), (*ks, *ad), strict=True)),
@@ -230,13 +230,10 @@ def _pair(
     """Compare two managers, each with its real and its simulated sample."""
     (real, ours), (other_real, other_ours) = samples
     test = statistics.mann_whitney(real, other_real, "asymptotic")  # as the subsamples below are tested
-    simulated = statistics.mann_whitney(ours, other_ours, "asymptotic")
     sign = statistics.sign_of(test.p_less, test.p_greater)
     is_less_better = METRICS[metric].better < 0  # as the exemplar's own one-sided tests have it
     sizes = len(real), len(other_real)
-    rng = generators(f"subsamples/{pair[0]}/{pair[1]}/{metric}")
-    better = {0: "neither", 1: pair[is_less_better], -1: pair[not is_less_better]}[sign]
-    effects = (each.effect.value for each in (test, simulated))
+    effects = test.effect.value, statistics.mann_whitney(ours, other_ours, "asymptotic").effect.value
     superiority = [1.0 - each if is_less_better else each for each in effects]
     ps = (test.p_less, test.p_greater) if is_less_better else (test.p_greater, test.p_less)
     return {
@@ -247,10 +244,12 @@ def _pair(
         "simulated_superiority": superiority[1],
         "published_first_better_p": ps[0],
         "published_second_better_p": ps[1],
-        "published_better": better,
+        "published_better": {0: "neither", 1: pair[is_less_better], -1: pair[not is_less_better]}[sign],
         "first_n": sizes[0],
         "second_n": sizes[1],
-        "agreement": statistics.agreement(sign, (ours, other_ours), sizes, rng),
+        "agreement": statistics.agreement(
+            sign, (ours, other_ours), sizes, generators(f"subsamples/{pair[0]}/{pair[1]}/{metric}")
+        ),
     }
 
 
@@ -269,8 +268,7 @@ def compare_shares(
     where: Region = {"pipeline_found": ((1.0, 1.0),)}
     found = [Share(manager=manager, name="pipeline found", where=where) for manager in managers]
     counted = [(share, [count(share, side) for side in sides]) for share in shares if share.manager in managers]
-    known = [side[side[FOUND].notna()] for side in sides]
-    of_found = [(share, [count(share, side) for side in known]) for share in found]
+    of_found = [(share, [count(share, side[side[FOUND].notna()]) for side in sides]) for share in found]
     counted += [(share, counts) for share, counts in of_found if all(n for _, n in counts)]
     rows = []
     for share, counts in counted:
@@ -298,17 +296,11 @@ def compare_places(
     """
     rows = []
     for manager in managers:
-        sides = [_places(runs, manager) for runs in (published, simulated)]
-        for place in sorted({*sides[0], *sides[1]}):
-            counts = ((side.get(place, 0), sum(side.values())) for side in sides)
+        steps = [(sample(runs, manager, "detection_x_m") / POSITION_STEP_M).round() for runs in (published, simulated)]
+        for place in np.unique(np.concatenate(steps)).tolist():
+            counts = ((int((side == place).sum()), len(side)) for side in steps)
             rows.append({"manager": manager, "detection_x_m": place * POSITION_STEP_M, **_proportions(*counts)})
     return pandas.DataFrame(rows)
-
-
-def _places(runs: pandas.DataFrame, manager: str) -> Counter[int]:
-    """Count detections by place, in steps."""
-    known = runs.loc[runs["manager"] == manager, "detection_x_m"].dropna()
-    return Counter((known / POSITION_STEP_M).round().astype(int).tolist())
 
 
 # Conditions
@@ -347,18 +339,19 @@ def compare_conditions(
         conditions are known.
     """
     rows = []
-    for metric in metrics if CONDITION in real and CONDITION in simulated else ():
+    sides = {"real": real, "simulated": simulated}
+    for metric in metrics if all(CONDITION in side for side in sides.values()) else ():
         for manager in managers:
-            theirs, ours = (
-                side[(side["manager"] == manager) & side[metric].notna()].groupby(CONDITION)[metric]
-                for side in (real, simulated)
-            )
-            samples = [{int(str(number)): own.to_numpy(float) for number, own in side} for side in (theirs, ours)]
-            for number in sorted(set(samples[0]) & set(samples[1])):
+            known = {
+                name: {int(str(number)): sample(part, manager, metric) for number, part in side.groupby(CONDITION)}
+                for name, side in sides.items()
+            }
+            for number in sorted(set(known["real"]) & set(known["simulated"])):
                 row: dict[str, Any] = {"manager": manager, "metric": metric, "condition": number}
-                for name, side in zip(("real", "simulated"), samples, strict=True):
-                    row |= described(name, side[number], intervals=False)
-                rows.append(row | {"difference_of_medians": row["simulated_median"] - row["real_median"]})
+                for name, own in known.items():
+                    row |= _without_intervals(_described(name, own[number]), f"{name}_mean", f"{name}_std")
+                if row["real_n"] and row["simulated_n"]:
+                    rows.append(row | {"difference_of_medians": row["simulated_median"] - row["real_median"]})
     return pandas.DataFrame(rows)
 
 
@@ -393,8 +386,8 @@ def _targets(
     shares: pandas.DataFrame,
     within: pandas.DataFrame,
     limits: Mapping[str, ConditionLimits],
-) -> Iterator[dict[str, Any]]:
-    """Yield the requirements.
+) -> Iterator[tuple[Any, ...]]:
+    """Yield the requirements, with the columns of _TARGET but met.
 
     The mean lies in the 95% t interval of the published one, the std in its chi-square interval; the KS p is 0.05 or
     more; at least half the subsamples as large as the published samples lead to the published conclusion; shares and
@@ -402,36 +395,30 @@ def _targets(
     """
     for each in cells.to_dict("records"):
         for kind in ("mean", "std"):
-            low, high = (each[f"published_{kind}_ci95_{end}"] for end in ("low", "high"))
-            value = math.nan if low is None or low != low else each[f"simulated_{kind}"]
-            yield _target(kind, each["manager"], each["metric"], value, low, high)
-        yield _target("ks", each["manager"], each["metric"], each["ks_p"], SIGNIFICANCE)
+            low, high = (each[name] for name in interval_names(f"published_{kind}"))
+            value = None if low is None or low != low else each[f"simulated_{kind}"]
+            yield kind, each["manager"], each["metric"], value, low, high
+        yield "ks", each["manager"], each["metric"], each["ks_p"], SIGNIFICANCE, None
     for each in pairs.to_dict("records"):
-        subject = f"{each['first']}, {each['second']}"
-        yield _target("conclusion", subject, each["metric"], each["agreement"], _LEAST_AGREEMENT)
+        pair = f"{each['first']}, {each['second']}"
+        yield "conclusion", pair, each["metric"], each["agreement"], _LEAST_AGREEMENT, None
     for each in shares.to_dict("records"):
-        if (low := each.get("target_low", math.nan)) == low:
-            yield _target("share", each["manager"], each["name"], each["simulated_share"], low, each["target_high"])
+        if (low := each["target_low"]) == low:
+            yield "share", each["manager"], each["name"], each["simulated_share"], low, each["target_high"]
     for each in within.to_dict("records"):
         limit = limits.get(each["metric"])
         if each["manager"] == "all" and limit is not None:
-            for kind, value, most in (
-                ("condition_median", each["difference"], limit.median_difference),
-                ("condition_std", each["std_ratio"], limit.std_ratio),
-            ):
-                if most is not None:
-                    yield _target(kind, "all", each["metric"], value, high=most)
+            if limit.median_difference is not None:
+                value, most = each["difference"], limit.median_difference
+                yield "condition_median", "all", each["metric"], value, None, most
+            if limit.std_ratio is not None:
+                yield "condition_std", "all", each["metric"], each["std_ratio"], None, limit.std_ratio
 
 
-def _target(
-    kind: str,
-    subject: str,
-    what: str,
-    value: float | None,
-    low: float | None = math.nan,
-    high: float | None = math.nan,
-) -> dict[str, Any]:
-    """Return the row of a requirement: a value that is to lie between two ends, of which one may be open."""
-    value, low, high = (math.nan if each is None else float(each) for each in (value, low, high))
-    met = None if value != value else not (value < low or value > high)
-    return dict(zip(_TARGET, (kind, subject, what, value, low, high, met), strict=True))
+def _judged(found: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
+    """Say of each requirement whether its value lies between two ends, of which one may be open."""
+    rows = []
+    for *names, value, low, high in found:
+        value, low, high = (math.nan if each is None else float(each) for each in (value, low, high))
+        rows.append((*names, value, low, high, None if value != value else not (value < low or value > high)))
+    return pandas.DataFrame(rows, columns=_TARGET).astype({"met": object})

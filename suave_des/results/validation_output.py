@@ -26,6 +26,8 @@ _PANEL_INCHES = (style.WIDTH_IN / 3.0, 2.0)
 _LEGEND_LINE_INCHES = 0.25
 _TIME_BIN_S = 2.0
 _LEGEND_SHARE = 0.1
+_ALL_AREA, _LEAST_AREA = 900.0, 1.5
+"""Areas of a marker, in square points: that of all missions of a manager, and the least."""
 _SHADED: Mapping[str, Any] = {"color": _SIMULATED, "alpha": 0.5, "linewidth": 0}
 _OUTLINED: Mapping[str, Any] = {"facecolor": "none", "edgecolor": _PUBLISHED, "linewidth": 0.8}
 _TICK: Mapping[str, Any] = {"linestyle": "", "marker": "|", "color": _PUBLISHED, "markersize": 7, "clip_on": False}
@@ -268,8 +270,12 @@ def detections_png(
         figure, panels = _panels(1, len(validation.managers), share_x=True)
         for axes, manager in zip(panels[0], validation.managers, strict=True):
             theirs, ours = (side[side["manager"] == manager] for side in (published, simulated))
-            style.bubbles(axes, ours, SEARCH_TIME, "detection_x_m", (_TIME_BIN_S, 0.001), _SHADED)
-            style.bubbles(axes, theirs, SEARCH_TIME, "detection_x_m", (_TIME_BIN_S, 0.001), _OUTLINED)
+            for side, look in ((ours, _SHADED), (theirs, _OUTLINED)):
+                places = (side[SEARCH_TIME] / _TIME_BIN_S).round() * _TIME_BIN_S, side["detection_x_m"].round(3)
+                counts = side.groupby(list(places)).size()
+                across, up = (counts.index.get_level_values(level) for level in (0, 1))
+                areas = np.maximum(counts.to_numpy(float) / max(1, len(side)) * _ALL_AREA, _LEAST_AREA)
+                axes.scatter(across, up, s=areas, **look)
             unplaced = theirs.loc[theirs["detection_x_m"].isna(), SEARCH_TIME]
             axes.plot(unplaced, np.ones(len(unplaced)), transform=axes.get_xaxis_transform(), **_TICK)
             axes.set_title(manager, pad=9)
@@ -277,7 +283,7 @@ def detections_png(
             axes.set_xlabel(f"{METRICS[SEARCH_TIME].heading}\n{without}")
         panels[0, 0].set_ylabel("x of the point seen first (m)")
         panels[0, 0].margins(0.06, 0.12)
-        circle: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": style.bubble_size(_LEGEND_SHARE)}
+        circle: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": (_LEGEND_SHARE * _ALL_AREA) ** 0.5}
         handles = [
             Line2D([], [], color=_SIMULATED, alpha=0.5, markeredgewidth=0, **circle),
             Line2D([], [], markerfacecolor="none", markeredgecolor=_PUBLISHED, markeredgewidth=0.8, **circle),

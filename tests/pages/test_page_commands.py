@@ -79,12 +79,6 @@ def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_pat
     assert page["cycles"]["cycles"][0]["measured"]
 
 
-def test_two_missions_are_written_side_by_side(mission, tmp_path, capsys):
-    assert status("replay", mission, mission, "--out", tmp_path / "page.html") == 0
-    assert "page.html" in capsys.readouterr().out
-    assert (tmp_path / "page.html").stat().st_size < 2_000_000
-
-
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

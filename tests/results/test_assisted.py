@@ -13,7 +13,6 @@ import pytest
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.results.assisted import AssistedComparison, assisted_mean, compare_assisted, deviations, planned
-from suave_des.results.compare import CampaignFrame
 from suave_des.results.figures import draw_assisted
 from tests.helpers.command import command_here
 
@@ -145,16 +144,6 @@ def test_a_simulation_that_does_not_help_is_said_not_to() -> None:
     assert "the simulation does not help" in first["conclusion"]
 
 
-def test_shares_are_in_per_cent() -> None:
-    real = real_missions(2)
-    real.loc[::5, ["search_time_s", "pipeline_found"]] = [300.0, False]
-    found = compare_assisted(real, missions(2, POINTS, 5), population(), metrics=["pipeline_found"])
-    first = found.estimates.iloc[0]
-    assert first["assisted"] == pytest.approx(0.75, abs=0.1) and first["assisted_ci95_high"] <= 1.0
-    assert "share that found the pipeline of a: " in first["conclusion"] and "%" in first["conclusion"]
-    assert "points" in found.conclusions[2]
-
-
 def test_conditions_are_found_by_number_and_by_order() -> None:
     real = real_missions(2, 25.0)
     numbered = real.assign(condition=np.repeat([1, 2, 3, 4, 5, 6] * 2, 2)).drop(columns="start.y_m")
@@ -274,14 +263,6 @@ def test_the_command(campaigns: Path) -> None:
     assert half.returncode == 2 and "without --population" in half.stderr
     plan = command_here("compare", "population", "--plan", "search_time_s:8", "--managers", "bt", cwd=campaigns)
     assert plan.returncode == 0 and "those of 2025" in plan.stdout
-
-
-def test_a_frame_assists_as_the_folder_does(campaigns: Path) -> None:
-    given = REAL, campaigns / "population", ["none", "bt"]
-    frame = CampaignFrame(pandas.read_csv(campaigns / "same" / "runs.csv"))
-    found = frame.assist(*given)
-    expected = compare_assisted(given[0], campaigns / "same", given[1], managers=given[2])
-    pandas.testing.assert_frame_equal(found.estimates, expected.estimates)
 
 
 def test_the_report_has_the_assisted_means(campaigns: Path) -> None:

@@ -68,12 +68,3 @@ def test_intervals_of_shares_in_pairs_cover_the_truth_and_are_shares(
         assert -1.0 <= low < high <= 1.0
         covered += bool(low <= only_first - only_second <= high)
     assert covered / 200 >= 0.92
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("n", "least"), [(20, 0.91), (100, 0.93)])
-def test_how_often_over_a_thousand_repetitions(n: int, least: float) -> None:
-    means, differences = coverage_of_means(n, 1_000), coverage_of_differences(n, n, 1_000)
-    print(f"{n} missions: {means:.3f} of the means, {differences:.3f} of the differences")
-    assert least <= means <= 0.97
-    assert least <= differences <= 0.97

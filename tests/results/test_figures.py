@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pandas
 import pytest
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -18,11 +16,9 @@ from suave_des.estimates import mean_of
 from suave_des.records.mission_folder import MissionRecord, read_mission
 from suave_des.results import style
 from suave_des.results.campaign_figures import (
-    draw_detections,
     draw_distributions,
     draw_heat_map,
     draw_rainclouds,
-    draw_reactions,
     draw_sweep,
 )
 from suave_des.results.figures import CAMPAIGN_KINDS, draw_folder, draw_frame, draw_results, write_picture
@@ -30,7 +26,6 @@ from suave_des.results.mission import adaptations, failure_spans, mode_spans
 from suave_des.results.mission_figures import draw_map, draw_timeline
 from suave_des.results.missions import grouped, missions_of, read_missions
 from suave_des.results.paper import published_runs
-from suave_des.results.style import folded, key_words
 
 
 @pytest.fixture(scope="module")
@@ -80,36 +75,10 @@ def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign
         assert all(line.get_ydata()[-1] == 1.0 for line in curves)
 
 
-def test_a_campaign_is_drawn_too(campaign: Path, tmp_path: Path) -> None:
-    draw_folder(campaign, tmp_path / "runs.png")
-    assert (tmp_path / "runs.png").is_file()
-
-
-@pytest.mark.parametrize("missing", ["mission.json", "events.csv"])
-def test_a_missing_file_is_named(missing: str, mission: Path, tmp_path: Path) -> None:
-    shutil.copytree(mission, tmp_path / "copy")
-    (tmp_path / "copy" / missing).unlink()
-    with pytest.raises(InputError, match=f"{missing}: no such file"):
-        draw_folder(tmp_path / "copy", tmp_path / "map.png")
-    assert not (tmp_path / "map.png").exists()
-
-
-def test_a_picture_that_cannot_be_written_is_reported(mission: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"map\.png: cannot be written"):
-        draw_folder(mission, tmp_path / "nowhere" / "map.png")
-
-
 @pytest.mark.parametrize(("ending", "date"), [(".pdf", b"CreationDate"), (".svg", b"dc:date")])
 def test_no_picture_has_the_time_at_which_it_was_written(ending: str, date: bytes, tmp_path: Path) -> None:
     write_picture(Figure(), tmp_path / f"empty{ending}")
     assert date not in (tmp_path / f"empty{ending}").read_bytes()
-
-
-def test_a_campaign_without_missions_is_reported(campaign: Path, tmp_path: Path) -> None:
-    header = (campaign / "runs.csv").read_text().splitlines()[0]
-    (tmp_path / "runs.csv").write_text(header + "\n")
-    with pytest.raises(InputError, match=r"runs\.csv: line 1: has no missions"):
-        draw_folder(tmp_path, tmp_path / "runs.png")
 
 
 def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: Path) -> None:
@@ -221,12 +190,6 @@ def test_more_managers_than_colours_differ_in_their_lines() -> None:
     assert len({(line.get_color(), str(line._unscaled_dash_pattern)) for line in curves}) == 14
 
 
-def test_missions_that_never_found_the_pipeline_are_named_at_the_time_limit() -> None:
-    figure = draw_distributions(grouped(read_missions([published_runs()]))[0])
-    (text,) = [text for text in figure.axes[0].texts if "not found" in text.get_text()]
-    assert text.get_position()[0] == 300.0
-
-
 def test_a_raincloud_shows_the_published_runs_beside_the_missions(campaign: Path) -> None:
     groups = grouped(read_missions([campaign]))[0]
     published = grouped(read_missions([published_runs()]))[0]
@@ -235,40 +198,12 @@ def test_a_raincloud_shows_the_published_runs_beside_the_missions(campaign: Path
     assert [len(line.get_xdata()) for line in crosses] == [20, 20]
 
 
-def test_detections_are_shares_of_all_missions(campaign: Path) -> None:
-    groups = grouped(read_missions([campaign]))[0]
-    figure = draw_detections(groups)
-    above = figure.subfigs[0].axes[0]
-    found = groups[0].frame["detection_x_m"].notna().mean()
-    assert sum(bar.get_height() for bar in above.patches) == pytest.approx(found)
-    assert len({part.axes[0].get_ylim() for part in figure.subfigs}) == 1  # bars of two managers can be compared
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["area: 10% of a manager's missions"]
-
-
-def test_adaptations_are_bars_where_missions_have_that_number_and_quick_reactions_are_seen() -> None:
-    frame = pandas.DataFrame({"manager": ["a"] * 4 + ["b"] * 4, "adaptations": [2, 2, 5, 5, 1, 1, 1, 1]})
-    frame = frame.assign(search_time_s=100.0, distance_inspected_m=1.0, run=[1, 2, 3, 4] * 2, seed=1)
-    frame["mean_reaction_time_s"] = [0.5, 0.5, 0.6, 0.6, 30.0, 60.0, 90.0, 200.0]
-    figure = draw_reactions(grouped(missions_of(frame))[0])
-    bars = {round(bar.get_x() + bar.get_width() / 2 + 0.2125): bar.get_height() for bar in figure.axes[0].patches[:2]}
-    assert bars == {2: 0.5, 5: 0.5}  # and no bar at numbers that no mission has
-    assert figure.axes[1].get_xscale() == "log"
-
-
 @pytest.mark.parametrize("kind", [kind for kind in CAMPAIGN_KINDS if kind != "differences"])
 def test_every_kind_is_drawn_of_a_single_mission_of_a_manager_with_an_awkward_name(kind: str, tmp_path: Path) -> None:
     text = "scenario,manager,run,seed,search_time_s,distance_inspected_m,pipeline_found,detection_x_m,adaptations\n"
     (tmp_path / "runs.csv").write_text(text + "a,_$x^<b>&\\,1,1,300,0,False,,3\n")
     draw_results([tmp_path], tmp_path / "out.svg", kind)
     assert "&lt;b&gt;" in (tmp_path / "out.svg").read_text()
-
-
-def test_several_missions_are_drawn_as_paths(mission: Path, tmp_path: Path) -> None:
-    run_mission("seams2023", "none", 1, 1, tmp_path / "none")
-    draw_results([mission, tmp_path / "none"], tmp_path / "paths.svg")
-    text = (tmp_path / "paths.svg").read_text()
-    assert "random: " in text
-    assert "none: " in text
 
 
 class TestTimeline:
@@ -318,20 +253,6 @@ class TestBattery:
         assert any(cause.startswith("battery at 2") for cause in causes)
 
 
-@pytest.mark.parametrize(
-    ("key", "words"),
-    [
-        ("signals.water_visibility.period_s", "water visibility: period (s)"),
-        ("start.x_m", "start: x (m)"),
-        ("calibration.origin_y_m", "origin y (m)"),
-        ("thruster_events.0.time_s", "thruster event 1: time (s)"),
-        ("default_modes.f_generate_search_path", "default modes: search"),
-    ],
-)
-def test_keys_become_words_with_units(key: str, words: str) -> None:
-    assert key_words(key).replace("\N{NO-BREAK SPACE}", " ") == words
-
-
 LONG = "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerName" + "ForItsManager" * 5
 
 
@@ -346,10 +267,6 @@ def test_a_long_name_is_shown_whole(kind: str, campaign: Path, tmp_path: Path) -
         texts = [each for each in figure.findobj(Text) if LONG[:8] in each.get_text()]
         boxes = [each.get_window_extent() for each in texts]
     assert boxes and all(box.x0 >= 0.0 and box.x1 <= width_px for box in boxes)
-
-
-def test_the_number_of_missions_stays_in_one_piece() -> None:
-    assert "(n = 1,000)" in folded(f"{LONG} (n = 1,000)") and "\n" in folded(LONG)
 
 
 def test_a_campaign_without_the_swept_parameter_is_reported(campaign: Path, tmp_path: Path) -> None:
@@ -371,13 +288,7 @@ def texts_of(figure: Figure) -> list[str]:
     return [" ".join(each.get_text().split()) for each in figure.findobj(Text)]
 
 
-def test_the_detections_of_a_sweep_are_those_of_its_missions(two_limits: pandas.DataFrame) -> None:
-    with style.publication():
-        figure = draw_frame(two_limits, "detections")
-    assert "not found: 50%" in texts_of(figure)
-
-
-@pytest.mark.parametrize("kind", ["distributions", "raincloud", "detections", "reactions"])
+@pytest.mark.parametrize("kind", ["distributions", "raincloud"])
 def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(kind: str, two_limits: pandas.DataFrame) -> None:
     texts = texts_of(draw_frame(two_limits, kind))
     assert "none (n = 4)" in texts
@@ -422,13 +333,3 @@ def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs() -> None
     assert "means of n = 2 runs, each averaged over the parameters of the other panels" in texts_of(
         draw_sweep(missions_of(frame))
     )
-
-
-def test_no_bubble_of_detections_hides_the_share_of_those_not_found(campaign: Path, tmp_path: Path) -> None:
-    frame = read_missions([campaign]).frame
-    figure = draw_frame(frame[(frame["run"] == 1) & (frame["manager"] == "none")], "detections")
-    figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
-    below = figure.findobj(lambda artist: isinstance(artist, Axes))[-1]
-    words = next(each for each in figure.findobj(Text) if each.get_text().startswith("not found"))
-    bubble = below.collections[0].get_window_extent()
-    assert words.get_window_extent().y0 >= below.get_window_extent().y1 >= bubble.y1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 from pathlib import Path
 
 import pandas
@@ -109,16 +108,6 @@ def test_real_missions_are_not_averaged_like_the_campaign_beside_them(
     assert any("(runs_per_draw) of simulated are averaged" in note for note in comparison.notes)
 
 
-def test_missions_of_draws_without_run_numbers_are_not_averaged_like_numbered_ones(
-    of_draws: Path, tmp_path: Path
-) -> None:
-    lacking = tmp_path / "lacking"
-    shutil.copytree(of_draws, lacking)
-    pandas.read_csv(lacking / "runs.csv").assign(run="").to_csv(lacking / "runs.csv", index=False)
-    comparison = compare_folders([lacking, of_draws], metrics=["search_time_s"])
-    assert [each.n for each in comparison.summaries] == [20, 4]
-
-
 def test_further_metrics_are_not_what_was_swept(tmp_path: Path) -> None:
     sweep = {"grid": {"battery.discharge_time_s": [150.0, 200.0]}}
     run_campaign("extended", ["none", "metacontrol"], 3, 1, out=tmp_path / "out", sweep=sweep)
@@ -173,10 +162,3 @@ def test_real_missions_without_run_numbers_are_not_averaged_like_the_sweep_besid
     real.to_csv(tmp_path / "real.csv", index=False)
     comparison = compare_folders([tmp_path / "swept", tmp_path / "real.csv"], metrics=["search_time_s"])
     assert [each.n for each in comparison.summaries] == [2, 20]
-
-
-def test_what_a_manifest_says_was_swept_counts_only_where_the_runs_have_it(tmp_path: Path) -> None:
-    run_campaign("seams2023", ["none", "bt"], 2, 1, out=tmp_path / "out", sweep={"grid": {"start.y_m": [2.0, 2.5]}})
-    runs = pandas.read_csv(tmp_path / "out" / "runs.csv").query("`start.y_m` == 2.0").assign(depth=1)
-    runs.drop(columns="start.y_m").to_csv(tmp_path / "out" / "runs.csv", index=False)
-    assert compare_folders([tmp_path / "out"]).differences[0].n == 2

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pandas
-from scipy.stats import gaussian_kde
 
-from suave_des.results import campaign_figures, style
+from suave_des.results import style
 from suave_des.results.campaign_figures import (
     draw_differences,
     draw_distributions,
     draw_rainclouds,
-    draw_reactions,
 )
 from suave_des.results.missions import grouped, missions_of
 
@@ -20,14 +18,6 @@ def _times_s(n: int) -> np.ndarray:
     """Make search times in clusters, as turns of the spiral make them."""
     rng = np.random.default_rng(7)
     return np.abs(rng.choice((60.0, 110.0, 190.0), n) + rng.normal(0.0, 8.0, n))
-
-
-def test_a_density_from_counts_is_that_from_values() -> None:
-    values = np.sort(_times_s(20_000))
-    grid = np.linspace(values[0], values[-1], 300)
-    counted = campaign_figures._density(values, grid)
-    exact = gaussian_kde(values, bw_method=0.6 * len(values) ** -0.2)(grid)
-    assert np.abs(counted - exact).max() < 0.005 * exact.max()
 
 
 def test_figures_of_many_missions_are_written_from_few_points() -> None:
@@ -46,7 +36,7 @@ def test_a_legend_of_long_names_stays_within_the_figure() -> None:
     names = [f"a manager with a long name {number}" for number in range(4)]
     frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
     groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)))
-    for draw in (draw_differences, draw_distributions, draw_reactions):
+    for draw in (draw_differences, draw_distributions):
         with style.publication():
             figure = draw(groups)
             figure.draw_without_rendering()

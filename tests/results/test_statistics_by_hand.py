@@ -9,7 +9,7 @@ import pandas
 import pytest
 from scipy import stats
 
-from suave_des.estimates import Estimate, mean_of
+from suave_des.estimates import mean_of
 from suave_des.results import statistics
 from suave_des.results.compare import compare_frame
 from suave_des.results.comparison import Comparison
@@ -30,11 +30,6 @@ def frame(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> pan
 
 def compared(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> Comparison:
     return compare_frame(frame(seeds, **search_times_s), metrics=["search_time_s"])
-
-
-def test_an_interval_is_cut_off_at_both_limits() -> None:
-    assert Estimate(0.1, -0.1, 0.2).cut(0.0, 1.0).interval == (0.0, 0.2)
-    assert Estimate(0.9, 0.8, 1.1).cut(0.0, 1.0).interval == (0.8, 1.0)
 
 
 def test_two_shares_differ_as_in_newcombes_example() -> None:
@@ -102,11 +97,6 @@ def test_two_runs_in_common_are_a_pair_of_samples_and_one_is_not(b: list[float],
     (found,) = compared(a=[100.0, 110.0, 121.0, 133.0], b=b).differences
     assert found.paired is (n == 2)
     assert (found.n, found.n_other) == (n, n)
-
-
-def test_a_single_run_is_a_pair() -> None:
-    (found,) = compared(a=[100.0], b=[90.0]).differences
-    assert found.paired and found.n == 1
 
 
 def test_search_times_are_compared_up_to_the_shorter_limit() -> None:

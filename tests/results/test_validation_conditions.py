@@ -33,10 +33,6 @@ def test_a_column_may_give_the_number(column):
     assert CONDITIONS.numbers(frame(**{column: [3, 1]})).tolist() == [3, 1]
 
 
-def test_without_such_columns_nothing_is_reported():
-    assert CONDITIONS.numbers(frame(run=[1, 2])) is None
-
-
 @pytest.mark.parametrize(
     ("columns", "problem", "row"),
     [
@@ -89,21 +85,10 @@ def test_data_whose_conditions_cannot_be_told_are_refused(write, first, second, 
         read_real([write("a.csv", first), write("b.csv", second)], CONDITIONS)
 
 
-def test_rows_of_averages_that_were_left_out_are_noted(write):
-    header = "mission name,time searching pipeline (s),distance inspected (m)"
-    real = read_real([write("bt.csv", f"{header}\nsuave bt,20,1\nAVERAGE,20,1\nSTD,0,0\n")])
-    assert real.notes == (f"{real.files[0].path}: lines 3, 4 left out: averages, not missions.",)
-
-
 def test_simulated_missions_are_taken_in_the_real_ones_proportions():
     real = missions("bt", {1: [1.0] * 2, 2: [1.0]})
     simulated = missions("bt", {1: [1.0] * 5, 2: [1.0] * 9, 3: [1.0]})
     assert balanced(real, simulated, ["bt"])["condition"].value_counts().to_dict() == {1: 4, 2: 2}
-
-
-def test_a_condition_without_simulated_missions_is_an_error():
-    with pytest.raises(InputError, match="no simulated mission of manager bt under condition 2"):
-        balanced(missions("bt", {2: [1.0]}), missions("bt", {1: [1.0]}), ["bt"])
 
 
 def test_what_differs_between_conditions_is_not_taken_for_chance():
@@ -152,23 +137,11 @@ def test_the_share_that_found_the_pipeline_is_compared():
     assert (share["name"], share["published_share"], share["simulated_share"]) == ("pipeline found", 0.75, 1.0)
 
 
-def test_it_is_not_compared_where_the_data_do_not_tell():
-    real = missions("bt", {1: [50.0] * 4})
-    unknown = real.assign(pipeline_found=pandas.array([pandas.NA] * 4, dtype="boolean"))
-    assert validate(unknown, real, ["bt"]).shares.empty
-
-
 def test_reaction_times_are_compared_of_the_missions_that_have_one():
     real = missions("bt", {1: [50.0] * 4}).assign(mean_reaction_time_s=[1.0, 2.0, 3.0, float("nan")])
     found = validate(real, real, ["bt"])
     reaction = found.cells.set_index("metric").loc["mean_reaction_time_s"]
     assert reaction[["published_n", "published_mean"]].tolist() == [3, 2.0]
-
-
-def test_managers_come_in_the_order_of_the_file_unless_chosen(write):
-    real = read_real([write("runs.csv", f"{OWN}\nrandom,1,2\nnone,1,2\nrandom,1,2\n")])
-    assert real.choose(None) == ("random", "none")
-    assert real.choose("none") == ("none",)
 
 
 @pytest.mark.parametrize(

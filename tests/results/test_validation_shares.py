@@ -44,11 +44,6 @@ def test_of_detections_only_those_with_a_known_place_count(frame):
     assert count(share, frame) == (2, 3)
 
 
-def test_one_of_several_intervals_is_enough(frame):
-    share = Share(manager="metacontrol", name="either", where={"detection_x_m": [(-19.5, -18.9), (-16.1, -15.9)]})
-    assert count(share, frame) == (2, 5)
-
-
 def test_places_that_come_from_sums_of_steps_are_at_the_interval_end(missions):
     share = Share(manager="none", name="edge", where={"detection_x_m": [(-17.5, -16.0)]})
     assert count(share, missions({"none": [(1, 1, -17.5 - 1e-9), (1, 1, -17.51)]})) == (1, 2)
@@ -60,11 +55,6 @@ def test_no_mission_has_no_share(missions):
     assert count(share, frame) == (0, 0)
     (row,) = compare_shares([share], frame.assign(pipeline_found=math.nan), frame, ["none"]).to_dict("records")
     assert row["published_share"] is None
-
-
-def test_shares_of_managers_that_are_not_compared_are_left_out(frame):
-    shares = [Share(manager=name, name="all", where={"search_time_s": [(0, 300)]}) for name in ("none", "metacontrol")]
-    assert compare_shares(shares, frame, frame, ["none"])["manager"].tolist() == ["none"]
 
 
 def test_places_are_counted_to_the_nearest_half_metre_on_both_sides(missions):
@@ -89,24 +79,6 @@ def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their
         low, high = share.target
         counted, n = count(share, published)
         assert low <= counted / n <= high
-
-
-def test_the_shipped_clusters_hold_the_published_runs_as_known():
-    data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
-    published = read_runs(data).frame
-    counts = {
-        (share.manager, share.name): count(share, published)[0] for share in read_targets(targets_beside(data)).shares
-    }
-    assert counts["metacontrol", "found at 69 to 90 s"] == 10
-    assert counts["metacontrol", "found at 124 to 128 s"] == 9
-    assert counts["metacontrol", "in neither cluster, 300 s included"] == 1
-    none = {name: number for (manager, name), number in counts.items() if manager == "none"}
-    assert (none["found at 124 to 128 s"], none["found at 151 to 191 s"], none["found at 200 to 225 s"]) == (4, 8, 7)
-    assert (none["not found by 300 s"], none["in no cluster"]) == (1, 0)
-
-
-def test_a_data_file_without_a_file_of_shares_beside_it_has_none(tmp_path):
-    assert targets_beside(tmp_path / "runs.csv") is None
 
 
 ENTRY = "shares:\n  - manager: none\n    name: early\n    where: {where}\n"

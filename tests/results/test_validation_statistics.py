@@ -36,15 +36,9 @@ class TestBootstrap:
         assert ratio_interval(published, simulated, rng(7)) == ratio_interval(published, simulated, rng(7))
         assert ratio_interval(published, simulated, rng(7)) != ratio_interval(published, simulated, rng(8))
 
-    def test_a_planted_ratio_is_outside_one(self):
-        assert ratio_interval(normal(100, 10, 20, 1), normal(130, 30, 500, 2), rng()).low > 1
-
     def test_values_all_equal_have_no_ratio(self):
         found = ratio_interval(np.full(5, 0.1), np.full(7, 0.3), rng())
         assert np.isnan(found.value) and found.interval is None
-
-    def test_one_value_has_no_interval(self):
-        assert ratio_interval(np.array([1.0]), np.array([1.0, 2.0]), rng()).interval is None
 
 
 class TestDistributions:
@@ -80,34 +74,17 @@ class TestDistributions:
         assert shift == pytest.approx(other.statistic)
         assert (total > 1.0) == (shift > 0.0)  # 1 is its mean if both come from one distribution
 
-    def test_planted_differences_are_found_and_planted_equality_passes(self):
-        same, shifted, wider = normal(100, 10, 2_000, 1), normal(120, 10, 2_000, 2), normal(100, 30, 2_000, 2)
-        published = normal(100, 10, 20, 3)
-        assert kolmogorov_smirnov(published, same)[1] > 0.05
-        assert anderson_darling(published, same, rng())[1] > 0.05
-        assert kolmogorov_smirnov(published, shifted)[1] < 0.001
-        assert anderson_darling(published, shifted, rng())[1] == pytest.approx(0.001)  # the least that there can be
-        assert anderson_darling(published, wider, rng())[1] < 0.05
-
     def test_the_permutation_p_of_equal_distributions_is_uniform(self):
         p = [
             anderson_darling(normal(0, 1, 8, s).round(1), normal(0, 1, 30, s + 999), rng(s), 99)[1] for s in range(200)
         ]
         assert stats.kstest(p, "uniform").pvalue > 0.001
 
-    def test_a_sample_of_one_value_is_not_tested(self):
-        assert np.isnan(anderson_darling(np.ones(1), np.ones(9), rng())).all()
-
     def test_all_values_equal_are_no_evidence(self):
         assert anderson_darling(np.ones(3), np.ones(9), rng()) == (0.0, 1.0)
 
 
 class TestManagers:
-    def test_a12_of_a_worked_example(self):
-        # Of 6 pairs the first is greater in 2 and equal in 1.
-        first, second = np.array([1.0, 2.0]), np.array([2.0, 3.0, 0.0])
-        assert mann_whitney(first, second).effect.value == pytest.approx((2 + 0.5) / 6)
-
     def test_the_conclusion_has_scipys_p_and_says_which_is_greater(self):
         first, second = normal(100, 20, 20, 1), normal(140, 20, 20, 2)
         found = mann_whitney(first, second, "asymptotic")
@@ -116,11 +93,6 @@ class TestManagers:
         assert sign_of(found.p_less, found.p_greater) == -1
         assert sign_of(found.p_greater, found.p_less) == 1
         assert sign_of(0.05, 0.05) == 0
-
-    def test_values_all_equal_lead_to_no_conclusion(self):
-        found = mann_whitney(np.ones(5), np.ones(5))
-        assert (found.p, found.p_less, found.effect.value) == (1.0, 1.0, 0.5)
-        assert agreement(0, (np.ones(5), np.ones(5)), (5, 5), rng(), subsamples=9) == 1.0
 
     def test_subsamples_agree_with_a_clear_conclusion_and_not_with_its_opposite(self):
         samples = normal(100, 20, 400, 1), normal(200, 20, 400, 2)
@@ -132,11 +104,6 @@ class TestManagers:
         assert sum(shares) == pytest.approx(1.0)
         assert shares[1] == pytest.approx(0.9, abs=0.03)
 
-    def test_with_as_many_missions_as_published_there_is_one_subsample(self):
-        samples = normal(100, 20, 20, 1), normal(110, 20, 20, 2)
-        found = mann_whitney(*samples, "asymptotic")
-        assert agreement(sign_of(found.p_less, found.p_greater), samples, (20, 20), rng(), subsamples=50) == 1.0
-
     def test_too_few_missions_give_no_share(self):
         assert np.isnan(agreement(0, (np.ones(19), np.ones(20)), (20, 20), rng()))
 
@@ -146,8 +113,3 @@ class TestManagers:
 def test_the_interval_of_a_share_is_scipys(count, n, method):
     reference = stats.binomtest(count, n).proportion_ci(method=method)
     assert share_of(count, n, method).interval == pytest.approx((reference.low, reference.high))
-
-
-def test_no_trials_have_no_share_and_no_interval():
-    found = share_of(0, 0)
-    assert np.isnan(found.value) and found.interval is None
