@@ -282,7 +282,7 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
                 raise InputError(problem, file=parameter.document.path, place=place, remedy=remedy)
             notes.append(f"{parameter.place}: not taken over: the campaign's value counts ({other.place})")
     if unneeded:
-        notes.append(f"no counterpart, nor needed here: {', '.join(unneeded)}")
+        notes.append(f"no counterpart here, and none needed: {', '.join(unneeded)}")
     values = {path: Value(each.value, f"{each.source}: {each.keys}", each) for path, each in found.items()}
 
     has_mission = any(each.node not in (RUNNER, REASONER) for each in parameters)
