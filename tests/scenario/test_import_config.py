@@ -293,7 +293,7 @@ class TestWithoutCounterpart:
     @pytest.mark.parametrize(
         ("text", "words", "why"),
         [
-            (MISSION_2023, "mission_node.result_path (given0.yaml, line 4)", "no counterpart, nor needed here"),
+            (MISSION_2023, "mission_node.result_path (given0.yaml, line 4)", "no counterpart here, and none needed"),
             ("mission_node: {ros__parameters: {time_limt: 3}}\n", "mission_node.time_limt", "mean 'time_limit'"),
             (
                 "task_bridge: {ros__parameters: }\nmisson_node: {ros__parameters: {time_limit: 3}}\n",
