@@ -112,6 +112,7 @@ def subject_of(loaded: LoadedScenario) -> Subject:
         operators=loaded.scenario.revision.comparison_operators,
         reported=REPORTED_STATUSES,
         measured=measured_attributes(loaded.scenario),
+        reaction_thresholds_m=loaded.scenario.reaction_metric.visibility_thresholds_m,
     )
 
 

@@ -126,6 +126,15 @@ def test_modes_without_a_design_are_noted(tmp_path: Path) -> None:
     assert note.message.endswith("metacontrol never chooses: fd_fast, normal")
 
 
+def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path: Path) -> None:
+    known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
+    warning = only(found(tmp_path, **known), "fd_spiral_medium expects a visibility of 2.25 m")
+    assert warning.level is Level.WARN
+    assert "reaction_metric.visibility_thresholds_m" in str(warning.remedy)
+    (tmp_path / "other").mkdir()
+    assert not [each for each in found(tmp_path / "other") if "expects a visibility" in each.message]
+
+
 @pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"])
 def test_shipped_scenarios_have_no_warning(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:

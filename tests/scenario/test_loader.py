@@ -65,7 +65,7 @@ def test_the_vehicle_is_the_same_in_every_revision():
     )
 
 
-def test_paper_table_values_differs_from_seams2023_in_the_knowledge_only():
+def test_paper_table_values_differs_from_seams2023_in_the_knowledge_and_what_reactions_are_measured_by():
     ours, other = load_scenario("paper_table_values").scenario, load_scenario("seams2023").scenario
     assert ours.knowledge.values == {
         "qa_water_visibility_low": 0.5,
@@ -73,7 +73,8 @@ def test_paper_table_values_differs_from_seams2023_in_the_knowledge_only():
         "qa_water_visibility_high": 2.0,
         "qa_performance_recover_thrusters": 0.5,
     }
-    same = {"name": other.name, "description": other.description, "knowledge": other.knowledge}
+    assert ours.reaction_metric.visibility_thresholds_m == (2.0, 1.0, 0.5)
+    same = {name: getattr(other, name) for name in ("name", "description", "knowledge", "reaction_metric")}
     assert ours.model_copy(update=same) == other
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from rdflib import URIRef
 
-from suave_des.domain import DEFAULT_MODE, UNGROUND_MODE
+from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import KnowledgeError, nearest, with_article
 from suave_des.findings import Level
 from suave_des.knowledge.checks.registry import Found, Material, check
@@ -159,6 +159,17 @@ def without_operator(content: Content, model: Model, measured: Collection[str]) 
     compared = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
     expected = frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
     return sorted(name for name in expected.intersection(measured) if model.attributes[name] not in compared)
+
+
+@check(Level.WARN)
+def thresholds_without_reaction(material: Material) -> Iterator[Found]:
+    """Find the search designs whose expected visibility the metric of reactions does not know."""
+    known = material.subject.reaction_thresholds_m
+    for design in material.base.designs(GENERATE_SEARCH_PATH) if known is not None else ():
+        expected_m = material.base.expected(design).get(WATER_VISIBILITY)
+        if expected_m is not None and float(expected_m) not in (known or ()):
+            problem = f"{design} expects a visibility of {expected_m} m, by which mean_reaction_time_s does not judge"
+            yield design, None, problem, "set reaction_metric.visibility_thresholds_m and expected_altitudes_m"
 
 
 @check(Level.WARN)

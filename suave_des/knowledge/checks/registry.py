@@ -41,6 +41,7 @@ class Subject:
         revision: the scenario's, for messages.
         reported: the statuses that the simulation reports, by component; None: that is not checked.
         measured: the quality attributes that the scenario measures; None: that is not checked.
+        reaction_thresholds_m: visibilities by which the mean reaction time is judged; None: that is not checked.
         time_limit_s: for Pellet.
     """
 
@@ -55,6 +56,7 @@ class Subject:
     revision: str = ""
     reported: Mapping[str, Collection[str]] | None = None
     measured: Collection[str] | None = None
+    reaction_thresholds_m: Collection[float] | None = None
     time_limit_s: float = TIME_LIMIT_S
 
     @property
