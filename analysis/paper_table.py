@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from suave_des import InputError, compare_with_paper, read_runs
-from suave_des.results.paper import FILES, published_runs
+from suave_des.results.paper import FILE, published_runs
 
 
 def main() -> None:
@@ -22,14 +22,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Compare a campaign with the paper's table.")
     parser.add_argument("runs", type=Path, help="runs.csv of a campaign on seams2023")
     parser.add_argument("--published", type=Path, default=published_runs(), help="published runs (default: shipped)")
-    parser.add_argument("--out", type=Path, help="folder for paper_table.md and paper_table.csv")
+    parser.add_argument("--out", type=Path, help="folder for paper_table.md")
     arguments = parser.parse_args()
     try:
         comparison = compare_with_paper(read_runs(arguments.runs).frame, arguments.published)
         if arguments.out is not None:
             arguments.out.mkdir(parents=True, exist_ok=True)
-            for name, text in zip(FILES, (comparison.markdown(), comparison.csv()), strict=True):
-                (arguments.out / name).write_text(text, encoding="utf-8")
+            (arguments.out / FILE).write_text(comparison.markdown(), encoding="utf-8")
     except InputError as error:
         print("paper_table.py: " + " ".join(str(error).split()), file=sys.stderr)
         sys.exit(2)

@@ -185,7 +185,6 @@ class FigureKind(StrEnum):
     MAP = "map"
     TIMELINE = "timeline"
     DISTRIBUTIONS = "distributions"
-    RAINCLOUD = "raincloud"
     DIFFERENCES = "differences"
     SWEEP = "sweep"
     HEATMAP = "heatmap"
@@ -199,7 +198,7 @@ def figure(
     kind: Annotated[
         FigureKind,
         typer.Option(
-            help="For a mission: map, timeline; for a campaign: distributions, raincloud, differences;"
+            help="For a mission: map, timeline; for a campaign: distributions, differences;"
             " for a sweep: sweep, heatmap."
         ),
     ] = FigureKind.AUTO,

@@ -113,13 +113,12 @@ def _results(missions: Missions) -> dict[str, Any]:
         InputError: they cannot be compared.
     """
     found = compare(missions)
-    most, replay = found.largest_differences()
     return {
         "conclusion": found.conclusion,
         "notes": found.notes,
         "sections": [_section(capital(title), tables, conclusions) for title, tables, conclusions in found.sections()],
         "needed": _plain_table(found.runs_needed()) if found.differences else None,
-        "largest": (capital(most.title), _plain_table(most), replay),
+        "largest": (capital(found.largest.title), _plain_table(found.largest), found.replay),
         "remarks": found.remarks(),
         "drawn": chart_columns(missions),
     }

@@ -1,12 +1,11 @@
-"""Figures of a campaign's missions, with a curve, cloud or panel for each manager."""
+"""Figures of a campaign's missions: distributions, differences run by run, and means over what was swept."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from textwrap import fill
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -17,7 +16,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
@@ -39,12 +37,8 @@ _LEGEND_LINE_IN, _HANDLE_IN = 0.2, 0.6
 """Height of a line of a legend, and width of an entry without its text."""
 _DOTS = 400
 """More missions are drawn as so many, evenly taken in the order of their values."""
-_DENSITY_BINS = 3_000
-"""Values are counted in so many bins before their density is estimated."""
 _EACH_WITH_EACH = 4
 """More groups have too many pairs for one figure."""
-_FEWEST = 5
-"""Values for a density."""
 _MEAN: dict[str, Any] = {
     "fmt": "D",
     "ms": 3,
@@ -88,71 +82,6 @@ def _mark_limit(axes: Axes, groups: Sequence[Group]) -> None:
         axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
         look: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
         axes.text(limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
-
-
-def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group] = MappingProxyType({})) -> style.Picture:
-    """Draw for each group a cloud (density), a box (quartiles, median, mean) and rain (missions).
-
-    Args:
-        groups: to draw, a row for each.
-        published: real missions to show beside a group, by its name.
-    """
-    height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
-    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
-    for axes, metric, title in _metric_panels(figure):
-        for row, (number, group) in enumerate(_looks(groups)):
-            _raincloud(axes, row, number, group, metric, published.get(group.name))
-        axes.set_xlabel(title)
-        axes.set_xlim(left=0.0)
-    left = figure.axes[0]
-    left.set_yticks(range(len(groups)), [_label(group) for group in groups])
-    left.set_ylim(len(groups) - 0.45, -0.6)
-    _mark_limit(left, groups)
-    handles: list[Artist] = [
-        Patch(facecolor="#BBBBBB", label="density"),
-        Line2D([], [], color=style.BLACK, lw=4, alpha=0.35, label="quartiles"),
-        Line2D([], [], color=style.BLACK, marker="|", ms=8, lw=0, label="median"),
-        Line2D([], [], color=style.BLACK, marker="D", ms=3, mfc="white", lw=0, label="mean"),
-        Line2D([], [], color=style.GREY, marker="o", ms=2, lw=0, label="mission"),
-    ]
-    if published:
-        handles.append(Line2D([], [], color=style.BLACK, marker="x", ms=4, lw=0, label="published run"))
-    _legend(figure, handles, [str(handle.get_label()) for handle in handles])
-    return figure
-
-
-def _raincloud(axes: Axes, row: int, number: int, group: Group, metric: str, published: Group | None) -> None:
-    values = np.sort(group.known_values(metric))
-    colour = style.line(number)["color"]
-    if len(values) >= _FEWEST and np.ptp(values) > 0.0:
-        grid = np.linspace(values[0], values[-1], 300)
-        heights = _density(values, grid)
-        heights *= 0.38 / heights.max()
-        axes.fill_between(
-            grid, row - 0.12 - heights, row - 0.12, color=colour, alpha=0.55, lw=0, hatch=style.hatch(number)
-        )
-        axes.plot(grid, row - 0.12 - heights, color=colour, lw=0.8)
-    low, median, high = np.percentile(values, (25, 50, 75))
-    axes.plot([low, high], [row, row], color=style.BLACK, lw=4, alpha=0.35, solid_capstyle="butt")
-    axes.plot(median, row, color=style.BLACK, marker="|", ms=8)
-    axes.plot(values.mean(), row, color=style.BLACK, marker="D", ms=3, mfc="white", mew=0.7)
-    rain = values if len(values) <= _DOTS else values[np.linspace(0, len(values) - 1, _DOTS).astype(int)]
-    axes.plot(rain, row + 0.1 + _jitter(len(rain), 0.12), "o", color=colour, ms=1.6, alpha=0.6, mew=0)
-    if published is not None:
-        real = np.sort(published.known_values(metric))
-        axes.plot(real, row + 0.3 + _jitter(len(real), 0.06), "x", color=style.BLACK, ms=2.8, mew=0.7)
-
-
-def _density(values: Sample, grid: Sample) -> Sample:
-    """Estimate the density of values at the points of a grid.
-
-    The kernel is narrow, so that the clusters of search times, a turn of the spiral each, stay apart.
-    """
-    from scipy.stats import gaussian_kde
-
-    counts, edges = np.histogram(values, bins=_DENSITY_BINS)
-    middles = (edges[:-1] + edges[1:]) / 2.0
-    return np.asarray(gaussian_kde(middles, bw_method=0.6 * len(values) ** -0.2, weights=counts)(grid))
 
 
 def _jitter(number: int, height: float) -> NDArray[np.floating]:
@@ -284,7 +213,7 @@ def _text_width_in(label: str) -> float:
 
 # Sweeps
 
-_MOST_PARAMETERS, _COLUMNS = 9, 3
+_MOST_PARAMETERS = 3
 _MOST_CELLS = 10
 """Values of a parameter in a heat map."""
 _MOST_VALUES = 16
@@ -318,38 +247,26 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     if len(parameters) > _MOST_PARAMETERS:
         problem = f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
         raise InputError(problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them")
-    frame = missions.frame
+    frame, columns = missions.frame, len(parameters)
     names = _names(frame)
-    managers = list(dict.fromkeys(names))
-    columns = min(len(parameters), _COLUMNS)
-    blocks = math.ceil(len(parameters) / columns)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
-    height_in = 4.0 * blocks + 0.2 * math.ceil((len(managers) + 1) / 3)
+    height_in = 4.0 + 0.2 * math.ceil((names.nunique() + 1) / 3)
     figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
-    panels = figure.subplots(len(PAPER_METRICS) * blocks, columns, sharey="row", squeeze=False)
+    panels = figure.subplots(len(PAPER_METRICS), columns, sharex="col", sharey="row", squeeze=False)
     counts: list[int] = []
-    for place, parameter in enumerate(parameters):
-        block, column = divmod(place, columns)
-        for row, metric in enumerate(PAPER_METRICS):
-            axes = panels[len(PAPER_METRICS) * block + row, column]
+    for row, metric in zip(panels, PAPER_METRICS, strict=True):
+        for axes, parameter in zip(row, parameters, strict=True):
             counts += _draw_panel(axes, frame, names, parameter, metric)
-            axes.tick_params(labelbottom=row == len(PAPER_METRICS) - 1)
-            if column == 0:
-                axes.set_ylabel(f"mean {METRICS[metric].heading}")
-        panels[len(PAPER_METRICS) * block + len(PAPER_METRICS) - 1, column].set_xlabel(_folded(key_words(parameter)))
-    for row in range(len(PAPER_METRICS)):
-        own = panels[row :: len(PAPER_METRICS)].ravel()
-        top = max(axes.get_ylim()[1] for axes in own if axes.has_data())
-        for axes in own:
-            axes.set_ylim(0.0, top)
-    for axes in panels.ravel():
-        axes.set_visible(bool(axes.has_data()))
+        row[0].set_ylabel(f"mean {METRICS[metric].heading}")
+        row[0].set_ylim(bottom=0.0)
+    for axes, parameter in zip(panels[-1], parameters, strict=True):
+        axes.set_xlabel(_folded(key_words(parameter)))
     handles, labels = panels[0, 0].get_legend_handles_labels()
     handles.append(Line2D([], [], lw=0, marker="|", ms=8, color=style.GREY))
     labels.append("95% interval of the mean")
     ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
     figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
-    if len(parameters) == len(missions.swept) > 1:
+    if len(missions.swept) == columns > 1:
         write_below(figure, f"{_averaged(counts, ())}, each averaged over the parameters of the other panels")
     else:
         write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))

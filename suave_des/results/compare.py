@@ -40,6 +40,7 @@ from suave_des.results.missions import (
     time_limit_s,
 )
 from suave_des.results.statistics import Sample
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -182,36 +183,33 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
     means = {each.group: each.mean.value for each in summaries if each.metric == metrics[0].name and each.n}
     sentence = " ".join(_conclusions(groups, metrics[0], differences, means))
     notes = [*missions.notes, *notes, *caveats(groups, metrics), *_worse_paired(differences)]
-    largest = () if unpaired else tuple(_largest(pairs, metrics[0], missions.folders))
-    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups), largest)
+    largest = _largest(() if unpaired else pairs, metrics[0], missions.folders)
+    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups), *largest)
 
 
-def _largest(
-    pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]
-) -> Iterator[dict[str, Any]]:
-    """Yield the runs with the least and the greatest difference of each pair, and the command that replays one."""
+def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]) -> tuple[Table, str]:
+    """Return the least and the greatest difference of each pair, and the command that replays the largest of all."""
+    rows, found = [], []
     for first, second in pairs:
         x, y = first.by_run(metric.name), second.by_run(metric.name)
         if x is None or y is None or not (first.is_of_missions and second.is_of_missions):
             continue
         apart = (x - y).dropna()
-        if not apart.any():
-            continue
-        least, greatest = first_and_last(apart)
-        row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
-        for name, (value, number) in (("least", least), ("greatest", greatest)):
-            row |= {name: value, f"{name}_run": number}
-        managers, sources = (
-            list(dict.fromkeys(str(group.frame[name].iloc[0]) for group in (first, second)))
-            for name in ("manager", "source")
-        )
-        row["replay"] = ""
-        if not first.point and 1 in (len(managers), len(sources)) and all(source in folders for source in sources):
-            run = row["greatest_run" if row["greatest"] > -row["least"] else "least_run"]
-            places = [str(folders[source]) for source in sources]
-            chosen = "--run", str(run), "--managers", ",".join(managers)
-            row["replay"] = shlex.join(["suave-des", "replay", *places, *chosen])
-        yield row
+        if apart.any():
+            ends = first_and_last(apart)
+            cells = (text for value, run in ends for text in (metric.number(value), str(run)))
+            rows.append((f"{first.name} - {second.name}", *cells))
+            parts = [group.frame.iloc[0] for group in (first, second)]
+            managers, sources = (
+                list(dict.fromkeys(str(part[name]) for part in parts)) for name in ("manager", "source")
+            )
+            if not first.point and 1 in (len(managers), len(sources)) and folders.keys() >= set(sources):
+                size, run = max((abs(value), run) for value, run in ends)
+                chosen = "--run", str(run), "--managers", ",".join(managers)
+                places = [str(folders[source]) for source in sources]
+                found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
+    title = f"runs that differ most: {metric.heading}"
+    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(found, default=(0.0, ""))[1]
 
 
 def _conclusions(

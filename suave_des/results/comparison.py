@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from textwrap import fill
 from typing import Any
@@ -18,7 +18,9 @@ from suave_des.results.missions import listed
 from suave_des.results.statistics import A12, RANK_BISERIAL, SIGNIFICANCE
 from suave_des.tables import Table, markdown_text
 
-_NAN, _UNKNOWN = math.nan, Estimate()
+_NAN, _UNKNOWN, _NO_TABLE = math.nan, Estimate(), Table((), ())
+_EFFECT = "effect"
+"""Heading of the widest column, the last one, which goes where the table would be too wide."""
 _EFFECTS = {
     RANK_BISERIAL: "Effect: rank-biserial correlation, 1 if the first has the greater value in all pairs.",
     A12: "Effect: A12, the probability that a mission of the first has the greater value.",
@@ -150,8 +152,8 @@ class Comparison:
         notes: what a reader should know about the data.
         metrics: the compared metrics.
         counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
-        largest: of each pair the runs whose missions differ most in the first metric: group, other, metric, least and
-            greatest (differences), least_run and greatest_run, and the command that replays one, where it is known.
+        largest: of each pair the least and the greatest difference in the first metric, each with its run.
+        replay: the command that replays both missions of the largest of these; empty: not known.
     """
 
     conclusion: str
@@ -160,7 +162,8 @@ class Comparison:
     notes: tuple[str, ...]
     metrics: tuple[Metric, ...] = field(repr=False)
     counted: str = field(default="mission", repr=False)
-    largest: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)
+    largest: Table = field(default=_NO_TABLE, repr=False)
+    replay: str = field(default="", repr=False)
 
     def summary_frame(self) -> pandas.DataFrame:
         """Return a row for each group and metric, with the columns of Summary.row()."""
@@ -170,44 +173,19 @@ class Comparison:
         """Return a row for each pair and metric, with the columns of Difference.row()."""
         return pandas.DataFrame([each.row() for each in self.differences])
 
-    def sections(self, *, has_effects: bool = True) -> Iterator[tuple[str, list[Table], list[str]]]:
-        """Yield of each metric its title with unit, its tables, and what follows from each difference.
-
-        Args:
-            has_effects: whether tables of differences have the sizes of effects, which are their widest column.
-        """
+    def sections(self) -> Iterator[tuple[str, list[Table], list[str]]]:
+        """Yield of each metric its title with unit, its tables, and what follows from each difference."""
         for metric in self.metrics:
             summaries = [each for each in self.summaries if each.metric == metric.name]
             differences = [each for each in self.differences if each.metric == metric.name]
-            tables = [_summary_table(metric, summaries), _search_table(summaries)]
-            tables.append(_difference_table(metric, differences, has_effects=has_effects))
-            shown = [table for table in tables if table.rows]
-            yield metric.heading, shown, [each.conclusion for each in differences]
+            tables = _summary_table(metric, summaries), _search_table(summaries), _difference_table(metric, differences)
+            yield metric.heading, [each for each in tables if each.rows], [each.conclusion for each in differences]
 
     def runs_needed(self) -> Table:
         """Return the number of runs that an interval needs, for each pair and metric."""
         metrics = {metric.name: metric for metric in self.metrics}
         rows = [_runs_row(each, metrics[each.metric]) for each in self.differences if not math.isnan(each.half_width)]
         return Table(("difference", "for ±", "paired", "not paired", "variance ratio"), rows)
-
-    def largest_differences(self) -> tuple[Table, str]:
-        """Return the runs in which two managers differ most, and the command that replays one; empty: none is known."""
-        metric = self.metrics[0]
-        rows = [
-            (
-                f"{each['group']} - {each['other']}",
-                *(
-                    text
-                    for end in ("least", "greatest")
-                    for text in (metric.number(each[end]), str(each[f"{end}_run"]))
-                ),
-            )
-            for each in self.largest
-        ]
-        title = f"runs that differ most: {metric.heading}"
-        known = [each for each in self.largest if each["replay"]]
-        most = max(known, key=lambda each: max(each["greatest"], -each["least"]), default={"replay": ""})
-        return Table(("difference", "least", "run", "greatest", "run"), rows, title), most["replay"]
 
     def remarks(self) -> list[str]:
         """Describe how missions were compared and why, and what to know about the data."""
@@ -234,18 +212,19 @@ class Comparison:
     def text(self, width: int = 95) -> str:
         """Write the conclusions, the tables, and the methods, for a terminal of that width."""
         parts = [folded(self.conclusion, width)]
-        sections = zip(self.sections(), self.sections(has_effects=False), strict=True)
-        for (title, tables, conclusions), (_, narrow, _) in sections:
-            for place, (table, other) in enumerate(zip(tables, narrow, strict=True)):
+        for title, tables, conclusions in self.sections():
+            for place, table in enumerate(tables):
                 heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
-                parts.append(heading + (table if table.width() <= width else other).text(width))
+                fits = table.headings[-1] != _EFFECT or table.width() <= width
+                shown = table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
+                parts.append(heading + shown.text(width))
             if conclusions:
                 parts.append("\n".join(folded(f"- {each}", width) for each in conclusions))
         if (needed := self.runs_needed()).rows:
             parts.append(f"runs of each manager that an interval of the difference needs\n{needed.text(width)}")
-        most, replay = self.largest_differences()
-        if most.rows:
-            parts.append(f"{most.title}\n{most.text(width)}" + (f"\nTo see both missions: {replay}" if replay else ""))
+        if self.largest.rows:
+            replay = f"\nTo see both missions: {self.replay}" if self.replay else ""
+            parts.append(f"{self.largest.title}\n{self.largest.text(width)}{replay}")
         parts.append("\n".join(folded(line, width) for line in self.remarks()))
         return "\n\n".join(parts) + "\n"
 
@@ -265,13 +244,9 @@ class Comparison:
                 parts.append("\n".join(f"- {markdown_text(each)}" for each in conclusions))
         if self.differences:
             parts += ["### Runs needed", self.runs_needed().markdown()]
-        most, replay = self.largest_differences()
-        if most.rows:
-            parts += [
-                f"### {capital(most.title)}",
-                most.markdown(),
-                *([f"To see both missions: `{replay}`"] if replay else []),
-            ]
+        if self.largest.rows:
+            parts += [f"### {capital(self.largest.title)}", self.largest.markdown()]
+            parts += [f"To see both missions: `{self.replay}`"] if self.replay else []
         return "\n\n".join([*parts, *map(markdown_text, self.remarks())]) + "\n"
 
     def _repr_markdown_(self) -> str:
@@ -326,7 +301,7 @@ class Comparison:
             "notes": list(self.notes),
             "summaries": [each.row() for each in self.summaries],
             "differences": [each.row() for each in self.differences],
-            "largest_differences": self.largest,
+            "largest_differences": {"rows": self.largest.rows, "replay": self.replay},
         }
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -372,10 +347,10 @@ def _seconds(value: float) -> str:
     return f"{value:.0f}" if math.isfinite(value) else "not reached"
 
 
-def _difference_table(metric: Metric, differences: Sequence[Difference], *, has_effects: bool) -> Table:
+def _difference_table(metric: Metric, differences: Sequence[Difference]) -> Table:
     """Return the difference of each pair; for shares, without an effect size."""
-    headings = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", "effect")
-    width = len(headings) if has_effects and metric.name != FOUND else 6
+    headings = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", _EFFECT)
+    width = 6 if metric.name == FOUND else len(headings)
     return Table(headings[:width], [_difference_row(each, metric)[:width] for each in differences])
 
 

@@ -17,7 +17,6 @@ from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, rea
 from suave_des.results import campaign_figures, style
 from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
 from suave_des.results.missions import Group, Missions, grouped, missions_of, read_missions
-from suave_des.results.paper import published_runs
 from suave_des.results.style import key_words
 
 if TYPE_CHECKING:
@@ -26,12 +25,10 @@ if TYPE_CHECKING:
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 AUTO, SWEEP, HEAT_MAP, MAP, TIMELINE = "auto", "sweep", "heatmap", "map", "timeline"
-_PUBLISHED_SCENARIO = "seams2023"
 
 
 CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
     "distributions": campaign_figures.draw_distributions,
-    "raincloud": campaign_figures.draw_rainclouds,
     "differences": campaign_figures.draw_differences,
 }
 """Figures of a campaign's missions by their names."""
@@ -165,14 +162,7 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     if name not in CAMPAIGN_KINDS:
         raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
     groups = grouped(missions, averages=name == _OF_MEANS)[0]
-    scenarios = set(missions.frame["scenario"])
-    if name == "raincloud" and scenarios == {_PUBLISHED_SCENARIO} and not missions.swept:
-        names, real = [group.name for group in groups], grouped(read_missions([published_runs()]))[0]
-        figure: Figure = campaign_figures.draw_rainclouds(
-            groups, {group.name: group for group in real if group.name in names}
-        )
-    else:
-        figure = CAMPAIGN_KINDS[name](groups)
+    figure = CAMPAIGN_KINDS[name](groups)
     if missions.swept:
         shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)

@@ -161,29 +161,16 @@ def _in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
 
 def _read_exemplars_folder(folder: Path) -> Missions:
     """Read all CSV files of a folder that are results; others, such as the exemplar's statistics, are left out."""
-    found, notes, errors = [], [], []
-    try:
-        paths = sorted(folder.glob("*.csv"))
-        inner = sorted(child.name for child in folder.iterdir() if (child / RUNS_FILE).is_file())
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=folder, remedy="check its rights") from None
-    for path in paths:
-        try:
-            found.append(_read_file(path))
-        except InputError as error:
-            if not is_foreign(path):
-                raise
-            errors.append(error)
-            notes.append(f"{path} is left out: it has no columns of missions")
-    if found:
-        frame = pandas.concat([each.frame for each in found], ignore_index=True)
+    paths = sorted(folder.glob("*.csv"))
+    own = [path for path in paths if not is_foreign(path)]
+    if own or paths:
+        found = [_read_file(path) for path in own or paths[:1]]
+        notes = [f"{path} is left out: it has no columns of missions" for path in paths if path not in own]
         notes += [note for each in found for note in each.notes]
+        frame = pandas.concat([each.frame for each in found], ignore_index=True)
         return Missions(_in_papers_order(frame), (), tuple(notes))
-    if errors:
-        raise errors[0]
-    if inner:
-        names = " ".join(str(folder / name) for name in inner[:4])
-        raise InputError("has no results itself", file=folder, remedy=f"give the folders in it: {names}")
+    if inner := sorted(str(path.parent) for path in folder.glob(f"*/{RUNS_FILE}")):
+        raise InputError("has no results itself", file=folder, remedy=f"give the folders in it: {' '.join(inner[:4])}")
     remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
     raise InputError("has no result files" if folder.exists() else "no such folder", file=folder, remedy=remedy)
 

@@ -10,7 +10,6 @@ import pandas
 
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate, mean_of, std_of
-from suave_des.files import csv_text
 from suave_des.records.metrics import DISTANCE, METRICS, PAPER_METRICS, SEARCH_TIME
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
@@ -22,7 +21,7 @@ _CLAIMS = {SEARCH_TIME: "find the pipeline sooner", DISTANCE: "inspect more of i
 """What the paper says that metacontrol does on average."""
 MARK = "*"
 """Marks figures outside the paper's interval."""
-FILES = ("paper_table.md", "paper_table.csv")
+FILE = "paper_table.md"
 
 
 @dataclass(frozen=True)
@@ -93,18 +92,6 @@ class PaperComparison:
     def markdown(self) -> str:
         """Write the comparison as Markdown."""
         return "\n\n".join([self.table().markdown(), *map(markdown_text, self.remarks())]) + "\n"
-
-    def csv(self) -> str:
-        """Write the comparison as CSV, with six decimals; missing values are empty."""
-        rows = []
-        for (manager, metric, statistic), (paper, ours) in self.figures.items():
-            is_known = ours.value == ours.value
-            row: dict[str, object] = {"manager": manager, "metric": metric, "statistic": statistic}
-            row |= {**paper.columns("published"), **ours.columns("ours")}
-            row["difference"] = ours.value - paper.value if is_known else None
-            row["inside_published_ci95"] = paper.contains(ours.value) if is_known else None
-            rows.append(row)
-        return csv_text(list(rows[0]), (list(row.values()) for row in rows))
 
 
 def published_runs() -> Path:

@@ -221,19 +221,23 @@ class Conditions:
             raise InputError(problem, place=str(row), remedy=remedy)
         return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
 
-    def in_order(self, managers: pandas.Series[str]) -> NDArray[np.int64] | None:
+    def in_order(self, managers: pandas.Series[str]) -> NDArray[np.int64]:
         """Number missions by their order, as the exemplar's runner makes them: equally many runs of each condition.
 
         Args:
             managers: of each mission, in the order in which they were made.
 
         Returns:
-            From 1, shape (n,); none if a manager's missions do not divide evenly.
+            From 1, shape (n,).
+
+        Raises:
+            InputError: a manager's missions do not divide evenly.
         """
-        places = managers.groupby(managers, sort=False).cumcount().to_numpy()
-        sizes = managers.groupby(managers, sort=False).transform("size").to_numpy()
-        if np.any(sizes % len(self)):
-            return None
+        by_manager = managers.groupby(managers, sort=False)
+        places, sizes = by_manager.cumcount().to_numpy(), by_manager.transform("size").to_numpy()
+        for row in np.flatnonzero(sizes % len(self))[:1]:
+            own = f"{number_of(int(sizes[row]), 'mission')} of manager {managers.iloc[row]}"
+            raise InputError(f"has {own}, which {len(self)} conditions do not share evenly", remedy=_REMEDY)
         return np.asarray(1 + places // (sizes // len(self)), dtype=np.int64)
 
 
@@ -271,21 +275,19 @@ class RealRuns:
         """Choose the managers to compare: those named, separated by commas, or all.
 
         Raises:
-            InputError: one is named twice, or has no mission.
+            InputError: one has no mission.
         """
         if wanted is None:
             return self.managers
         source = ", ".join(str(file.path) for file in self.files)
-        names = [name.strip() for name in wanted.split(",") if name.strip()]
+        names = tuple(dict.fromkeys(name.strip() for name in wanted.split(",") if name.strip()))
         if not names:
             raise InputError("no managers are given", remedy=f"of {source}: {', '.join(self.managers)}")
-        for place, manager in enumerate(names):
-            if manager in names[:place]:
-                raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
+        for manager in names:
             if manager not in self.managers:
                 remedy = did_you_mean(manager, self.managers, "its managers")
                 raise InputError(f"has no mission of manager {manager!r}", file=source, remedy=remedy)
-        return tuple(names)
+        return names
 
     def check_can_be_run(self, managers: Iterable[str]) -> None:
         """Check that missions of some of its managers can be simulated.
@@ -326,18 +328,21 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
     notes = [f"{note}." for file in files for note in file.notes]
     frame = pandas.concat([file.frame for file in files], ignore_index=True)
     if conditions is not None:
-        parts = [_numbered(file, conditions) for file in files]
-        known = [part for part in parts if part is not None]
-        if 0 < len(known) < len(parts):
-            lacking = next(file.path for file, part in zip(files, parts, strict=True) if part is None)
-            problem = "does not say under which condition its missions were made"
-            raise InputError(problem, file=lacking, remedy=_REMEDY)
-        if not known:
-            known = [_in_order(files, frame, conditions)]
+        try:
+            numbers = conditions.numbers(frame)
+        except InputError as error:
+            lines = [(file.path, int(line)) for file in files for line in file.frame.index]
+            raise line_error(*lines[int(error.place or 0)], error.problem, error.remedy) from None
+        if numbers is None:
+            try:
+                numbers = conditions.in_order(frame["manager"])
+            except InputError as error:
+                names = ", ".join(str(file.path) for file in files)
+                raise InputError(error.problem, file=names, remedy=error.remedy) from None
             each = f"one after the other, as many missions of each of the {len(conditions)}"
             notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}.")
         named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
-        frame = frame.drop(columns=named).assign(**{CONDITION: np.concatenate(known)})
+        frame = frame.drop(columns=named).assign(**{CONDITION: numbers})
     return RealRuns(tuple(files), frame, tuple(notes))
 
 
@@ -362,11 +367,10 @@ def matched(
     conditions = Conditions(tuple(names), tuple(points.itertuples(index=False, name=None)))
     try:
         numbers = conditions.numbers(real)
+        if numbers is None:
+            numbers = conditions.in_order(real["manager"])
     except InputError as error:
         raise InputError(error.problem, place=place, remedy=error.remedy) from None
-    if numbers is None and (numbers := conditions.in_order(real["manager"])) is None:
-        problem = f"they do not say their conditions, which {len(conditions)} do not share evenly"
-        raise InputError(problem, place=place, remedy=f"add a column {CONDITION} with the number of each, from 1")
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
     real, simulated = real.assign(**{CONDITION: numbers}), simulated.assign(**{CONDITION: own})
     for name in real.columns.intersection(simulated.columns).intersection(["initial_x_m", "initial_y_m"]):
@@ -377,25 +381,6 @@ def matched(
             remedy = f"under the others it is {off.median():+.2f} m: simulate the same conditions, in the same order"
             raise InputError(problem, place=place, remedy=remedy)
     return real, simulated
-
-
-def _numbered(file: Runs, conditions: Conditions) -> NDArray[np.int64] | None:
-    try:
-        return conditions.numbers(file.frame)
-    except InputError as error:
-        line = int(file.frame.index[int(error.place or 0)])
-        raise line_error(file.path, line, error.problem, error.remedy) from None
-
-
-def _in_order(files: Sequence[Runs], frame: pandas.DataFrame, conditions: Conditions) -> NDArray[np.int64]:
-    numbers = conditions.in_order(frame["manager"])
-    if numbers is None:
-        counts = frame["manager"].value_counts(sort=False)
-        manager, count = next((name, count) for name, count in counts.items() if count % len(conditions))
-        own = f"{number_of(count, 'mission')} of manager {manager}"
-        problem = f"has {own}, which {len(conditions)} conditions do not share evenly"
-        raise InputError(problem, file=", ".join(str(file.path) for file in files), remedy=_REMEDY)
-    return numbers
 
 
 def read_varied(campaign: str | Path, **replacements: Unpack[Replacements]) -> tuple[LoadedScenario, Variation, str]:

@@ -9,7 +9,7 @@ import pytest
 from suave_des import run_mission
 from suave_des.campaign.campaign import run_campaign
 from suave_des.cli.main import main
-from suave_des.pages.recorded import MissionSelection, missions_in, recorded
+from suave_des.pages.recorded import recorded
 from suave_des.pages.replay import mission_on_page
 from suave_des.records.mission_folder import read_mission
 
@@ -32,13 +32,6 @@ def campaign(tmp_path_factory):
     folder = tmp_path_factory.mktemp("campaigns") / "two"
     run_campaign("seams2023", ["none", "bt"], runs=2, out=folder)
     return folder
-
-
-def test_a_mission_of_a_campaign_is_the_one_that_run_records(campaign, mission):
-    (again,) = missions_in([campaign], MissionSelection(("bt",), run=2))
-    there = recorded(read_mission(mission))
-    assert again.record.metrics["search_time_s"] == there.record.metrics["search_time_s"]
-    assert again.record.trajectory["x_m"].tolist() == pytest.approx(there.record.trajectory["x_m"].tolist(), abs=1e-6)
 
 
 def test_what_was_inspected_adds_up_to_the_metric_of_the_mission(tmp_path):

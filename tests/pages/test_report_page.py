@@ -75,11 +75,6 @@ def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
     assert page.text_content("#count") == "16 missions"
 
 
-def test_it_says_for_which_runs_it_has_ways(opened_report):
-    for caption in ("where-title", "runs-title"):
-        assert "3 runs of each manager" in opened_report.page.text_content(f"#{caption}")
-
-
 def test_a_manager_has_the_colour_that_it_has_in_figures(opened_report):
     for number, name in enumerate(("none", "bt"), start=1):
         chip = f"#managers button:nth-child({number}) i"

@@ -24,14 +24,6 @@ def write(tmp_path: Path):
     return write_file
 
 
-def test_the_published_runs_give_the_figures_of_the_papers_table():
-    frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
-    table = frame.groupby("manager")[["search_time_s", "distance_inspected_m"]].agg(["mean", "std"]).round(2)
-    assert table.loc["none"].tolist() == [187.85, 42.40, 31.40, 13.00]
-    assert table.loc["random"].tolist() == [180.15, 82.05, 3.88, 3.19]
-    assert table.loc["metacontrol"].tolist() == [106.95, 39.46, 51.15, 12.01]
-
-
 def test_places_of_detection_are_known_for_19_missions_of_none_and_17_of_metacontrol():
     frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
     assert frame.groupby("manager")["detection_x_m"].count().to_dict() == {"none": 19, "random": 0, "metacontrol": 17}
@@ -109,13 +101,6 @@ def test_a_file_that_is_missing_or_a_folder_is_named(tmp_path: Path, name):
         read_runs(tmp_path / name)
 
 
-def test_a_binary_file_is_refused_with_its_line(tmp_path: Path):
-    path = tmp_path / "runs.csv"
-    path.write_bytes(OWN.encode() + b"\n\xff\xfe\n")
-    with pytest.raises(InputError, match="line 2: is not UTF-8"):
-        read_runs(path)
-
-
 def test_a_simulated_file_must_have_each_manager(write):
     runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
     runs.check_simulated(["none"], None)
@@ -191,12 +176,6 @@ def test_the_behaviour_tree_of_the_extended_mission_is_the_manager_of_that_name_
     assert runs.frame["manager"].tolist() == ["bt_extended", "none", "bt"]
 
 
-def test_a_manager_of_our_own_files_may_be_called_average(write):
-    runs = read_runs(write("runs.csv", f"{OWN}\naverage,120,3\n"))
-    assert runs.managers == ("average",)
-    assert runs.averages == ()
-
-
 @pytest.mark.parametrize(
     ("header", "rows", "found"),
     [
@@ -227,11 +206,6 @@ def test_a_number_that_no_sweep_has_is_text_in_a_further_column_and_an_error_in_
     assert frame["depth"].tolist() in ([number], [float(number)])
     with pytest.raises(InputError, match="line 2: adaptations: expected a whole number"):
         read_runs(write("runs.csv", f"{OWN},adaptations\nnone,120,3,{number}\n"))
-
-
-def test_a_word_that_is_neither_true_nor_false_is_named(write):
-    with pytest.raises(InputError, match="pipeline_found: expected True or False, got 'maybe'"):
-        read_runs(write("runs.csv", f"{OWN},pipeline_found\nnone,20,1,maybe\n"))
 
 
 def test_a_metric_of_which_one_direction_is_better_has_the_words_to_say_so():

@@ -135,15 +135,6 @@ def test_all_forms_say_the_same(tmp_path: Path) -> None:
     draw_assisted(found).savefig(tmp_path / "figure.png", dpi=40)
 
 
-def test_a_simulation_that_does_not_help_is_said_not_to() -> None:
-    chance = np.random.default_rng(1)
-    same = missions(2, POINTS, 5).assign(search_time_s=chance.uniform(50.0, 250.0, 60))
-    found = compared(same=same)
-    first = found.estimates.iloc[0]
-    assert not first["helps"]
-    assert "the simulation does not help" in first["conclusion"]
-
-
 def test_conditions_are_found_by_number_and_by_order() -> None:
     real = real_missions(2, 25.0)
     numbered = real.assign(condition=np.repeat([1, 2, 3, 4, 5, 6] * 2, 2)).drop(columns="start.y_m")
@@ -175,7 +166,7 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit() -> None:
         ({"same": missions(2, POINTS, 5).assign(distance_inspected_m=math.inf)}, "distance_inspected_m has a value"),
         ({"same": missions(2, POINTS, 5, managers="a")}, "there is no mission of b"),
         ({"population": population().assign(mission_duration_s=400.0)}, "missions end after 400 s, others after 300 s"),
-        ({"real": real_missions(3).drop(columns="start.y_m")[:-1]}, "6 do not share evenly"),
+        ({"real": real_missions(3).drop(columns="start.y_m")[:-1]}, "6 conditions do not share evenly"),
         ({"real": real_missions(1).assign(condition=7).drop(columns="start.y_m")}, "there is no condition 7"),
     ],
 )
@@ -193,14 +184,6 @@ def test_other_starts_are_other_conditions() -> None:
     turned = in_order.iloc[::-1].sort_values("manager", kind="stable")
     with pytest.raises(InputError, match=r"initial_y_m is .* from the simulated one"):
         compared(real=turned, same=same)
-
-
-def test_a_population_of_other_conditions_is_noticed() -> None:
-    notes = compared(population=population().assign(**{"start.y_m": 2.0})).notes
-    assert any("does not vary start.y_m" in note for note in notes)
-    frame = population()
-    notes = compared(population=frame[frame["start.y_m"] < 2.5]).notes
-    assert any("in the population, and 2.9 for real missions" in note for note in notes)
 
 
 def test_runs_that_share_a_draw_are_one_draw() -> None:

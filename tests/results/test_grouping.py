@@ -146,19 +146,3 @@ def test_managers_that_lack_different_points_are_not_compared_over_these() -> No
     lacked = frame["manager"].map({"a": 0.0, "b": 1.0})
     with pytest.raises(InputError, match="no manager has a run with missions at all points"):
         reactions(frame[frame["start.y_m"] != lacked])  # each has two points of three
-
-
-def test_values_that_are_compared_may_have_different_numbers_of_points() -> None:
-    frame = two_points().assign(depth=0)
-    more = frame[frame["start.y_m"] == 0.0].assign(depth=1)
-    comparison = compare_frame(pandas.concat([frame, more]), managers=["a"], metrics=["search_time_s"], by=["depth"])
-    assert [each.n for each in comparison.summaries] == [40, 40]
-
-
-def test_real_missions_without_run_numbers_are_not_averaged_like_the_sweep_beside_them(tmp_path: Path) -> None:
-    sweep = {"grid": {"start.y_m": [2.0, 2.5]}}
-    run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "swept", sweep=sweep)
-    real = pandas.read_csv(PUBLISHED / "seams2023_runs.csv").query("manager == 'none'").drop(columns="run")
-    real.to_csv(tmp_path / "real.csv", index=False)
-    comparison = compare_folders([tmp_path / "swept", tmp_path / "real.csv"], metrics=["search_time_s"])
-    assert [each.n for each in comparison.summaries] == [2, 20]

@@ -9,7 +9,6 @@ from suave_des.results import style
 from suave_des.results.campaign_figures import (
     draw_differences,
     draw_distributions,
-    draw_rainclouds,
 )
 from suave_des.results.missions import grouped, missions_of
 
@@ -26,10 +25,8 @@ def test_figures_of_many_missions_are_written_from_few_points() -> None:
         {"manager": "none", "run": np.arange(1, n + 1), "seed": 1, "search_time_s": _times_s(n)}
     ).assign(distance_inspected_m=20.0, pipeline_found=True, scenario="seams2023")
     groups, _ = grouped(missions_of(pandas.concat([frame, frame.assign(manager="bt")])))
-    for figure in (draw_differences(groups), draw_rainclouds(groups, {})):
-        for axes in figure.axes:
-            assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
-            assert all(len(path.vertices) <= 5_000 for each in axes.collections for path in each.get_paths())
+    for axes in draw_differences(groups).axes:
+        assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
 
 
 def test_a_legend_of_long_names_stays_within_the_figure() -> None:

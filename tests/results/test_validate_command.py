@@ -189,14 +189,6 @@ def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(vali
     assert (tmp_path / "again" / same).read_bytes() == (tmp_path / "out" / same).read_bytes()
 
 
-def test_runs_of_the_users_own_are_called_real_and_the_papers_published(validate, tmp_path):
-    (tmp_path / "real.csv").write_text(DATA.read_text(encoding="utf-8"), encoding="utf-8")
-    own = validate("--data", "real.csv", "--runs-file", "real.csv").out
-    assert "real runs, then simulated" in own
-    assert "published" not in own
-    assert "published, then simulated" in validate("--runs-file", str(DATA)).out
-
-
 def test_several_files_are_compared_as_one_data_set(validate, tmp_path):
     header, *lines = DATA.read_text(encoding="utf-8").splitlines()
     names = []

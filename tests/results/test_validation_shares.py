@@ -23,25 +23,20 @@ def frame(missions):
     )
 
 
-def test_runs_are_counted_with_both_ends_of_the_interval(frame):
-    share = Share(manager="metacontrol", name="late", where={"search_time_s": [(120, 130)]})
-    assert count(share, frame) == (4, 5)
+LATE, THERE = {"search_time_s": [(120, 130)]}, {"detection_x_m": [(-19.5, -18.5)]}
 
 
-def test_a_place_that_is_not_known_is_in_no_region_but_is_a_run(frame):
-    where = {"search_time_s": [(120, 130)], "detection_x_m": [(-19.5, -18.5)]}
-    assert count(Share(manager="metacontrol", name="there", where=where), frame) == (2, 5)
-
-
-def test_of_detections_only_those_with_a_known_place_count(frame):
-    share = Share(
-        manager="metacontrol",
-        name="there",
-        of="detections",
-        among={"search_time_s": [(120, 130)]},
-        where={"detection_x_m": [(-19.5, -18.5)]},
-    )
-    assert count(share, frame) == (2, 3)
+@pytest.mark.parametrize(
+    ("share", "counted"),
+    [
+        ({"where": LATE}, (4, 5)),  # both ends count
+        ({"where": LATE | THERE}, (2, 5)),  # an unknown place is in no region, but a run
+        ({"of": "detections", "among": LATE, "where": THERE}, (2, 3)),
+        ({"where": {"detection_x_m": [(-19.5, -18.9), (-16.1, -15.9)]}}, (2, 5)),  # one of several intervals
+    ],
+)
+def test_missions_are_counted_in_regions(share, counted, frame):
+    assert count(Share(manager="metacontrol", name="some", **share), frame) == counted
 
 
 def test_places_that_come_from_sums_of_steps_are_at_the_interval_end(missions):

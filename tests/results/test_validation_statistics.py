@@ -8,7 +8,6 @@ from suave_des.estimates import share_of
 from suave_des.results.statistics import (
     agreement,
     anderson_darling,
-    kolmogorov_smirnov,
     mann_whitney,
     ratio_interval,
     sign_of,
@@ -31,27 +30,12 @@ class TestBootstrap:
         quantiles = stats.f(299, 399).ppf([0.975, 0.025]) ** 0.5
         assert (low, high) == pytest.approx(tuple(ratio / quantiles), rel=0.03)
 
-    def test_it_repeats_with_its_seed_and_changes_with_it(self):
-        published, simulated = normal(0, 1, 20, 1), normal(0, 1, 50, 2)
-        assert ratio_interval(published, simulated, rng(7)) == ratio_interval(published, simulated, rng(7))
-        assert ratio_interval(published, simulated, rng(7)) != ratio_interval(published, simulated, rng(8))
-
     def test_values_all_equal_have_no_ratio(self):
         found = ratio_interval(np.full(5, 0.1), np.full(7, 0.3), rng())
         assert np.isnan(found.value) and found.interval is None
 
 
 class TestDistributions:
-    def test_kolmogorov_smirnov_of_a_worked_example(self):
-        # 1 2 | 3 4: at 2 all of the one are below and none of the other; of the 6 ways to deal, 2 are as far apart.
-        found = kolmogorov_smirnov(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
-        assert found == (1.0, pytest.approx(2 / 6))
-
-    def test_the_anderson_darling_p_of_a_worked_example(self):
-        # Of the 6 ways to deal 1 2 3 4 out in twos, {1 2} and {3 4} are the most unlike.
-        _, p = anderson_darling(np.array([1.0, 2.0]), np.array([3.0, 4.0]), rng())
-        assert p == pytest.approx(1 / 3, abs=0.01)
-
     @pytest.mark.parametrize("ties", [False, True])
     def test_the_anderson_darling_statistic_is_the_normalised_one_of_midranks(self, ties):
         first, second = normal(0, 3, 7, 1), normal(1, 4, 5, 2)
@@ -80,9 +64,6 @@ class TestDistributions:
         ]
         assert stats.kstest(p, "uniform").pvalue > 0.001
 
-    def test_all_values_equal_are_no_evidence(self):
-        assert anderson_darling(np.ones(3), np.ones(9), rng()) == (0.0, 1.0)
-
 
 class TestManagers:
     def test_the_conclusion_has_scipys_p_and_says_which_is_greater(self):
@@ -103,9 +84,6 @@ class TestManagers:
         shares = [agreement(sign, samples, (20, 20), rng()) for sign in (1, 0, -1)]
         assert sum(shares) == pytest.approx(1.0)
         assert shares[1] == pytest.approx(0.9, abs=0.03)
-
-    def test_too_few_missions_give_no_share(self):
-        assert np.isnan(agreement(0, (np.ones(19), np.ones(20)), (20, 20), rng()))
 
 
 @pytest.mark.parametrize(("count", "n"), [(0, 20), (9, 20), (20, 20), (1, 7)])
