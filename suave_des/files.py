@@ -39,7 +39,6 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
         "ensemble.csv",
         "validation_conditions.csv",
         "suave_results.csv",
-        "runs.parquet",
         *DERIVED,
         "knowledge_states.jsonl",
     ),

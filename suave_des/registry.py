@@ -273,7 +273,7 @@ def _check_hooks(what: str, kind: type, root: type) -> None:
         for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
             near = similar(each, forms, cutoff=0.8)
             inherits = any(hasattr(parent, each) for parent in base.__bases__)
-            if near is not None and near not in vars(base) and not inherits and not _is_named_elsewhere(each, base):
+            if near is not None and near not in vars(base) and not inherits and each not in _names_in(base):
                 remedy = f"did you mean {forms[near]}? give a method of your own a name that differs more"
                 raise wrong(f"{each} is not a hook, and nothing calls it", remedy)
 
@@ -286,18 +286,9 @@ def _form(root: type, hook: str) -> str:
     return f"{'@classmethod ' if is_of_class else ''}def {hook}({arguments})"
 
 
-@cache
-def _is_named_elsewhere(method: str, kind: type) -> bool:
-    """Return whether a method's name occurs in its module besides its definition; True if there is no source.
-
-    Imports do not count: a manager that imports from suave_des.monitor.diagnostics does not call its `diagnostics`.
-    """
-    try:
-        source = inspect.getsource(sys.modules[kind.__module__])
-    except (OSError, TypeError, KeyError):
-        return True
-    source = re.sub(r"^\s*(from|import) .*$", "", source, flags=re.MULTILINE)
-    return re.search(rf"(?<!def )\b{re.escape(method)}\b", source) is not None
+def _names_in(kind: type) -> set[str]:
+    """Return the attributes and functions that the methods of a class name."""
+    return {name for each in vars(kind).values() if inspect.isfunction(each) for name in each.__code__.co_names}
 
 
 # What a manager says of itself, once it was made.
@@ -348,7 +339,7 @@ def remarks(manager: ManagingSubsystem) -> Iterator[str]:
     """Yield probable mistakes of a manager's author that are no errors, as a mission has shown them."""
     author = next(base for base in type(manager).__mro__ if "adapt" in vars(base))
     is_shipped = author.__module__.startswith("suave_des.")
-    if not is_shipped and manager.period_s is None and not _is_named_elsewhere("adapt", author):
+    if not is_shipped and manager.period_s is None and "adapt" not in _names_in(author):
         yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
     known = _measured_somewhere(manager.system)
     for name in sorted(manager.system.unmeasured.difference(known), key=str):

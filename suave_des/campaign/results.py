@@ -20,7 +20,6 @@ from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRIC
 from suave_des.records.store import (
     ENSEMBLE_FILE,
     MANIFEST_FILE,
-    PARQUET_FILE,
     RUNS_FILE,
     SUMMARY_FILE,
     Content,
@@ -170,8 +169,6 @@ class CampaignResult:
             columns = (*ENSEMBLE_COLUMNS, *sweep.parameters)
             rows = ([each[name] for name in columns] for each in self.differences())
             files[ENSEMBLE_FILE] = csv_text(columns, rows)
-        if spec.parquet:
-            files[PARQUET_FILE] = self.frame().to_parquet(engine="pyarrow", index=False)
         if spec.record_knowledge:
             files[CAMPAIGN_KNOWLEDGE_FILE] = self._knowledge_lines()
         write_campaign(self.folder, files, dict(self._suave_files()) if spec.suave_format else {})

@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -103,8 +102,6 @@ class CampaignSpec(CampaignKeys):
     """What replaces the scenario's own files and values, as of load_scenario."""
     suave_format: bool = False
     """Write the exemplar's own results files, too."""
-    parquet: bool = False
-    """Write runs.parquet, too; it needs pyarrow."""
     record_knowledge: bool = False
     """Record the knowledge states that managers analysed, in knowledge_states.jsonl, for `kb try`."""
     out: Annotated[Path | None, Option("DIR")] = None
@@ -170,14 +167,12 @@ class CampaignSpec(CampaignKeys):
         """Check what depends on this machine; imports the managers.
 
         Raises:
-            InputError: an unknown or repeated manager, or a library that is not installed.
+            InputError: an unknown or repeated manager, or workers besides a scheduler.
         """
         for index, manager in enumerate(self.managers):
             manager_class(manager)
             if manager in self.managers[:index]:
                 raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
-        if self.parquet and find_spec("pyarrow") is None:
-            raise InputError("Parquet needs pyarrow, which is not installed", remedy="pip install 'suave-des[parquet]'")
         if self.scheduler is not None and self.workers not in (None, 1):
             remedy = "omit it; `dask worker --nworkers N` sets how many missions run there at a time"
             raise InputError(f"workers: {self.workers} cannot be used with a scheduler", remedy=remedy)

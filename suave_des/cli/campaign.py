@@ -49,7 +49,6 @@ class ResultFormat(StrEnum):
     """Result files to write besides our own."""
 
     SUAVE = "suave"
-    PARQUET = "parquet"
 
 
 def campaign(
@@ -74,10 +73,7 @@ def campaign(
     ] = None,
     yes: Trusted = False,
     form: Annotated[
-        list[ResultFormat] | None,
-        typer.Option(
-            "--format", help="Also write the exemplar's own files into DIR/suave, or runs.parquet; repeat it for both."
-        ),
+        ResultFormat | None, typer.Option("--format", help="Also write the exemplar's own files into DIR/suave.")
     ] = None,
     manager_option: ManagerOptions = None,
     quiet: Quiet = False,
@@ -110,8 +106,7 @@ def campaign(
         else:
             assert scenario is not None
             managers = options.get("managers") or (managers_of(scenario) if manager_option else ())
-            written = {"suave_format": ResultFormat.SUAVE, "parquet": ResultFormat.PARQUET}
-            settings |= {name: True for name, each in written.items() if each in (form or ())}
+            settings["suave_format"] = form is ResultFormat.SUAVE
             replaced = files.with_options(manager_option, managers)
             result = run_campaign(scenario, on_progress=show, command=command_line(), **settings, **replaced)
     console = output()

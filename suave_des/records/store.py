@@ -24,8 +24,8 @@ from suave_des.records.metrics import COLUMNS, Row
 
 STORE_FILE = "campaign.sqlite"
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
-ENSEMBLE_FILE, PARQUET_FILE = "ensemble.csv", "runs.parquet"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+ENSEMBLE_FILE = "ensemble.csv"
+FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, CAMPAIGN_KNOWLEDGE_FILE)
 SUAVE_FOLDER = "suave"
 """Folder of the exemplar's own files, for its scripts."""
 _ENDINGS = ("", "-wal", "-shm", "-journal")

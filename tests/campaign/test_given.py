@@ -8,7 +8,6 @@ import pandas
 import pytest
 
 from suave_des import load_scenario, run_campaign, run_mission, with_values
-from suave_des.campaign.campaign import run_campaign as campaign_result
 from suave_des.campaign.variation import plain
 from suave_des.errors import InputError
 from suave_des.managing.metacontrol import Metacontrol
@@ -105,12 +104,6 @@ def test_a_manager_of_a_notebook_runs_on_several_workers():
         [sys.executable, "-"], input=IN_NOTEBOOK, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.stdout == "True 3 __main__:Mine\n", done.stderr
-
-
-def test_parquet_has_the_rows_and_types_of_the_frame(tmp_path):
-    pytest.importorskip("pyarrow")
-    result = campaign_result("seams2023", ["none"], runs=2, out=tmp_path / "out", parquet=True)
-    pandas.testing.assert_frame_equal(pandas.read_parquet(tmp_path / "out" / "runs.parquet"), result.frame())
 
 
 def test_results_print_as_tables():
