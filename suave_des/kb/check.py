@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
-from decimal import Decimal
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from rdflib import RDF, Graph, Namespace, URIRef
-from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
 from suave_des.caches import private_cache, read_checked, remove_oldest, with_checksum
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.files import decode, read_bytes
 from suave_des.findings import Finding, Level, has_level, ordered
 from suave_des.kb.space import (
     Scale,
@@ -28,12 +24,12 @@ from suave_des.kb.space import (
     interchangeable_components,
     numbers_in,
 )
-from suave_des.knowledge.checks import Subject, static_findings
+from suave_des.knowledge.checks import Subject, findings_in, static_findings
 from suave_des.knowledge.checks.model import check_revision, rules_of_2023
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, place_of
 from suave_des.knowledge.pellet import ReasonerTimeoutError, TimeLimit
-from suave_des.knowledge.rdf import HAS_VALUE, local_name, without_log
+from suave_des.knowledge.rdf import HAS_VALUE, local_name
 from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState, measurement_name
 from suave_des.monitor.diagnostics import RECOVERED
@@ -44,10 +40,8 @@ __all__ = ["MAX_STATES", "Subject", "check", "combined", "simple_states"]
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
-_REASON: Final = re.compile(r"Bad syntax \((.*?)\) at \^ in:", re.DOTALL)
+_PARTS: Final = ("groundings", "components", "measurements")
 _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.INFO}
-_TURTLE: Final = "give SHACL shapes in Turtle"
-_SHAPES_LIMIT_BYTES: Final = 8 * 2**20
 
 
 def check(subject: Subject) -> tuple[Finding, ...]:
@@ -61,14 +55,6 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     Raises:
         InputError: a file cannot be read at all.
     """
-    sources = collect(subject.given)
-    findings = [*static_findings(subject, sources), *check_shapes(sources, subject.shapes)]
-    return ordered([*findings, *_ask_pellet(subject, findings)])
-
-
-def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding]:
-    """Use the knowledge base: this brings up contradictions, and rules that Pellet drops."""
-    is_wrong = has_level(before, Level.ERROR)
     try:
         base = Ontology.load(
             subject.ontologies,
@@ -78,9 +64,24 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
             operators=subject.operators,
         )
     except KnowledgeError as error:
+        sources = collect(subject.given)
+        findings = [*static_findings(subject, sources), *check_shapes(sources)]
         message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
-        yield Finding(Level.INFO, message) if is_wrong else Finding.of(error)
-        return
+        is_known = has_level(findings, Level.ERROR)
+        return ordered([*findings, Finding(Level.INFO, message) if is_known else Finding.of(error)])
+    findings = [*findings_in(base, subject), *_without_rules(base, subject), *check_shapes(base.sources)]
+    return ordered([*findings, *_ask_pellet(subject, base, findings)])
+
+
+def _without_rules(base: Ontology, subject: Subject) -> Iterator[Finding]:
+    files = {rule.file for rule in (*base.rules, *(old for old, _ in base.content.replaced))}
+    for path in subject.rules:
+        if path not in files:
+            yield Finding(Level.INFO, "there is no rule in this file", file=str(path))
+
+
+def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> Iterator[Finding]:
+    """Use the knowledge base: this brings up contradictions, and rules that Pellet drops."""
     try:
         check_revision(base, subject.measured or (), subject.revision)
     except KnowledgeError:  # it is among the findings, and contradictions follow from it
@@ -121,30 +122,29 @@ def combined(states: Sequence[KnowledgeState], *, apart: bool = False) -> tuple[
         apart: whether recovered components are left in states of their own, because the rules of 2023 contradict any
             other problem then.
     """
-    joined: list[tuple[dict[str, str], dict[str, str], dict[str, Decimal]]] = []
+    joined: list[dict[tuple[str, str], Any]] = []
     for state in states:
-        groundings, components, measurements = dict(state.groundings), dict(state.components), dict(state.measurements)
-        for designs, reports, values in joined:
-            if (
-                not (apart and RECOVERED in {*components.values(), *reports.values()})
-                and _agree(designs, groundings)
-                and _agree(reports, components)
-                and _agree(values, measurements)
-            ):
-                designs.update(groundings)
-                reports.update(components)
-                values.update(measurements)
-                break
+        parts: dict[tuple[str, str], Any] = {
+            (kind, name): value for kind in _PARTS for name, value in getattr(state, kind)
+        }
+        is_apart = apart and RECOVERED in dict(state.components).values()
+        fitting = (
+            other
+            for other in joined
+            if not (apart and (is_apart or RECOVERED in other.values()))
+            and all(other.get(key, value) == value for key, value in parts.items())
+        )
+        if (found := next(fitting, None)) is None:
+            joined.append(parts)
         else:
-            joined.append((groundings, components, measurements))
+            found.update(parts)
     return tuple(
-        KnowledgeState.of(map(ObjectiveState, designs), groundings=designs, components=reports, measurements=values)
-        for designs, reports, values in joined
+        KnowledgeState.of(
+            map(ObjectiveState, (name for kind, name in parts if kind == "groundings")),
+            **{kind: {name: value for (each, name), value in parts.items() if each == kind} for kind in _PARTS},
+        )
+        for parts in joined
     )
-
-
-def _agree(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
-    return all(one.get(name, value) == value for name, value in other.items())
 
 
 def simple_states(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:
@@ -173,48 +173,31 @@ def simple_states(base: Ontology, measured: Collection[str] | None = None) -> It
                 )
 
 
-def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path] = ()) -> list[Finding]:
-    """Check the model against SHACL shapes, the shipped ones and more; the same files are checked once, then cached.
-
-    Args:
-        sources: the ontologies.
-        more: files of shapes.
-
-    Raises:
-        InputError: a file of shapes cannot be read.
-    """
-    files = (shipped_folder("ontology") / "tomasys-shapes.ttl", *more)
-    texts = [decode(path, read_bytes(path, _SHAPES_LIMIT_BYTES)) for path in files]
-    total = hashlib.sha256(f"{version('pyshacl')}{Path(__file__).read_bytes()!r}{texts}".encode())
+def check_shapes(sources: Sequence[OntologyFile]) -> list[Finding]:
+    """Check the model of ontologies against SHACL shapes; the same files are checked once, then cached."""
+    shapes = (shipped_folder("ontology") / "tomasys-shapes.ttl").read_bytes()
+    total = hashlib.sha256(f"{version('pyshacl')}{Path(__file__).read_bytes()!r}{shapes!r}".encode())
     for source in sources:
         total.update(str(source.path).encode() + hashlib.sha256(source.content).digest())
     folder = private_cache("findings")
     path = None if folder is None else folder / total.hexdigest()
     if path is not None and (content := read_checked(path)) is not None:
         return [Finding(**each | {"level": Level(each["level"])}) for each in json.loads(content)]
-    shapes = Graph()
-    for file, text in zip(files, texts, strict=True):
-        shapes += _read_shapes(file, text)
-    found = list(_validate(sources, shapes, more))
+    found = list(_validate(sources, Graph().parse(data=shapes, format="turtle")))
     if path is not None:
         path.write_bytes(with_checksum(json.dumps([asdict(each) for each in found]).encode()))
         remove_oldest(path.parent, "*")
     return found
 
 
-def _validate(sources: Sequence[OntologyFile], shapes: Graph, files: Sequence[Path]) -> Iterator[Finding]:
+def _validate(sources: Sequence[OntologyFile], shapes: Graph) -> Iterator[Finding]:
     from pyshacl import validate
 
     data = Graph()
     for source in sources:
         data += source.graph
-    try:
-        _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
-        if not isinstance(report, Graph):
-            raise ValueError(getattr(report, "message", report))
-    except Exception as error:  # each kind of malformed shape raises another error
-        reason = " ".join(str(error).split())
-        raise InputError(f"the shapes cannot be used: {reason}", file=", ".join(map(str, files)) or None) from error
+    _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
+    assert isinstance(report, Graph)
     for result in report.subjects(_SH.resultSeverity, None):
         # A query (SPARQL) is about the value that it gives, other constraints are about their focus.
         is_query = report.value(result, _SH.sourceConstraintComponent) == _SH.SPARQLConstraintComponent
@@ -227,21 +210,6 @@ def _is_placeholder(node: Node | None, data: Graph) -> bool:
     """Whether an individual has nothing but a class, and nothing refers to it, so that it has no effect."""
     is_mentioned = any(predicate != RDF.type for predicate in data.predicates(node, None))
     return isinstance(node, URIRef) and not is_mentioned and (None, None, node) not in data
-
-
-def _read_shapes(path: Path, text: str) -> Graph:
-    if text.lstrip().startswith(("<?xml", "<rdf:RDF")):
-        raise InputError("this is XML, not Turtle", file=path, remedy=_TURTLE)
-    place = None
-    try:
-        with without_log():
-            return Graph().parse(data=text, format="turtle")
-    except BadSyntax as error:
-        found = _REASON.search(str(error))
-        reason, place = found.group(1) if found else "bad syntax", f"line {error.lines + 1}"
-    except Exception as error:  # the parser meets the end of a truncated file in many ways
-        reason = "it ends too early" if isinstance(error, IndexError) else " ".join(str(error).split())[:200]
-    raise InputError(f"is not Turtle: {reason}", file=path, place=place, remedy=_TURTLE)
 
 
 def _finding(report: Graph, result: Node, thing: Node | None, sources: Sequence[OntologyFile]) -> Finding:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.kb.matching import with_bindings
 from suave_des.kb.states import FactReader
-from suave_des.kb.tracing import Clash, Derivation, Tracer
+from suave_des.kb.tracing import Derivation, Tracer
 from suave_des.kb.why_not import RuleQuestions, WhyNot
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.planning import performance
-from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, fact_of, facts_of, local_name, value_of
+from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, facts_of, local_name, value_of
 from suave_des.knowledge.state import (
     NO_GROUNDING,
     ContradictionError,
@@ -42,16 +43,18 @@ class Candidate:
     """The planner's verdict on a function design.
 
     Attributes:
-        design: its name.
         verdict: "chosen", "left out" or "not the best".
-        reason: why.
-        because: derivations of the facts for which it is ruled out.
+        because: derivations of the facts for which it is left out.
     """
 
     design: str
     verdict: str
     reason: str
     because: tuple[Derivation, ...] = ()
+
+    def __str__(self) -> str:
+        """Design, verdict and reason."""
+        return f"{self.design}: {self.verdict}: {self.reason}"
 
 
 def verdicts(base: Ontology, reasoning: Reasoning, decision: Decision) -> Iterator[Candidate]:
@@ -75,7 +78,6 @@ class DecisionExplanation:
     """Why a function gets a design.
 
     Attributes:
-        function: which function.
         answer: in one sentence.
         because: derivations of the facts that require adaptation.
         candidates: all designs of the function, by name; none when there is nothing to decide.
@@ -93,7 +95,7 @@ class DecisionExplanation:
             yield "  adapted because"
             yield from derivation.lines("    ")
         for candidate in self.candidates:
-            yield f"  {candidate.design}: {candidate.verdict}: {candidate.reason}"
+            yield f"  {candidate}"
             for derivation in candidate.because:
                 yield from derivation.lines("    ")
 
@@ -103,20 +105,18 @@ class Explanation:
     """The answer to a question about a state.
 
     Attributes:
-        state: the state.
         facts: how facts follow.
         decisions: why functions get their designs.
         contradiction: for a state that contradicts itself, what Pellet says about it.
         rules: the rules that take part in the contradiction.
-        clashes: the properties that would have two values.
+        clashes: how each of the values follows that a functional property would have.
     """
 
-    state: KnowledgeState
     facts: tuple[Derivation, ...] = ()
     decisions: tuple[DecisionExplanation, ...] = ()
     contradiction: str | None = None
     rules: tuple[str, ...] = ()
-    clashes: tuple[Clash, ...] = ()
+    clashes: tuple[tuple[Derivation, ...], ...] = ()
 
     def __str__(self) -> str:
         """As `kb explain` prints it."""
@@ -127,9 +127,9 @@ class Explanation:
         if self.contradiction is not None:
             yield f"contradiction: {self.contradiction}"
             yield f"rules in it: {', '.join(self.rules) or 'none'}"
-            for clash in self.clashes:
-                yield f"{clash.property} of {clash.subject} would have {len(clash.sides)} values:"
-                for side in clash.sides:
+            for sides in self.clashes:
+                yield f"{sides[0].fact.property} of {sides[0].fact.subject} would have {len(sides)} values:"
+                for side in sides:
                     yield from side.lines("  ")
             return
         for derivation in self.facts:
@@ -165,13 +165,14 @@ def explain(
         problem, clashes, rules = tracer.clashes()
         if not rules and not clashes:
             raise reasoning  # the message has all there is to say
-        return Explanation(state, contradiction=problem, clashes=clashes, rules=rules)
+        return Explanation(contradiction=problem, clashes=clashes, rules=rules)
     explainer = _Explainer(base, reasoning, tracer)
     if why:
-        return Explanation(state, decisions=(explainer.design(why.group(2), wanted=why.group(1) is None),))
+        return Explanation(decisions=(explainer.design(why.group(2), wanted=why.group(1) is None),))
     if question:
-        return Explanation(state, facts=(explainer.fact(question),))
-    return Explanation(state, explainer.inferred(), tuple(map(explainer.decision, reasoning.plan.decisions)))
+        return Explanation((explainer.fact(question),))
+    inferred = sorted(reasoning.inference.facts, key=str)
+    return Explanation(tuple(map(explainer.derive, inferred)), tuple(map(explainer.decision, reasoning.plan.decisions)))
 
 
 class _Explainer:
@@ -184,10 +185,6 @@ class _Explainer:
             for fact in facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
 
-    def inferred(self) -> tuple[Derivation, ...]:
-        """How all that is inferred follows."""
-        return tuple(self.derive(fact) for fact in sorted(self.reasoning.inference.facts, key=str))
-
     def derive(self, fact: Fact) -> Derivation:
         return self.tracer.derive(self.triples[fact])
 
@@ -197,12 +194,11 @@ class _Explainer:
         triple = reader.triple(text)
         if (*triple[:2], canonical(triple[2])) in self.tracer.known:
             return self.tracer.derive(triple)
-        reader.fact(text)  # a value that the property cannot have is refused
-        fact = fact_of(triple, self.base.names)
+        fact = reader.fact(text)  # a value that the property cannot have is refused
         values = [value for s, p, value in self.tracer.known if (s, p) == triple[:2]]
         texts = sorted(value_text(value_of(value, self.base.names)) for value in values)
         name = "type" if triple[1] == RDF_TYPE else local_name(triple[1])
-        near = RuleQuestions(self.base).missing(fact, triple[0], self.tracer.state)
+        near = RuleQuestions(self.base).missing(triple, self.tracer.state)
         remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}", *map(_near_rule, near[:NEAREST])]
         raise InputError(f"{fact} does not follow in this state", remedy="; ".join(remedies))
 
@@ -225,13 +221,13 @@ class _Explainer:
 
     def decision(self, decision: Decision, asked: str | None = None, *, wanted: bool = True) -> DecisionExplanation:
         """Why a decision is made; the answer begins with the design that was asked about."""
-        function = decision.function
-        candidates = tuple(
-            replace(each, because=tuple(self._objections(function, each.design))) if each.verdict == LEFT_OUT else each
-            for each in verdicts(self.base, self.reasoning, decision)
-        )
+        function, objective = decision.function, objective_name(decision.function)
+        candidates = []
         answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
-        for each in candidates:
+        for each in verdicts(self.base, self.reasoning, decision):
+            why = (Fact(each.design, "fd_realisability", False), Fact(each.design, "fd_error_log", objective))
+            because = (self.derive(fact) for fact in why if each.verdict == LEFT_OUT and fact in self.triples)
+            candidates.append(replace(each, because=tuple(because)))
             if each.design == asked and each.verdict != CHOSEN:
                 answer = f"{asked} is {each.verdict}: {each.reason}"
                 if decision.design is None:
@@ -240,26 +236,15 @@ class _Explainer:
                     answer = f"no design is left, {stays}; {answer}"
             elif each.design == asked and not wanted:
                 answer = f"{asked} is chosen: {decision.reason}"
-        return DecisionExplanation(function, answer, tuple(self._trigger(function)), candidates)
-
-    def _trigger(self, function: str) -> Iterator[Derivation]:
-        """How the facts follow for which an objective is adapted."""
-        objective = objective_name(function)
-        for fact in sorted(self.reasoning.inference.facts, key=str):
-            if fact.subject == objective and fact.property in ("o_status", "o_updatable"):
-                yield self.derive(fact)
-
-    def _objections(self, function: str, design: str) -> Iterator[Derivation]:
-        """How the inferred facts follow for which a design was ruled out."""
-        log = Fact(design, "fd_error_log", objective_name(function))
-        for fact in (Fact(design, "fd_realisability", False), log):
-            if fact in self.triples:
-                yield self.derive(fact)
+        status = (
+            fact
+            for fact in sorted(self.reasoning.inference.facts, key=str)
+            if fact.subject == objective and fact.property in ("o_status", "o_updatable")
+        )
+        return DecisionExplanation(function, answer, tuple(map(self.derive, status)), tuple(candidates))
 
 
 def _near_rule(answer: WhyNot) -> str:
     """The first atom that fails of a rule that could conclude what is missing, in the nearest match."""
-    if not answer.atom:
-        return f"rule {answer.rule}: {answer.answer}"
-    bound = ", ".join(f"?{name} = {value}" for name, value in answer.bindings)
-    return f"rule {answer.rule}: {answer.atom} does not hold{f' with {bound}' if bound else ''}"
+    holds = f"{answer.atom} does not hold{with_bindings(answer.bindings)}" if answer.atom else answer.answer
+    return f"rule {answer.rule}: {holds}"

@@ -7,9 +7,10 @@ them, is left to Pellet; the nearest match asks for it with a rule that has this
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 from rdflib import BNode
@@ -24,6 +25,8 @@ from suave_des.knowledge.state import Value
 
 #: What the variables of a rule stand for: IRIs and literals by name.
 Binding = Mapping[str, str | Lit]
+#: The same as people write it.
+Bound = tuple[tuple[str, Value], ...]
 #: Kinds of atoms that are about facts; the others compare or compute.
 FACT_KINDS: Final = ("class", "object", "data")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
@@ -38,11 +41,11 @@ def bound(term: Term, binding: Binding) -> str | Lit | None:
 
 
 def instance(atom: Atom, binding: Binding) -> Atom:
-    """An atom with the values of those variables that have one."""
+    """An atom with the values of those variables that have one, and with literals in canonical form."""
 
     def value(term: Term) -> Term:
         found = bound(term, binding)
-        return term if found is None else found if isinstance(found, Lit) else Named(found)
+        return term if found is None else canonical(found) if isinstance(found, Lit) else Named(found)
 
     return replace(atom, arguments=tuple(map(value, atom.arguments)), places=())
 
@@ -62,9 +65,15 @@ def unified(terms: Sequence[Term], values: Iterable[str | Lit | None], binding: 
     return found
 
 
-def shown_bindings(binding: Binding, names: Names) -> tuple[tuple[str, Value], ...]:
-    """Return variable bindings as people write them, by the names of the variables in their order."""
+def shown_bindings(binding: Binding, names: Names) -> Bound:
+    """Return the values of variables as people write them, by the names of the variables in their order."""
     return tuple((name, value_of(binding[name], names)) for name in sorted(binding))
+
+
+def with_bindings(bindings: Bound) -> str:
+    """Write the values of variables after something that holds with them."""
+    words = ", ".join(f"?{name} = {value}" for name, value in bindings)
+    return f" with {words}" if words else ""
 
 
 def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
@@ -87,147 +96,133 @@ def stated(atom: Atom, binding: Binding) -> Triple | None:
 
 
 class Facts:
-    """What follows in a state, to be looked up by property and subject."""
+    """What follows in a state, to be looked up by property or class, and subject."""
 
     def __init__(self, known: Iterable[Triple]) -> None:
-        self.all = tuple((subject, predicate, canonical(value)) for subject, predicate, value in known)
-        self._by_predicate: dict[str, list[Triple]] = {}
-        self._by_subject: dict[tuple[str, str], list[Triple]] = {}
-        for triple in self.all:
-            self._by_predicate.setdefault(_key(triple), []).append(triple)
-            self._by_subject.setdefault((_key(triple), triple[0]), []).append(triple)
+        self._index: dict[tuple[str, str | None], list[Triple]] = {}
+        for subject, predicate, value in known:
+            name = str(value) if predicate == RDF_TYPE else predicate
+            for key in ((name, subject), (name, None)):
+                self._index.setdefault(key, []).append((subject, predicate, canonical(value)))
+
+    def of(self, name: str, subject: str | Lit | None = None) -> Sequence[Triple]:
+        """The triples of a property or class, about one subject; None: about any."""
+        return self._index.get((name, subject if isinstance(subject, str) else None), ())
 
     def __contains__(self, triple: Triple) -> bool:
         """Whether a triple, in canonical form, follows."""
-        return triple in self._by_subject.get((_key(triple), triple[0]), ())
+        return triple in self.of(str(triple[2]) if triple[1] == RDF_TYPE else triple[1], triple[0])
 
     def matches(self, atom: Atom, binding: Binding) -> Iterator[Binding]:
         """Extend a binding in each way in which an atom says a fact."""
-        subject = bound(atom.arguments[0], binding)
-        if isinstance(subject, str):
-            candidates = self._by_subject.get((atom.predicate, subject), ())
-        else:
-            candidates = self._by_predicate.get(atom.predicate, ())
-        found = (matched(atom, triple, binding) for triple in candidates)
-        return (each for each in found if each is not None)
+        for triple in self.of(atom.predicate, bound(atom.arguments[0], binding)):
+            if (found := matched(atom, triple, binding)) is not None:
+                yield found
 
-    def values(self, subject: str | None, predicate: str) -> list[str | Lit]:
+    def values(self, subject: str | Lit | None, predicate: str) -> list[str | Lit]:
         """Values of a property of an individual; None: of all of them."""
-        every = self._by_predicate.get(predicate, ())
-        found = every if subject is None else self._by_subject.get((predicate, subject), ())
-        return list(dict.fromkeys(triple[2] for triple in found))
+        return list(dict.fromkeys(value for _, _, value in self.of(predicate, subject)))
 
 
-def _key(triple: Triple) -> str:
-    """The property of a triple, or the class of which it says membership."""
-    return str(triple[2]) if triple[1] == RDF_TYPE else triple[1]
+def matches(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> list[Binding]:
+    """All bindings with which the whole body of a rule holds, in a fixed order.
 
-
-@dataclass
-class NearestFinder:
-    """Finds the nearest match of one rule in one state.
-
-    Attributes:
-        facts: all that follows in the state.
+    Args:
         start: what variables must stand for.
     """
+    body = _canonical_body(rule)
+    ways = _ways(body, testable_order(body), facts, start, iter(range(MOST_WAYS)))
+    return sorted((binding for binding, _ in ways), key=str)
 
-    rule: Rule
-    facts: Facts
-    start: Binding = field(default_factory=dict)
-    _ways: int = 0
 
-    def matches(self) -> list[Binding]:
-        """All bindings with which the whole body holds, in a fixed order."""
-        found = self._ways_to_match(testable_order(self.rule.body), self.start, (), 0)
-        return sorted((binding for binding, _ in found), key=str)
+def nearest_match(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> tuple[Binding, tuple[int, ...]]:
+    """Find the binding with the fewest atoms of a rule's body that fail, and their numbers.
 
-    def find(self) -> tuple[Binding, tuple[int, ...]]:
-        """Find the binding with the fewest atoms that fail, and their numbers.
+    Of several, one where a comparison fails comes before one where a value differs, and that before one where
+    nothing is known. Atoms of which there is no fact at all fail in any case.
 
-        Of several, one where a comparison fails comes before one where a value differs, and that before one where
-        nothing is known. Atoms of which there is no fact at all fail in any case.
-        """
-        body = tuple(map(_canonical_atom, self.rule.body))
-        hopeless = frozenset(
-            number
-            for number, atom in enumerate(body)
-            if atom.kind in FACT_KINDS and not any(True for _ in self.facts.matches(atom, self.start))
-        )
-        order = [number for number in testable_order(body) if number not in hopeless]
-        for allowed in range(len(order) + 1):
-            self._ways = 0
-            ways = list(self._ways_to_match(order, self.start, (), allowed))
-            if ways:
-                binding, failing = min(ways, key=self._rank)
-                return binding, tuple(sorted({*failing, *hopeless}))
-        return self.start, tuple(range(len(body)))
+    Args:
+        start: what variables must stand for.
+    """
+    body = _canonical_body(rule)
 
-    def _ways_to_match(
-        self, order: Sequence[int], binding: Binding, failing: tuple[int, ...], allowed: int
-    ) -> Iterator[tuple[Binding, tuple[int, ...]]]:
-        self._ways += 1
-        if self._ways > MOST_WAYS:
-            return
-        if not order:
-            yield binding, failing
-            return
-        number, rest = order[0], order[1:]
-        atom = _canonical_atom(self.rule.body[number])
-        if atom.kind in FACT_KINDS:
-            for found in self.facts.matches(atom, binding):
-                yield from self._ways_to_match(rest, found, failing, allowed)
-            is_failing = True  # the fact that is missing may be the only thing wrong, with another binding
-        else:
-            results = self.tested(atom, binding)
-            for found in results or ():
-                yield from self._ways_to_match(rest, found, failing, allowed)
-            is_failing = results == []
-            if results is None:  # a variable has no value, as the atom that gives it one fails
-                yield from self._ways_to_match(rest, binding, failing, allowed)
-        if is_failing and len(failing) < allowed:
-            yield from self._ways_to_match(rest, binding, (*failing, number), allowed)
-
-    def tested(self, atom: Atom, binding: Binding) -> list[Binding] | None:
-        """What a built-in, a datatype, sameAs or differentFrom makes of a binding.
-
-        Returns:
-            the bindings with which it holds, with what it computes; None if an argument has no value.
-        """
-        asked = instance(atom, binding)
-        unbound = [number for number, term in enumerate(asked.arguments) if isinstance(term, Variable)]
-        computes = atom.computes and unbound == [0]
-        if unbound and not computes:
-            return None
-        if atom.kind in ("same", "different"):
-            is_same = asked.arguments[0] == asked.arguments[1]
-            return [binding] if is_same == (atom.kind == "same") else []
-        values = _ask_pellet(asked, computes=computes)
-        if computes:
-            name = atom.arguments[0].name  # type: ignore[union-attr]
-            return [{**binding, name: canonical(value)} for value in values]
-        return [binding] if values else []
-
-    def _rank(self, way: tuple[Binding, tuple[int, ...]]) -> tuple[object, ...]:
-        """Order ways to match, the nearest first."""
+    def rank(way: tuple[Binding, tuple[int, ...]]) -> tuple[object, ...]:
         binding, failing = way
-        return tuple(self._distance(number, binding) for number in failing), str(sorted(binding.items()))
+        distances = ((_distance(body[number], facts, binding), -number) for number in failing)
+        return tuple(distances), str(sorted(binding.items()))
 
-    def _distance(self, number: int, binding: Binding) -> tuple[int, int]:
-        """How far an atom is from holding: a comparison, another value, nothing."""
-        atom = self.rule.body[number]
-        if atom.kind not in FACT_KINDS:
-            return 0, -number
-        if atom.kind == "class":
-            return 3, -number
-        subject = bound(atom.arguments[0], binding)
-        if isinstance(subject, str) and self.facts.values(subject, atom.predicate):
-            return 1, -number
-        return 2, -number
+    hopeless = {
+        number
+        for number, atom in enumerate(body)
+        if atom.kind in FACT_KINDS and not any(True for _ in facts.matches(atom, start))
+    }
+    order = [number for number in testable_order(body) if number not in hopeless]
+    for allowed in range(len(order) + 1):
+        ways = list(_ways(body, order, facts, start, iter(range(MOST_WAYS)), allowed))
+        if ways:
+            binding, failing = min(ways, key=rank)
+            return binding, tuple(sorted({*failing, *hopeless}))
+    return start, tuple(range(len(body)))
 
 
-def _canonical_atom(atom: Atom) -> Atom:
-    return replace(atom, arguments=tuple(canonical(each) if isinstance(each, Lit) else each for each in atom.arguments))
+def _ways(
+    body: Sequence[Atom],
+    order: Sequence[int],
+    facts: Facts,
+    binding: Binding,
+    tries: Iterator[int],
+    allowed: int = 0,
+) -> Iterator[tuple[Binding, tuple[int, ...]]]:
+    """Ways to match atoms, in an order, of which some are allowed to fail: the binding, and the numbers of those.
+
+    Args:
+        tries: ends when there have been enough.
+    """
+    if next(tries, None) is None:
+        return
+    if not order:
+        yield binding, ()
+        return
+    number, rest = order[0], order[1:]
+    atom = body[number]
+    is_fact = atom.kind in FACT_KINDS
+    results = facts.matches(atom, binding) if is_fact else _tested(atom, binding)
+    # A variable without a value is one of an atom that fails already.
+    for found in [binding] if results is None else results:
+        yield from _ways(body, rest, facts, found, tries, allowed)
+    # The fact that is missing may be the only thing wrong, with another binding.
+    if allowed and (is_fact or results == []):
+        for found, failing in _ways(body, rest, facts, binding, tries, allowed - 1):
+            yield found, (number, *failing)
+
+
+def _tested(atom: Atom, binding: Binding) -> list[Binding] | None:
+    """The bindings with which a built-in, datatype, sameAs or differentFrom holds; None if an argument has no value."""
+    asked = instance(atom, binding)
+    unbound = [number for number, term in enumerate(asked.arguments) if isinstance(term, Variable)]
+    computes = atom.computes and unbound == [0]
+    if unbound and not computes:
+        return None
+    if atom.kind in ("same", "different"):
+        is_same = asked.arguments[0] == asked.arguments[1]
+        return [binding] if is_same == (atom.kind == "same") else []
+    values = _ask_pellet(asked, computes=computes)
+    if computes:
+        name = next(atom.variables())
+        return [{**binding, name: canonical(value)} for value in values]
+    return [binding] if values else []
+
+
+def _distance(atom: Atom, facts: Facts, binding: Binding) -> int:
+    """How far an atom is from holding: a comparison, another value, nothing, a class."""
+    if atom.kind not in FACT_KINDS:
+        return 0
+    subject = bound(atom.arguments[0], binding)
+    return 3 if atom.kind == "class" else 1 if isinstance(subject, str) and facts.of(atom.predicate, subject) else 2
+
+
+def _canonical_body(rule: Rule) -> list[Atom]:
+    return [instance(atom, {}) for atom in rule.body]
 
 
 def testable_order(body: Sequence[Atom]) -> list[int]:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import Final, NamedTuple, TypeVar
 
 from suave_des.errors import KnowledgeError
@@ -349,21 +349,9 @@ class _Original:
             is_anywhere = not all(bodies)  # what is changed alone makes a rule fire
             probes = None if is_anywhere else frozenset(numbers.setdefault(body, len(numbers)) for body in bodies)
             self.mutants.append(_Changed(self, mutant, probes))
-        self._probes = Probes(knowledge.base, knowledge.limit, tuple(numbers))
-        self._outcomes: dict[Situation, Outcome] = {}
-        self._holding: dict[Situation, frozenset[int] | None] = {}
-
-    def outcome(self, situation: Situation) -> Outcome:
-        """What follows and is decided."""
-        if situation not in self._outcomes:
-            self._outcomes[situation] = self.knowledge.outcome(situation)
-        return self._outcomes[situation]
-
-    def holding(self, situation: Situation) -> frozenset[int] | None:
-        """Numbers of the probes that hold; None for a situation that contradicts itself."""
-        if situation not in self._holding:
-            self._holding[situation] = self._probes.asked(situation)
-        return self._holding[situation]
+        #: What follows and is decided; and numbers of the probes that hold, None where a situation contradicts itself.
+        self.outcome = cache(knowledge.outcome)
+        self.holding = cache(Probes(knowledge.base, knowledge.limit, tuple(numbers)).asked)
 
 
 def _planning_facts(base: Ontology) -> frozenset[Fact]:

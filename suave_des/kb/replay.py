@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
@@ -13,18 +13,19 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from suave_des.errors import MISTAKES_LOGGER, InputError, KnowledgeError
+from suave_des.errors import MISTAKES_LOGGER, InputError, KnowledgeError, number_of
 from suave_des.files import read_json
 from suave_des.findings import Level, ordered
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.situations import Situation, compare
+from suave_des.kb.matching import with_bindings
+from suave_des.kb.situations import Situation
 from suave_des.kb.states import ManagingSettings, read_rules
 from suave_des.kb.tracing import Tracer, pellet_for
 from suave_des.knowledge.checks.rules import findings_on_rule
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.state import NONE_LEFT, Fact, KnowledgeState, Value
+from suave_des.knowledge.state import NONE_LEFT
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
@@ -35,48 +36,20 @@ from suave_des.scenario_knowledge import read_base
 _MISSION_FILE = "mission.json"
 
 
-class Firing(NamedTuple):
-    """One way in which a rule fires: conclusions, bindings, and whether none of the conclusions is there anyway."""
-
-    facts: tuple[Fact, ...]
-    bindings: tuple[tuple[str, Value], ...]
-    is_new: bool
-
-    def __str__(self) -> str:
-        """Conclusions and individuals, without numbers, which differ each time."""
-        bound = ", ".join(f"?{name} = {value}" for name, value in self.bindings if not isinstance(value, Decimal))
-        known = "" if self.is_new else " (known without it)"
-        return f"{', '.join(map(str, self.facts))}{known} with {bound or 'nothing bound'}"
-
-
-class ChangedDecision(NamedTuple):
-    """A decision that would have been different: the design recorded and then; None: no adaptation, or none left."""
-
-    function: str
-    recorded: str | None
-    then: str | None
-
-    def __str__(self) -> str:
-        """Both designs."""
-        return f"{self.function}: {self.then or 'no change'} instead of {self.recorded or 'no change'}"
-
-
-@dataclass(frozen=True)
-class ReplayedCycle:
+class ReplayedCycle(NamedTuple):
     """One recorded reasoning cycle in which a rule fires or something changes.
 
     Attributes:
         t_s: mission time.
-        firings: of the rules.
+        firings: each way in which a rule fires: conclusions and individuals, without numbers, which differ each time.
         decisions: those that would have been different.
         contradiction: for a state that would contradict itself, what contradicts what.
     """
 
     t_s: float
-    state: KnowledgeState
-    firings: tuple[Firing, ...]
-    decisions: tuple[ChangedDecision, ...]
-    contradiction: str | None = None
+    firings: tuple[str, ...]
+    decisions: tuple[str, ...]
+    contradiction: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,22 +70,40 @@ class MissionReplay:
 
     def lines(self) -> Iterator[str]:
         """The replay as `kb try` prints it."""
-        firings: dict[str, list[ReplayedCycle]] = {}
-        decisions: dict[str, list[ReplayedCycle]] = {}
-        for cycle in self.cycles:
-            for texts, each in ((firings, cycle.firings), (decisions, cycle.decisions)):
-                for text in map(str, each):
-                    texts.setdefault(text, []).append(cycle)
         which = f": {self.mission}" if self.mission else ""
         firing_cycles = sum(bool(cycle.firings) for cycle in self.cycles)
         yield f"{self.folder}{which}: fires in {firing_cycles} of {self.states} recorded states"
-        yield from (f"  {_times(cycles)}: {text}" for text, cycles in firings.items())
-        yield f"  decisions that would have been different: {sum(map(len, decisions.values()))}"
-        yield from (f"    {_times(cycles)}: {text}" for text, cycles in decisions.items())
+        yield from self._grouped("  ", lambda cycle: cycle.firings)
+        yield f"  decisions that would have been different: {sum(len(cycle.decisions) for cycle in self.cycles)}"
+        yield from self._grouped("    ", lambda cycle: cycle.decisions)
         contradicting = [cycle for cycle in self.cycles if cycle.contradiction]
         if contradicting:
             yield f"  states that would contradict themselves: {len(contradicting)} ({_times(contradicting)})"
             yield f"    {contradicting[0].contradiction}"
+
+    def _grouped(self, indent: str, texts_of: Callable[[ReplayedCycle], Iterable[str]]) -> Iterator[str]:
+        """Each text with the times of its cycles."""
+        found: dict[str, list[ReplayedCycle]] = {}
+        for cycle in self.cycles:
+            for text in texts_of(cycle):
+                found.setdefault(text, []).append(cycle)
+        return (f"{indent}{_times(cycles)}: {text}" for text, cycles in found.items())
+
+
+def summary(missions: Sequence[MissionReplay]) -> Iterator[str]:
+    """Several replays as `kb try` prints them: those in which something happens, and how many they are."""
+    for mission in missions:
+        if mission.cycles or len(missions) == 1:
+            yield from mission.lines()
+    if len(missions) > 1:
+        cycles = [mission.cycles for mission in missions]
+        firing = sum(any(each.firings for each in one) for one in cycles)
+        changed = [sum(len(each.decisions) for each in one) for one in cycles]
+        contradictions = sum(any(each.contradiction for each in one) for one in cycles)
+        yield (
+            f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
+            f"({number_of(sum(changed), 'decision')}), contradictions in {contradictions}"
+        )
 
 
 def _times(cycles: Sequence[ReplayedCycle]) -> str:
@@ -247,23 +238,23 @@ class _Trial:
     def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
         """Return the effect of the change in a recorded reasoning cycle; None if it has none."""
         situation = Situation(record.state)
-        decisions: tuple[ChangedDecision, ...] = ()
-        for difference in compare(self.before.outcome, self.after.outcome, [situation]):
-            one, other = difference.one.changes, difference.other.changes
-            designs = ((name, _design(one.get(name)), _design(other.get(name))) for name in sorted({*one, *other}))
-            decisions = tuple(ChangedDecision(*each) for each in designs if each[1] != each[2])
-        after = self.after.outcome(situation)
+        before, after = self.before.outcome(situation), self.after.outcome(situation)
         if after.reasoning is None:
-            return ReplayedCycle(record.t_s, record.state, (), (), f"contradiction: {after.contradiction}")
+            return ReplayedCycle(record.t_s, (), (), f"contradiction: {after.contradiction}")
+        decisions = []
+        for name in sorted({*before.changes, *after.changes}):
+            one, other = (_design(outcome.changes.get(name)) for outcome in (before, after))
+            if one != other:
+                decisions.append(f"{name}: {other} instead of {one}")
         without = self.without_rule.outcome(situation).known
+        firings = []
         tracer = Tracer(self.with_rule.base, record.state, self._pellet)
-        firings = tuple(
-            Firing(facts, bindings, is_new=not without.issuperset(facts))
-            for rule in self.rules
-            for bindings, facts in tracer.firings(rule)
-        )
-        return ReplayedCycle(record.t_s, record.state, firings, decisions) if firings or decisions else None
+        for bindings, facts in (firing for rule in self.rules for firing in tracer.firings(rule)):
+            known = " (known without it)" if without.issuperset(facts) else ""
+            bound = with_bindings(tuple(each for each in bindings if not isinstance(each[1], Decimal)))
+            firings.append(f"{', '.join(map(str, facts))}{known}{bound or ' with nothing bound'}")
+        return ReplayedCycle(record.t_s, tuple(firings), tuple(decisions)) if firings or decisions else None
 
 
-def _design(choice: str | None) -> str | None:
-    return None if choice == NONE_LEFT else choice
+def _design(choice: str | None) -> str:
+    return "no change" if choice in (None, NONE_LEFT) else str(choice)

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 import yaml
 from lxml import etree
@@ -33,7 +33,6 @@ from suave_des.kb.replay import mission_scenario
 from suave_des.kb.situations import Decide, Outcome, Situation
 from suave_des.kb.space import Region, measurements_in, parse_region
 from suave_des.kb.states import (
-    NEW_INDIVIDUAL,
     FactReader,
     StateBuilder,
     StateContent,
@@ -44,6 +43,7 @@ from suave_des.kb.states import (
 from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
+from suave_des.knowledge.rdf import Triple
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
@@ -95,7 +95,7 @@ class RuleTest:
         name: what it says of the rules.
         file, line: where it is.
         situations: one, or one for each region of measured values.
-        follows: facts that must follow, or be asserted.
+        follows: facts that must follow, or be asserted, each with its triple.
         follows_not: facts that must not.
         decides: (function, what happens to its grounding: a design, "stays" or "none left").
         contradicts: whether the situation must contradict itself.
@@ -108,7 +108,7 @@ class RuleTest:
     file: Path
     line: int
     situations: tuple[Situation, ...] = field(default=(), repr=False)
-    follows: tuple[Fact, ...] = ()
+    follows: Mapping[Fact, Triple] = field(default_factory=dict)
     follows_not: tuple[Fact, ...] = ()
     decides: tuple[tuple[str, str], ...] = ()
     contradicts: bool = False
@@ -199,7 +199,7 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
         changes.append((function, _choice(base, function, before), _choice(base, function, after)))
     return {
         "situations": tuple(Situation(each, triples, words) for each, words in _states(test.given, knowledge, folder)),
-        "follows": tuple(map(reader.fact, test.follows)),
+        "follows": {reader.fact(text): reader.triple(text) for text in test.follows},
         "follows_not": tuple(map(reader.fact, test.follows_not)),
         "decides": tuple((name, _choice(base, name, words)) for name, words in test.decides.items()),
         "contradicts": test.contradiction,
@@ -240,22 +240,11 @@ def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[t
         yield builder.state(), words
 
 
-@dataclass(frozen=True)
-class Failure:
-    """An expectation that does not hold.
-
-    Attributes:
-        what: in one line.
-        situation: the first one in which it does not hold; None where there is none.
-        fact: the fact that it is about.
-        function: the function that it is about.
-        because: why, as lines.
-    """
+class Failure(NamedTuple):
+    """An expectation that does not hold: what is wrong, in the first situation, if there is one, and why, as lines."""
 
     what: str
     situation: Situation | None = None
-    fact: Fact | None = None
-    function: str | None = None
     because: tuple[str, ...] = ()
 
     def lines(self) -> Iterator[str]:
@@ -294,11 +283,13 @@ def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
     began = time.perf_counter()
     found = [Failure(test.problem)] if test.problem else []
     for situation in () if found else test.situations:
-        found = list(_failures(test, situation, knowledge.outcome, lambda names: knowledge.without(names).outcome))
-        if found:
+        unmet = list(_unmet(test, situation, knowledge.outcome, lambda names: knowledge.without(names).outcome))
+        if unmet:
+            found = [
+                Failure(what, situation, tuple(_because(knowledge, test, situation, about))) for what, about in unmet
+            ]
             break
-    failures = tuple(replace(each, because=tuple(_because(knowledge, each))) for each in found)
-    return TestResult(test, failures, time.perf_counter() - began)
+    return TestResult(test, tuple(found), time.perf_counter() - began)
 
 
 def passes(test: RuleTest, outcome: Decide[Situation], without: Without) -> bool:
@@ -309,75 +300,62 @@ def passes(test: RuleTest, outcome: Decide[Situation], without: Without) -> bool
         outcome: concludes what follows and is decided in a situation.
         without: makes the same without some rules.
     """
-    return not any(True for situation in test.situations for _ in _failures(test, situation, outcome, without))
+    return not any(True for situation in test.situations for _ in _unmet(test, situation, outcome, without))
 
 
-def _failures(test: RuleTest, situation: Situation, outcome: Decide[Situation], without: Without) -> Iterator[Failure]:
-    """Each expectation that does not hold in a situation."""
+def _unmet(
+    test: RuleTest, situation: Situation, outcome_of: Decide[Situation], without: Without
+) -> Iterator[tuple[str, Fact | str | None]]:
+    """Each expectation that does not hold in a situation, in words, and the fact or function that it is about."""
     try:
-        yield from _unmet(test, situation, outcome, without)
+        outcome = outcome_of(situation)
+        before = without(test.without)(situation) if test.changes and outcome.reasoning is not None else outcome
     except ReasonerTimeoutError:
         raise  # Pellet is still at work: no further state can be decided
     except KnowledgeError as error:
-        yield Failure(f"the state cannot be decided: {error}", situation)
-
-
-def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide[Situation], without: Without) -> Iterator[Failure]:
-    outcome = outcome_of(situation)
+        yield f"the state cannot be decided: {error}", None
+        return
     if outcome.reasoning is None:
         if not test.contradicts:
-            yield Failure(f"the situation contradicts itself: {outcome.contradiction}", situation)
+            yield f"the situation contradicts itself: {outcome.contradiction}", None
         return
     if test.contradicts:
-        yield Failure("the situation does not contradict itself", situation)
-    for facts, is_wanted, words in ((test.follows, True, "does not follow"), (test.follows_not, False, "follows")):
-        for fact in facts:
-            if (fact in outcome.known) != is_wanted:
-                yield Failure(f"{fact} {words}", situation, fact)
+        yield "the situation does not contradict itself", None
+    yield from ((f"{fact} does not follow", fact) for fact in test.follows if fact not in outcome.known)
+    yield from ((f"{fact} follows", fact) for fact in test.follows_not if fact in outcome.known)
     wishes = [(outcome, function, wanted, "") for function, wanted in test.decides]
-    if test.changes:
-        before, names = without(test.without)(situation), ", ".join(test.without)
-        for function, one, other in test.changes:
-            wishes += [(before, function, one, f", without {names}"), (outcome, function, other, f", with {names}")]
+    names = ", ".join(test.without)
+    for function, one, other in test.changes:
+        wishes += [(before, function, one, f", without {names}"), (outcome, function, other, f", with {names}")]
     for each, function, wanted, words in wishes:
         chosen, present = each.choice(function), situation.state.grounded(function)
         if chosen != wanted and not (chosen == STAYS and wanted == present):
             happens = f"{present} stays" if chosen == STAYS and present else chosen
-            yield Failure(f"{function}{words}: {happens}, not {wanted}", situation, function=function)
+            yield f"{function}{words}: {happens}, not {wanted}", function
 
 
-def _because(knowledge: KnowledgeBase, failure: Failure) -> Iterator[str]:
-    """Why something follows or does not, or is decided as it is."""
-    situation, fact, function = failure.situation, failure.fact, failure.function
-    if situation is None or (fact is None and function is None):
-        return
+def _because(knowledge: KnowledgeBase, test: RuleTest, situation: Situation, about: Fact | str | None) -> Iterator[str]:
+    """Why a fact follows or does not, or a function is decided as it is."""
+    state = situation.state
     try:
         if situation.facts:
             knowledge = knowledge.changed(knowledge.base.with_facts(situation.facts))
-        if fact is not None and failure.what.endswith("does not follow"):
-            yield from _missing(knowledge.base, situation, fact)
-        elif fact is not None:
-            yield from knowledge.explain(situation.state, str(fact)).lines()
-        else:
-            reasoning = knowledge.infer(situation.state)
-            decisions = [each for each in reasoning.plan.decisions if each.function == function]
-            for each in (each for one in decisions for each in verdicts(knowledge.base, reasoning, one)):
-                yield f"{each.design}: {each.verdict}: {each.reason}"
+        if isinstance(about, Fact) and about in test.follows:
+            answers = RuleQuestions(knowledge.base).missing(test.follows[about], state)
+            near = min((answer.failing for answer in answers if answer.failing), default=0)
+            yield from (str(answer) for answer in answers if answer.failing in (0, near))
+            if not answers:
+                yield f"no rule concludes {about}"
+        elif isinstance(about, Fact):
+            yield from knowledge.explain(state, str(about)).lines()
+        elif about is not None:
+            reasoning = knowledge.infer(state)
+            decisions = [each for each in reasoning.plan.decisions if each.function == about]
+            yield from (str(each) for one in decisions for each in verdicts(knowledge.base, reasoning, one))
             if not decisions:
-                yield f"the objective of {function} requires no adaptation"
+                yield f"the objective of {about} requires no adaptation"
     except InputError as error:
         yield str(error)
-
-
-def _missing(base: Ontology, situation: Situation, fact: Fact) -> Iterator[str]:
-    """Why each rule that could conclude a fact does not: of those whose atoms fail, the ones that lack least."""
-    named = {base.names.short(iri): iri for iri in base.vocabulary.kinds}
-    subject = named.get(fact.subject, NEW_INDIVIDUAL + fact.subject)
-    answers = RuleQuestions(base).missing(fact, subject, situation.state)
-    near = min((answer.failing for answer in answers if answer.failing), default=0)
-    yield from (str(answer) for answer in answers if answer.failing in (0, near))
-    if not answers:
-        yield f"no rule concludes {fact}"
 
 
 def junit_xml(results: Sequence[TestResult]) -> bytes:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
-from suave_des.kb.matching import Facts, NearestFinder, matched, shown_bindings, stated
+from suave_des.kb.matching import Bound, Facts, matched, matches, shown_bindings, stated, with_bindings
 from suave_des.knowledge.content import Content, Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import (
@@ -25,12 +25,11 @@ from suave_des.knowledge.pellet.in_process import (
 )
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, fact_of, is_fact, n_triple
 from suave_des.knowledge.rules import Atom, AtomKind, Rule
-from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
+from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState
 
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
 _FUNCTIONAL: Final = OWL + "FunctionalProperty"
-_Bindings = tuple[tuple[str, Value], ...]
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class Derivation:
     fact: Fact
     source: str
     rule: str | None = None
-    bindings: _Bindings = ()
+    bindings: Bound = ()
     axioms: tuple[str, ...] = ()
     premises: tuple[Derivation, ...] = ()
 
@@ -59,9 +58,8 @@ class Derivation:
 
     def lines(self, indent: str = "") -> Iterator[str]:
         """The fact and how it follows, and below it, indented, the facts that it follows from."""
-        bindings = ", ".join(f"?{name} = {value}" for name, value in self.bindings)
         how = {
-            "rule": f"by rule {self.rule}" + (f" with {bindings}" if bindings else ""),
+            "rule": f"by rule {self.rule}{with_bindings(self.bindings)}",
             "axioms": f"by the schema: {'; '.join(self.axioms)}" if self.axioms else "by the schema",
             "state": "given in the state",
             "ontology": "asserted in the ontology",
@@ -70,29 +68,15 @@ class Derivation:
         for premise in self.premises:
             yield from premise.lines(indent + "  ")
 
-    def grounds(self) -> Iterator[Derivation]:
-        """Everything that it follows from."""
+    def all(self) -> Iterator[Derivation]:
+        """It, and everything that it follows from."""
+        yield self
         for premise in self.premises:
-            yield premise
-            yield from premise.grounds()
+            yield from premise.all()
 
     def rules(self) -> frozenset[str]:
         """Names of all rules in it."""
-        return frozenset(each.rule for each in (self, *self.grounds()) if each.rule is not None)
-
-
-@dataclass(frozen=True)
-class Clash:
-    """A contradiction: an individual would have two values of a functional property.
-
-    Attributes:
-        subject, property: the individual and the property.
-        sides: how each of the values follows.
-    """
-
-    subject: str
-    property: str
-    sides: tuple[Derivation, ...]
+        return frozenset(each.rule for each in self.all() if each.rule is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +95,9 @@ class Tracer:
     _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
 
     @cached_property
-    def _situation(self) -> frozenset[Triple]:
-        """What the state asserts."""
-        return frozenset(self.base.assertions(self.state))
-
-    @cached_property
     def asserted(self) -> frozenset[Triple]:
         """What ontologies and state assert."""
-        return self._situation.union(self.base.content.triples)
+        return frozenset((*self.base.assertions(self.state), *self.base.content.triples))
 
     @cached_property
     def entailed(self) -> frozenset[Triple]:
@@ -154,17 +133,17 @@ class Tracer:
         with one_at_a_time:
             found = self._derive(_canonical(triple), frozenset())
             if found is None:  # what Pellet says that it follows from, without the steps between
-                trace = self._trace(self.asserted, self.base.content.enabled_rules, _denial(triple))
+                trace = self._trace(triple, self.asserted, self.base.content.enabled_rules)
                 named = {fact.groups() for axiom in trace.axioms if (fact := _FACT.match(axiom))}
                 leaves = [each for each in sorted(self.asserted, key=str) if _as_axiom(each) in named]
                 premises = tuple(map(self._leaf, leaves))
                 found = Derivation(self._fact(triple), "axioms", premises=premises, axioms=self._axioms(trace))
             return found
 
-    def firings(self, rule: Rule) -> Iterator[tuple[_Bindings, tuple[Fact, ...]]]:
+    def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
         with one_at_a_time:
-            for binding in NearestFinder(rule, self._facts).matches():
+            for binding in matches(rule, self._facts):
                 concluded = [triple for atom in rule.head if (triple := stated(atom, binding)) is not None]
                 if all(_canonical(triple) in self._facts for triple in concluded):  # what is the same, Pellet knows
                     facts = tuple(map(self._fact, sorted(concluded, key=str)))
@@ -186,7 +165,7 @@ class Tracer:
         for rule in self.base.content.enabled_rules:
             starts = (matched(atom, triple, {}) for atom in rule.head)
             for start in (each for each in starts if each is not None):
-                for binding in NearestFinder(rule, self._facts, start).matches():
+                for binding in matches(rule, self._facts, start):
                     said = (stated(atom, binding) for atom in rule.body)
                     body = dict.fromkeys(_canonical(each) for each in said if each is not None)
                     if above.isdisjoint(body):
@@ -204,18 +183,19 @@ class Tracer:
             if about_same and other not in above and triple in self._concluded(other, asked):
                 premise = self._derive(other, above)
                 if premise is not None:
-                    axioms = self._axioms(self._trace((other,), (), _denial(triple)))
+                    axioms = self._axioms(self._trace(triple, [other]))
                     yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
 
-    def clashes(self) -> tuple[str, tuple[Clash, ...], tuple[str, ...]]:
+    def clashes(self) -> tuple[str, tuple[tuple[Derivation, ...], ...], tuple[str, ...]]:
         """Explain a state that contradicts itself.
 
         What follows if no property is functional is what clashes.
 
         Returns:
-            what Pellet says, the functional properties with two values, and the names of the rules involved.
+            what Pellet says; how each value follows of each functional property that has several; and the names of the
+            rules involved.
         """
-        content = self.base.content
+        content, names = self.base.content, self.base.names
         triples = tuple(each for each in content.triples if each[1:] != (RDF_TYPE, _FUNCTIONAL))
         functional = {each[0] for each in content.triples if each[1:] == (RDF_TYPE, _FUNCTIONAL)}
         relaxed = Tracer(replace(self.base, content=replace(content, triples=triples)), self.state)
@@ -223,29 +203,26 @@ class Tracer:
         try:
             for triple in relaxed.known:
                 if triple[1] in functional:
-                    values.setdefault(triple[:2], []).append(triple)
+                    values.setdefault((names.short(triple[0]), names.short(triple[1])), []).append(triple)
         except ContradictionError:  # for another reason, too
             values = {}
-        short = self.base.names.short
-        sides = {
-            (short(subject), short(name)): tuple(map(relaxed.derive, found))
-            for (subject, name), found in values.items()
-            if len(found) > 1
-        }
+        sides = {key: tuple(map(relaxed.derive, found)) for key, found in values.items() if len(found) > 1}
         # What follows from another clash is not one of its own.
-        clashes = tuple(
-            Clash(*key, each)
+        clashes = {
+            key: each
             for key, each in sides.items()
-            if not any((g.fact.subject, g.fact.property) in sides for side in each for g in side.grounds())
-        )
+            if not any(
+                (g.fact.subject, g.fact.property) in sides for one in each for top in one.premises for g in top.all()
+            )
+        }
         if clashes:
-            rules = {name for clash in clashes for side in clash.sides for name in side.rules()}
-            message = "; ".join(f"{each.subject} has two values of the functional {each.property}" for each in clashes)
-            return message, clashes, tuple(sorted(rules))
+            rules = {name for each in clashes.values() for side in each for name in side.rules()}
+            message = "; ".join(f"{subject} has two values of the functional {name}" for subject, name in clashes)
+            return message, tuple(clashes.values()), tuple(sorted(rules))
         with one_at_a_time:
-            trace = self._trace(self.asserted, content.enabled_rules)
-        names = sorted(self.base.rules[number].name for number in trace.rules)
-        return self._shorten(trace.message).strip(), (), tuple(names)
+            trace = trace_contradiction(self._text(self.asserted, content.enabled_rules))
+        rules = {self.base.rules[number].name for number in trace.rules}
+        return self._shorten(trace.message).strip(), (), tuple(sorted(rules))
 
     def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
         """What Pellet says of the property or class of an atom, from a fact and the schema alone."""
@@ -258,9 +235,9 @@ class Tracer:
         content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
         return content.n_triples(rules)
 
-    def _trace(self, facts: Iterable[Triple], rules: Sequence[Rule], denial: str = "") -> Trace:
-        """What Pellet says a contradiction follows from: the state's own, or that of a fact with its denial."""
-        return trace_contradiction(self._text(facts, rules) + denial)
+    def _trace(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> Trace:
+        """What Pellet says that a triple follows from."""
+        return trace_contradiction(self._text(facts, rules) + _denial(triple))
 
     def _axioms(self, trace: Trace) -> tuple[str, ...]:
         """The axioms of the schema in a trace: domains, subclasses and the like."""
@@ -271,7 +248,7 @@ class Tracer:
         return _IRI.sub(lambda iri: self.base.names.short(iri.group()), text)
 
     def _leaf(self, triple: Triple) -> Derivation:
-        return Derivation(self._fact(triple), "state" if triple in self._situation else "ontology")
+        return Derivation(self._fact(triple), "state" if triple in self.base.assertions(self.state) else "ontology")
 
     def _fact(self, triple: Triple) -> Fact:
         return fact_of(triple, self.base.names)
@@ -289,7 +266,6 @@ def pellet_for(base: Ontology) -> InProcessPellet:
 
 
 def _canonical(triple: Triple) -> Triple:
-    """A triple with a number in its one shortest form."""
     return (*triple[:2], canonical(triple[2]))
 
 

@@ -10,18 +10,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, did_you_mean, nearest, shown
 from suave_des.kb.matching import (
     FACT_KINDS,
     Binding,
+    Bound,
     Facts,
-    NearestFinder,
     bound,
+    matched,
+    nearest_match,
     shown_bindings,
     stated,
     unified,
+    with_bindings,
 )
 from suave_des.kb.situations import Probes, Situation
 from suave_des.kb.states import FactReader
@@ -43,12 +47,13 @@ from suave_des.knowledge.rdf import (
     fact_of,
     facts_of,
     local_name,
+    reached,
     value_of,
 )
 from suave_des.knowledge.rules import COMPARISONS, Atom, Rule, Variable, literal_text, texts_of, write_atom
 from suave_des.knowledge.rules.checks import fatal_problems
 from suave_des.knowledge.rules.files import RulesFile
-from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
+from suave_des.knowledge.state import ContradictionError, KnowledgeState
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
 
@@ -106,8 +111,7 @@ def open_without_unusable(loaded: LoadedScenario) -> tuple[Ontology, dict[str, s
     return replace(base, content=with_rules(base.content, [usable], disabled)), unusable
 
 
-@dataclass(frozen=True)
-class WhyNot:
+class WhyNot(NamedTuple):
     """Why a rule does not fire, or that it does.
 
     Attributes:
@@ -123,7 +127,7 @@ class WhyNot:
     answer: str
     fires: bool = False
     atom: str = ""
-    bindings: tuple[tuple[str, Value], ...] = ()
+    bindings: Bound = ()
     failing: int = 0
 
     def __str__(self) -> str:
@@ -178,13 +182,12 @@ class RuleQuestions:
         """
         if name in self.unusable:
             return WhyNot(name, f"never fires: {self.unusable[name]}")
-        rules = [rule for rule in self.base.rules if rule.name == name]
-        if not rules:
+        answers = [self.of(rule, state) for rule in self.base.rules if rule.name == name]
+        if not answers:
             raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, self.names))
-        answers = [self.of(rule, state) for rule in rules]
         return next((each for each in answers if each.fires), answers[0])
 
-    def of(self, rule: Rule, state: KnowledgeState, start: Binding | None = None) -> WhyNot:
+    def of(self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})) -> WhyNot:
         """Say why a rule, which may have the name of another one, does not fire in a state.
 
         Args:
@@ -194,20 +197,24 @@ class RuleQuestions:
             return WhyNot(
                 rule.name, f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
             )
-        problem = next(iter(fatal_problems(rule, self.base.vocabulary)), None)
-        if problem is not None:
+        for problem in fatal_problems(rule, self.base.vocabulary):
             remedy = f"; {problem.remedy}" if problem.remedy else ""
             return WhyNot(rule.name, f"never fires: {problem.message}{remedy}")
         facts = self._known(state)
         if isinstance(facts, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
-        binding, failing = NearestFinder(rule, facts, start or {}).find()
+        binding, failing = nearest_match(rule, facts, start)
         identities = [number for number, atom in enumerate(rule.body) if atom.kind in ("same", "different")]
-        if not failing and identities and not self._fires_in_pellet(rule, state):
+        # What is the same and what is different, Pellet alone knows.
+        if not failing and identities and not Probes(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)):
             failing = (identities[0],)
         bindings = shown_bindings(binding, self.base.names)
         if not failing:
-            return WhyNot(rule.name, self._fires(rule, binding, facts), True, bindings=bindings)
+            said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
+            stays = next((text for atom in rule.head for text in self._remaining(atom, binding, facts)), "")
+            return WhyNot(
+                rule.name, f"it fires{with_bindings(bindings)}, and concludes {said}{stays}", True, "", bindings
+            )
         first = rule.body[min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))]
         if first.predicate == HAS_QA_VALUE and id(rule) in self._unmeasured:
             reason = self._unmeasured[id(rule)]
@@ -219,16 +226,21 @@ class RuleQuestions:
         text = write_atom(first)
         return WhyNot(rule.name, f"{text} does not hold: {reason}{more}{chain}", False, text, bindings, len(failing))
 
+    def missing(self, triple: Triple, state: KnowledgeState) -> list[WhyNot]:
+        """Say why no rule concludes a fact, of each that could; those that lack least first."""
+        starts = (
+            (rule, next((start for head in rule.head if (start := matched(head, triple, {})) is not None), None))
+            for rule in self.base.content.enabled_rules
+        )
+        found = [self.of(rule, state, start) for rule, start in starts if start is not None]
+        return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
+
     def _is_fixed(self, atom: Atom) -> bool:
         """Whether what an atom asks for is neither said by states nor concluded by a rule."""
         content = self._usable.content
         concluded = content.head_properties() | content.head_classes()
         of_states = {triple[1] for individual in self._usable.model.individuals() for triple in individual.own}
         return atom.kind in FACT_KINDS and atom.predicate not in _SAID_BY_STATES | concluded | of_states
-
-    def _fires_in_pellet(self, rule: Rule, state: KnowledgeState) -> bool:
-        """Whether a rule fires: what is the same and what is different, Pellet alone knows."""
-        return bool(Probes(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)))
 
     @cached_property
     def _usable(self) -> Ontology:
@@ -254,76 +266,35 @@ class RuleQuestions:
                 self._facts[state] = error.problem.removeprefix("contradiction: ")
         return self._facts[state]
 
-    def missing(self, fact: Fact, subject: str, state: KnowledgeState) -> list[WhyNot]:
-        """Say of each rule that could conclude a fact why it does not, those that lack least first.
+    def _concluded(self, atom: Atom, binding: Binding) -> str:
+        fact = stated(atom, binding)
+        return write_atom(atom) if fact is None else str(fact_of(fact, self.base.names))
 
-        Args:
-            fact: which does not follow.
-            subject: IRI of its subject.
-        """
-        found = []
-        for rule in self.base.content.enabled_rules:
-            starts = (self._says(head, fact, subject) for head in rule.head)
-            start = next((each for each in starts if each is not None), None)
-            if start is not None:
-                found.append(self.of(rule, state, start))
-        return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
-
-    def _says(self, head: Atom, fact: Fact, subject: str) -> Binding | None:
-        """The binding with which an atom of a head says a fact, its value left free; None if it cannot."""
-        names, last = self.base.names, head.arguments[-1]
-        if fact.property != ("type" if head.kind == "class" else names.short(head.predicate)):
-            return None
-        value = head.predicate if head.kind == "class" else bound(last, {})
-        if value is not None and value_text(value_of(value, names)) != value_text(fact.value):
-            return None
-        return unified(head.arguments[:1], (subject,), {})
-
-    def _fires(self, rule: Rule, binding: Binding, facts: Facts) -> str:
-        concluded = []
-        stays = ""
-        for atom in rule.head:
-            fact = stated(atom, binding)
-            concluded.append(write_atom(atom) if fact is None else str(fact_of(fact, self.base.names)))
-            others = self._other_values(atom, binding, facts)
-            if others:
-                stays = f"; {others[0]} remains as well, because rules only add values"
-        bound = ", ".join(f"?{name} = {value}" for name, value in shown_bindings(binding, self.base.names))
-        return f"it fires{f' with {bound}' if bound else ''}, and concludes {', '.join(concluded)}{stays}"
-
-    def _other_values(self, atom: Atom, binding: Binding, facts: Facts) -> list[str]:
-        """Facts that give the subject of a head's atom another value of the same data property."""
-        subject, last = bound(atom.arguments[0], binding), atom.arguments[-1]
-        if atom.kind != "data" or not isinstance(last, Lit) or not isinstance(subject, str):
-            return []
-        values = [value for value in facts.values(subject, atom.predicate) if value != last]
-        triples = [(subject, atom.predicate, value) for value in values]
-        return sorted(str(fact) for fact in facts_of(triples, self.base.names))
+    def _remaining(self, atom: Atom, binding: Binding, facts: Facts) -> Iterator[str]:
+        """Another value that the subject of a head's atom has of the same data property."""
+        fact = stated(atom, binding)
+        if fact is not None and isinstance(fact[2], Lit) and isinstance(atom.arguments[-1], Lit):
+            others = [(*fact[:2], value) for value in facts.values(*fact[:2]) if value != fact[2]]
+            for text in sorted(str(each) for each in facts_of(others, self.base.names)):
+                yield f"; {text} remains as well, because rules only add values"
 
     def _concluder(self, rule: Rule, atom: Atom, binding: Binding, facts: Facts) -> str:
         """The rule that comes nearest to concluding what is missing, and why it does not."""
-        best: tuple[int, str, str] | None = None
-        for other, start in self._could_conclude(rule, atom, binding):
-            nearest_one, failing = NearestFinder(other, facts, start).find()
-            if failing:
-                first = other.body[failing[0]]
-                reason = describe_failure(self._usable, first, nearest_one, facts)
-                found = (len(failing), other.name, f"{write_atom(first)} fails: {reason}")
-                best = found if best is None or found < best else best
-        return "" if best is None else f"; {best[1]} would conclude it, but its {best[2]}"
-
-    def _could_conclude(self, rule: Rule, atom: Atom, binding: Binding) -> Iterator[tuple[Rule, Binding]]:
-        """Other rules with a head that says what an atom asks for, with the binding with which it does."""
         if atom.kind not in FACT_KINDS:
-            return
+            return ""
         wanted = [bound(term, binding) for term in atom.arguments]
+        found = []
         for other in self._usable.content.enabled_rules:
-            for head in other.head:
-                if other is rule or (head.kind, head.predicate) != (atom.kind, atom.predicate):
-                    continue
+            for head in other.head if other is not rule else ():
                 start = unified(head.arguments, wanted, {})
-                if start is not None:
-                    yield other, start
+                if (head.kind, head.predicate) != (atom.kind, atom.predicate) or start is None:
+                    continue
+                nearest_one, failing = nearest_match(other, facts, start)
+                if failing:
+                    first = other.body[failing[0]]
+                    reason = describe_failure(self._usable, first, nearest_one, facts)
+                    found.append((len(failing), other.name, f"its {write_atom(first)} fails: {reason}"))
+        return "".join(f"; {name} would conclude it, but {why}" for _, name, why in sorted(found)[:1])
 
 
 def _with_languages(known: Iterable[Triple], asserted: Iterable[Triple]) -> list[Triple]:
@@ -428,34 +399,17 @@ def _unequal(base: Ontology, predicate: str, values: list[str | Lit], wanted: st
 
 def _help(base: Ontology, atom: Atom) -> str:
     """Return a remedy if nothing is known of a property or class."""
-    if _only_said_to_exist(base, atom.predicate):
-        name = local_name(atom.predicate)
-        return f"; an axiom says that there is some {name}, but not which, and rules see known individuals only"
     given = _GIVEN_BY_STATES.get(atom.predicate)
     return f"; {given}" if given else ""
 
 
-def _only_said_to_exist(base: Ontology, iri: str) -> bool:
-    """Whether an axiom says that something has a value of a property, but not which."""
-    lines = [line.split(" ", 2) for line in base.content.structure]
-    restricted = {subject for subject, _, value in lines if value.startswith(f"<{iri}>")}
-    return any(subject in restricted and predicate == f"<{OWL}someValuesFrom>" for subject, predicate, _ in lines)
-
-
 def _closed_world(base: Ontology, iri: str) -> Iterator[str]:
     """Constructors in the definition of a class that need a closed world."""
-    children: dict[str, list[tuple[str, str]]] = {}
-    for line in base.content.structure:
-        subject, predicate, value = line.rstrip(" .\n").split(" ", 2)
-        children.setdefault(subject, []).append((predicate.strip("<>"), value))
-    waiting, seen = [f"<{iri}>"], {f"<{iri}>"}
-    while waiting:
-        for predicate, value in children.get(waiting.pop(), ()):
-            if predicate.removeprefix(OWL) in _CLOSED_WORLD:
-                yield local_name(predicate)
-            if value.startswith("_:") and value not in seen:
-                seen.add(value)
-                waiting.append(value)
+    lines = [line.rstrip(" .\n").split(" ", 2) for line in base.content.structure]
+    inside = reached([f"<{iri}>"], [(subject, value) for subject, _, value in lines if value.startswith("_:")])
+    for subject, predicate, _ in lines:
+        if subject in inside and predicate.strip("<>").removeprefix(OWL) in _CLOSED_WORLD:
+            yield local_name(predicate.strip("<>"))
 
 
 def _show(base: Ontology, value: str | Lit | None) -> str:

@@ -249,7 +249,7 @@ class TestLimits:
         assert done.returncode in (2, 3)
         assert "Traceback" not in done.stderr and "Too many open files" in done.stderr
 
-    @pytest.mark.parametrize("option", ["--shapes", "--rules", "--ontology"])
+    @pytest.mark.parametrize("option", ["--rules", "--ontology"])
     def test_a_pipe_in_place_of_a_file_is_not_waited_for(
         self, tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
     ) -> None:

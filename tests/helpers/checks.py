@@ -37,7 +37,7 @@ def found(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -
 def findings_of(subject: Subject) -> tuple[Finding, ...]:
     """What `kb check` finds without a reasoner."""
     sources = collect(subject.given)
-    return ordered([*static_findings(subject, sources), *check_shapes(sources, subject.shapes)])
+    return ordered([*static_findings(subject, sources), *check_shapes(sources)])
 
 
 def errors(findings: tuple[Finding, ...]) -> list[Finding]:

@@ -14,19 +14,13 @@ from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
-from tests.helpers.owl_text import SUAVE, TOMASYS, XSD
+from tests.helpers.owl_text import SUAVE, XSD
 
 SEARCH, MOTION = "f_generate_search_path", "f_maintain_motion"
 HIGH = {"groundings": {SEARCH: "fd_spiral_high"}}
 MEASURED = "hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v)"
 OWL = "http://www.w3.org/2002/07/owl#"
 PROPERTY = f'<owl:DatatypeProperty rdf:about="{SUAVE}depth_class"/>'
-SOME = f"""
-<owl:ObjectProperty rdf:about="{SUAVE}hasMotor"/>
-<owl:Class rdf:about="{TOMASYS}Component"><rdfs:subClassOf><owl:Restriction>
-<owl:onProperty rdf:resource="{SUAVE}hasMotor"/><owl:someValuesFrom rdf:resource="{OWL}Thing"/>
-</owl:Restriction></rdfs:subClassOf></owl:Class>
-"""
 WORKING = f"""
 <owl:Class rdf:about="{SUAVE}Failed"/>
 <owl:Class rdf:about="{SUAVE}Working"><owl:equivalentClass><owl:Class>
@@ -114,13 +108,6 @@ CASES: dict[str, tuple[Any, ...]] = {
         PROPERTY + TAGGED,
         'depth_class(?c, "deep") does not hold: found depth_class "deep"@en, needed "deep"; @en and string never '
         'match, even where they look alike: write "deep"@en',
-    ),
-    "something that only an axiom says to exist": (
-        "r: Component(?c) ^ hasMotor(?c, ?m) -> fd_realisability(fd_spiral_high, false)",
-        {},
-        SOME,
-        "hasMotor(?c, ?m) does not hold: c_thruster_1 has no hasMotor; an axiom says that there is some hasMotor, but "
-        "not which, and rules see known individuals only",
     ),
     "negation as what is not known": (
         "r: Component(?c) ^ Working(?c) -> fd_realisability(fd_spiral_high, false)",

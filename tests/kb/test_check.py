@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.errors import InputError, KnowledgeError
-from suave_des.findings import Level, has_level
+from suave_des.errors import KnowledgeError
+from suave_des.findings import Level
 from suave_des.kb.check import Subject, check, combined, simple_states
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.resources import shipped_folder
-from tests.helpers.checks import SUAVE, TOMASYS, errors, findings_of, found_by_pellet, only, subject
+from tests.helpers.checks import SUAVE, errors, findings_of, found_by_pellet, only, subject
 from tests.helpers.owl_text import individual
 
 
@@ -76,39 +76,6 @@ def test_exact_values_are_reported(tmp_path: Path) -> None:
     assert only(found_by_pellet(tmp_path, rules), "rule A computes with add").level is Level.INFO
 
 
-def test_shapes_of_ones_own(tmp_path: Path) -> None:
-    shapes = tmp_path / "mine.ttl"
-    shapes.write_text(
-        f"@prefix sh: <http://www.w3.org/ns/shacl#> .\n<urn:x> a sh:NodeShape ; sh:targetClass <{TOMASYS}Component> ;\n"
-        f' sh:property [ sh:path <{TOMASYS}typeC> ; sh:minCount 1 ; sh:severity sh:Warning ; sh:message "no class" ] .',
-        encoding="utf-8",
-    )
-    findings = found_by_pellet(tmp_path, shapes=[shapes])
-    assert len([one for one in findings if one.message == "c_thruster_1: typeC: no class"]) == 1
-    assert has_level(findings, Level.WARN)
-    assert not has_level(findings, Level.ERROR)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"@prefix x: <urn:x> .\nfoo\n", "line 2: is not Turtle: expected directive or statement"),
-        (b"<?xml version='1.0'?><rdf:RDF/>", "this is XML, not Turtle"),
-        (b"<urn:a> <urn:b> \xff", "is not UTF-8 text"),
-        (b"@prefix", "is not Turtle"),
-    ],
-)
-def test_shapes_that_cannot_be_read(
-    content: bytes, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    (tmp_path / "bad.ttl").write_bytes(content)
-    with pytest.raises(InputError) as caught:
-        check(Subject(shapes=[tmp_path / "bad.ttl"]))
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert not caplog.records
-
-
 def command(*arguments: str) -> int:
     with pytest.raises(SystemExit) as caught:
         main(["kb", "check", *arguments])
@@ -162,9 +129,7 @@ def test_what_cannot_be_read_exits_with_2(
     assert path.read_text(encoding="utf-8") == content
 
 
-@pytest.mark.parametrize(
-    ("option", "name"), [("--rules", "none.swrl"), ("--shapes", "none.ttl"), ("--ontology", "n.owl")]
-)
+@pytest.mark.parametrize(("option", "name"), [("--rules", "none.swrl"), ("--ontology", "n.owl")])
 def test_missing_files_exit_with_2(option: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(option, name) == 2
     assert "Traceback" not in capsys.readouterr().err

@@ -69,8 +69,7 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
     assert expected
     assert [cycle.t_s for cycle in trial.cycles if cycle.firings] == pytest.approx(expected, abs=1e-6)
     (firing,) = trial.cycles[0].firings
-    assert dict(firing.bindings)["q"] == "obs_water_visibility"
-    assert firing.is_new
+    assert "?q = obs_water_visibility" in firing and "known without it" not in firing
     assert trial.states == len(result.knowledge)
 
 
@@ -80,8 +79,7 @@ def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     lost = [each for cycle in trial.cycles for each in cycle.decisions]
     adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
     assert len(lost) == len(adapted) > 0
-    assert {each.then for each in lost} == {None}
-    assert {each.function for each in lost} == {SEARCH}
+    assert all(each.startswith(f"{SEARCH}: no change instead of fd_") for each in lost)
 
 
 def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
@@ -99,9 +97,9 @@ def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
 
 def test_a_folder_of_missions_is_tried_one_by_one(mission, command):
     folder, _ = mission
-    status, printed, _ = command("try", NEAR, "--on", folder.parent, "--format", "json")
+    status, printed, _ = command("try", NEAR, "--on", folder.parent)
     assert status == 0
-    assert [each["folder"] for each in json.loads(printed)] == [str(folder)]
+    assert printed.startswith(f"{folder}: fires in ")
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from enum import StrEnum
 from functools import partial
@@ -12,15 +13,12 @@ import typer
 
 from suave_des.cli.console import errors
 from suave_des.cli.kb.options import (
-    AsFormat,
     At,
-    Format,
     KnowledgeOptions,
     MaxFailed,
     ReasonerOptions,
     TimeLimitS,
     counting_states,
-    emit,
     shown,
     state_at,
 )
@@ -33,22 +31,49 @@ if TYPE_CHECKING:
     from suave_des.knowledge.state import Reasoning
 
 
-def infer(options: ReasonerOptions, at: At = None, form: AsFormat = Format.TEXT) -> None:
+class Format(StrEnum):
+    """Output format."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+class TableFormat(StrEnum):
+    """How to print a table."""
+
+    TEXT = "text"
+    CSV = "csv"
+    JSON = "json"
+
+
+def infer(
+    options: ReasonerOptions,
+    at: At = None,
+    form: Annotated[Format, typer.Option("--format", help="Output format: text or JSON.")] = Format.TEXT,
+) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     knowledge = options.knowledge()
     reasoning = knowledge.infer(state_at(at, knowledge))
-    plan = [
-        {
-            "function": decision.function,
-            "design": decision.design,
-            "reason": decision.reason,
-            "rejected": {rejection.design: rejection.reason for rejection in decision.rejected},
-        }
-        for decision in reasoning.plan.decisions
-    ]
-    inferred = sorted(map(str, reasoning.inference.facts))
-    content = {"state": reasoning.inference.state, "inferred": inferred, "plan": plan}
-    emit(content, form, partial(_inference_lines, reasoning))
+    if form is Format.JSON:
+        from suave_des.kb.states import state_dict
+
+        plan = [
+            {
+                "function": decision.function,
+                "design": decision.design,
+                "reason": decision.reason,
+                "rejected": {rejection.design: rejection.reason for rejection in decision.rejected},
+            }
+            for decision in reasoning.plan.decisions
+        ]
+        inferred = sorted(map(str, reasoning.inference.facts))
+        _print_json({"state": state_dict(reasoning.inference.state), "inferred": inferred, "plan": plan})
+    else:
+        print(*_inference_lines(reasoning), sep="\n")
+
+
+def _print_json(content: object) -> None:
+    print(json.dumps(content, indent=2, ensure_ascii=False))
 
 
 def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
@@ -82,12 +107,10 @@ def explain(
         ),
     ] = "",
     at: At = None,
-    form: AsFormat = Format.TEXT,
 ) -> None:
     """Explain why a fact follows in a state, why a design is chosen or not, or why the state contradicts itself."""
     knowledge = options.knowledge()
-    explanation = knowledge.explain(state_at(at, knowledge), question)
-    emit(explanation, form, explanation.lines)
+    print(knowledge.explain(state_at(at, knowledge), question))
 
 
 def policy(
@@ -120,14 +143,6 @@ def policy(
     print(*found.lines(), sep="\n")
 
 
-class TableFormat(StrEnum):
-    """How to print a table."""
-
-    TEXT = "text"
-    CSV = "csv"
-    JSON = "json"
-
-
 def query(
     options: ReasonerOptions,
     text: Annotated[
@@ -149,7 +164,7 @@ def query(
     for name in found.unknown:
         errors().print(f"suave-des: the knowledge base does not have {name}")
     if form is TableFormat.JSON:
-        emit([dict(zip(found.columns, row, strict=True)) for row in found.rows], Format.JSON, list)
+        _print_json([dict(zip(found.columns, row, strict=True)) for row in found.rows])
     elif form is TableFormat.CSV:
         print(csv_text(found.columns, found.rows), end="")
     else:
@@ -168,7 +183,6 @@ def why_not(
         typer.Option("--fact", metavar="FACT", help='Additional fact to assert, such as "Binding(b1)".'),
     ] = None,
     time_limit: TimeLimitS = 60.0,
-    form: AsFormat = Format.TEXT,
 ) -> None:
     """Show why a rule does not fire: the first atom that fails, the value found and the value needed.
 
@@ -188,4 +202,4 @@ def why_not(
         for name in names or questions.names
     ]
     answers = [answer for answer in answers if names or not answer.fires]
-    emit(answers, form, lambda: list(map(str, answers)) or ["all rules fire"])
+    print("\n".join(map(str, answers)) or "all rules fire")

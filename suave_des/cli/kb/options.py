@@ -1,16 +1,13 @@
-"""Share options among the `kb` commands, and print results as text or JSON."""
+"""Share options among the `kb` commands."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from decimal import Decimal
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -31,14 +28,6 @@ _SECONDS_EACH = {"owlready2": 1.0}
 _LONG_S = 5.0
 
 
-class Format(StrEnum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
-
-
-AsFormat = Annotated[Format, typer.Option("--format", help="Output format: text or JSON.")]
 TimeLimitS = Annotated[
     float,
     typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit of the reasoner for a state, in seconds."),
@@ -143,33 +132,3 @@ def shown(table: Table) -> str:
     console = output()
     width = console.width if console.is_terminal or "COLUMNS" in os.environ else None
     return f"{table.title}\n{table.text(width)}\n" if table.title else table.text(width)
-
-
-def emit(content: object, form: Format, lines: Callable[[], Iterable[str]]) -> None:
-    """Print a result: its content as JSON, or its lines.
-
-    In JSON dataclasses are objects, states are as in state files, facts and exact numbers are text.
-    """
-    if form is Format.JSON:
-        print(json.dumps(_plain(content), indent=2, ensure_ascii=False))
-    else:
-        for line in lines():
-            print(line)
-
-
-def _plain(value: Any) -> Any:
-    from suave_des.kb.states import state_dict
-    from suave_des.knowledge.state import Fact, KnowledgeState
-
-    if isinstance(value, KnowledgeState):
-        return state_dict(value)
-    if isinstance(value, Fact | Path | Decimal):
-        return str(value)
-    if dataclasses.is_dataclass(value):
-        value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
-    elif hasattr(value, "_asdict"):
-        value = value._asdict()
-    if isinstance(value, Mapping):
-        bindings = {name: str(each) for name, each in value.get("bindings", ())}
-        return {key: bindings if key == "bindings" else _plain(each) for key, each in value.items()}
-    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+import json
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb.options import AsFormat, Format, KnowledgeOptions, OtherScenario, TimeLimitS, emit
+from suave_des.cli.kb.options import KnowledgeOptions, OtherScenario, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, Modes, Reasoner
-from suave_des.errors import number_of
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.kb.replay import MissionReplay
     from suave_des.knowledge.ontology import Ontology
 
 FOUND = 1
@@ -43,10 +41,6 @@ class FailOn(StrEnum):
 def check(
     options: KnowledgeOptions,
     modes: Modes = None,
-    shapes: Annotated[
-        list[Path] | None,
-        typer.Option("--shapes", metavar="FILE", help="Additional SHACL shapes, in Turtle."),
-    ] = None,
     fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")] = (
         FailOn.ERROR
     ),
@@ -64,27 +58,27 @@ def check(
     from suave_des.scenario_knowledge import subject_of
 
     loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
-    findings = run_checks(replace(subject_of(loaded), shapes=shapes or (), time_limit_s=time_limit))
+    findings = run_checks(replace(subject_of(loaded), time_limit_s=time_limit))
     useless = (Finding(Level.WARN, words, shown_name(loaded.path)) for words in loaded.scenario.without_effect())
     findings = ordered([*findings, *useless])
     if form is FindingsFormat.MARKDOWN:
         rows = [(each.level, each.where, each.message, each.remedy or "") for each in findings]
-        print(
-            Table(("level", "where", "what", "remedy"), rows, align="llll").markdown(), "", summary(findings), sep="\n"
-        )
+        print(Table(("level", "where", "what", "remedy"), rows, align="llll").markdown(), "", sep="\n")
+    elif form is FindingsFormat.JSON:
+        print(json.dumps(list(map(asdict, findings)), indent=2, ensure_ascii=False))
     else:
-        emit(findings, Format(form), lambda: (*map(str, findings), summary(findings)))
+        print(*map(str, findings), sep="\n", end="\n" * bool(findings))
+    if form is not FindingsFormat.JSON:
+        print(summary(findings))
     if has_level(findings, Level(fail_on.upper())):
         raise typer.Exit(FOUND)
 
 
-def rules(options: KnowledgeOptions, form: AsFormat = Format.TEXT) -> None:
+def rules(options: KnowledgeOptions) -> None:
     """List all rules as text, in the format that --rules reads."""
     from suave_des.scenario_knowledge import open_base
 
-    base = open_base(options.loaded())
-    content = [{"name": r.name, "enabled": r.enabled, "file": r.file, "text": r.text} for r in base.rules]
-    emit(content, form, lambda: rules_text(base).splitlines())
+    print(rules_text(open_base(options.loaded())), end="")
 
 
 def rules_text(base: Ontology) -> str:
@@ -170,14 +164,13 @@ def try_(
     disable: Annotated[
         str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
     ] = None,
-    form: AsFormat = Format.TEXT,
 ) -> None:
     """Show when a rule would have fired in recorded missions, and which decisions would have been different.
 
     No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
     the consequences of a different decision.
     """
-    from suave_des.kb.replay import try_rules
+    from suave_des.kb.replay import summary, try_rules
 
     replayed = try_rules(
         on,
@@ -191,20 +184,4 @@ def try_(
         reasoner=options.reasoner,
         limit_s=options.time_limit,
     )
-    missions = list(replayed)
-    emit(missions, form, lambda: _replay_lines(missions))
-
-
-def _replay_lines(missions: Sequence[MissionReplay]) -> Iterator[str]:
-    for mission in missions:
-        if mission.cycles or len(missions) == 1:
-            yield from mission.lines()
-    if len(missions) > 1:
-        cycles = [mission.cycles for mission in missions]
-        firing = sum(any(each.firings for each in one) for one in cycles)
-        changed = [sum(len(each.decisions) for each in one) for one in cycles]
-        contradictions = sum(any(each.contradiction for each in one) for one in cycles)
-        yield (
-            f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
-            f"({number_of(sum(changed), 'decision')}), contradictions in {contradictions}"
-        )
+    print(*summary(list(replayed)), sep="\n")

@@ -34,7 +34,6 @@ class Subject:
         rules: files of rules as text.
         disabled_rules: names of rules to disable.
         values: replaces the hasValue of named QAvalue individuals.
-        shapes: files of SHACL shapes, in addition to the shipped ones.
         modes: names of the modes by function; None skips the checks against them.
         needed: functions that the mission cannot do without.
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
@@ -49,7 +48,6 @@ class Subject:
     rules: Sequence[Path] = ()
     disabled_rules: Collection[str] = ()
     values: Mapping[str, Decimal] = field(default_factory=dict)
-    shapes: Sequence[Path] = ()
     modes: Mapping[str, Collection[str]] | None = None
     needed: Collection[str] = ()
     operators: Mapping[str, str] = field(default_factory=dict)

@@ -16,7 +16,7 @@ from rdflib.term import Node
 from suave_des.errors import InputError
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import OWL, SWRL, SWRLA, SWRLB, XSD, Lit, RdfTriple, literal, local_name
+from suave_des.knowledge.rdf import IS_QA_TYPE, OWL, SWRL, SWRLA, SWRLB, XSD, Lit, RdfTriple, literal, local_name
 from suave_des.knowledge.rules import (
     DIFFERENT,
     EXPRESSION,
@@ -132,17 +132,19 @@ def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Ru
 def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
     kinds: tuple[str, ...] = ("class", "object property", "data property", "builtin")
     predicate = _iri(atom.predicate, atom.place(), vocabulary, file, kinds)
-    arguments = tuple(
-        Named(_iri(term.iri, atom.place(number), vocabulary, file, ("individual",), _not_a_name(term.iri, number)))
-        if isinstance(term, Named)
-        else term
-        for number, term in enumerate(atom.arguments)
-    )
+
+    def named(number: int, word: str) -> Named:
+        otherwise = _not_a_name(word, number, predicate)
+        return Named(_iri(word, atom.place(number), vocabulary, file, ("individual",), otherwise))
+
+    arguments = tuple(named(n, term.iri) if isinstance(term, Named) else term for n, term in enumerate(atom.arguments))
     return replace(atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments)
 
 
-def _not_a_name(word: str, number: int) -> str:
+def _not_a_name(word: str, number: int, predicate: str) -> str:
     """Say how to write what is perhaps no individual's name, but a truth value, a text or a variable."""
+    if predicate == IS_QA_TYPE and number == 1:
+        return f"declare it: an individual {word} of QualityAttributeType"
     if word in ("True", "False"):
         return f"write {word.lower()}"
     return f"write ?{word} for a variable" if number == 0 else f'write "{word}" for a text, ?{word} for a variable'
