@@ -66,10 +66,14 @@ CHANGES = (
     ),
     Change("the same (8)", "", {"calibration.heading_frequency_rad_per_s": 8.0}),
     Change(
-        "first failure without effect: before 30 s, and later 25% (all have one)",
-        "none in 2025: five of five with failures at 24.8 s, and six of 25 with later ones, go on as if only the second"
-        " had happened",
-        {f"{FAILURES}.effective_from_s": 0.0, f"{FAILURES}.loss_probability": 0.0},
+        "failed thrusters keep their thrust (are dead)",
+        "autopilot and simulator: an output without a function keeps its last signal",
+        {f"{FAILURES}.failure_mode": "dead"},
+    ),
+    Change(
+        "failures before 26 s without effect (with one)",
+        "none in 2025: missions with failures at 25 and 26 s go on as if only the second had happened",
+        {f"{FAILURES}.effective_from_s": 0.0},
     ),
     Change(
         "lost set-points: 1% (none)",

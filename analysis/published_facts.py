@@ -1,7 +1,7 @@
 """What the published runs themselves show: how fast missions follow, when the search ends, and which failures are lost.
 
 Three mechanisms rest on these figures (docs/background/fidelity.md): the reasoner slows the simulator down, the search
-begins some time after its first activation, and a mission's first failure may be without effect. Writes speeds.csv,
+begins some time after its first activation, and early failures are without effect. Writes speeds.csv,
 search_times.csv, and failures.csv, which has simulated missions too.
 
     python analysis/published_facts.py [--out DIR]
@@ -20,8 +20,8 @@ SLOW_M_PER_S = 0.26
 """Missions without a dead thruster mostly follow at 0.27 to 0.28 m/s."""
 RUNS = {2023: "seams2023_runs.csv", 2025: "planta_exp1_runs.csv"}
 
-DEAD = {"both": (1, 3), "first": (1,), "second": (3,), "neither": ()}
-"""The thrusters that fail in 2025, one second apart; and which of them are dead if the other failure is lost."""
+FAILED = {"both": (1, 3), "first": (1,), "second": (3,), "neither": ()}
+"""The thrusters that fail in 2025, one second apart; and which of them do if the other failure is lost."""
 MISSIONS = 12
 
 
@@ -56,25 +56,27 @@ def search_times() -> pandas.DataFrame:
 
 
 def failures() -> pandas.DataFrame:
-    """Compare none's missions under each condition of 2025 with simulated ones in which some thrusters are dead.
+    """Compare none's missions under each condition of 2025 with simulated ones in which some of its failures happen.
 
     Returns:
-        A row for each condition and set of dead thrusters, "real" for the published missions: medians of search time,
-        s, and speed of following, m/s.
+        A row for each condition, set of failures and failure mode, "real" for the published missions: medians of search
+        time, s, and speed of following, m/s.
     """
     runs, loaded, rows = read(2025).query("manager == 'none'"), load_scenario("planta_exp1"), []
     for condition, real in runs.groupby("condition"):
         start_y_m, time_s = real[["nominal_y_m", "failure_time_s"]].iloc[0]
-        rows.append({"condition": condition, "dead": "real", **_medians(real)})
-        for dead, thrusters in DEAD.items():
+        rows.append({"condition": condition, "failed": "real", "mode": "", **_medians(real)})
+        for failed, thrusters in FAILED.items():
             events = [{"thruster": thruster, "event": "failure", "time_s": time_s} for thruster in thrusters]
-            effective = {"effective_from_s": 0.0, "loss_probability": 0.0}
-            values = {"thruster_events": events, "start.y_m": start_y_m, "revision.thruster_failures": effective}
-            simulator = Simulator(with_values(loaded, values))
-            missions = pandas.DataFrame(simulator.run("none", run, seed=1).metrics for run in range(1, MISSIONS + 1))
-            followed_s = simulator.loaded.scenario.mission.time_limit_s - missions["search_time_s"]
-            missions["speed_m_per_s"] = missions["distance_inspected_m"] / followed_s
-            rows.append({"condition": condition, "dead": dead, **_medians(missions)})
+            for mode in ("frozen", "dead") if thrusters else ("none",):
+                how = {"effective_from_s": 0.0, "failure_mode": "frozen" if mode == "none" else mode}
+                values = {"thruster_events": events, "start.y_m": start_y_m, "revision.thruster_failures": how}
+                simulator = Simulator(with_values(loaded, values))
+                metrics = (simulator.run("none", run, seed=1).metrics for run in range(1, MISSIONS + 1))
+                missions = pandas.DataFrame(metrics)
+                followed_s = simulator.loaded.scenario.mission.time_limit_s - missions["search_time_s"]
+                missions["speed_m_per_s"] = missions["distance_inspected_m"] / followed_s
+                rows.append({"condition": condition, "failed": failed, "mode": mode, **_medians(missions)})
     return pandas.DataFrame(rows)
 
 

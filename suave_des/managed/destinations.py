@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 
 import simpy
 
-from suave_des.clock import Process
-from suave_des.domain import SURFACE_Z_M
+from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.managed.node import ProcessNode, SetPointSender
+from suave_des.monitor.measurements import BatteryMeasurements
+from suave_des.scenario.physical import Battery
 
 ABOVE_M = 3.0
 """Height of the set-point above the surface: an autopilot that stops short of it still surfaces."""
@@ -22,21 +24,29 @@ RESEND_CHECKS = 20
 
 @dataclass(eq=False)
 class GenerateRechargePath(ProcessNode):
-    """The recharge function: while active, the station is the set-point, sent again once a period.
+    """The recharge function: while active, at each tick a docked vehicle is recharged, and the station is sent.
 
     Attributes:
-        station_m: x, y and z of the recharge station.
+        station: where the recharge station is, and how often the timer ticks.
+        level: the battery's.
+        phase_s: mission time of a tick.
     """
 
     sender: SetPointSender
-    station_m: tuple[float, float, float]
-    resend_period_s: float
+    station: Battery
+    level: BatteryMeasurements
+    phase_s: float
 
     def activity(self) -> Process:
-        """Go to the station."""
+        """Go to the station, and recharge there."""
+        station, z_m = self.station, SEA_BED_Z_M + self.station.approach_altitude_m
+        yield until(self.env, tick_at_or_after(self.env.now, self.phase_s, station.docking_check_period_s))
         while True:
-            self.sender.send(*self.station_m)
-            yield self.env.timeout(self.resend_period_s)
+            x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
+            if max(abs(x_m - station.station_x_m), abs(y_m - station.station_y_m)) <= station.station_radius_m:
+                self.level.recharge(self.env.now)
+            self.sender.send(station.station_x_m, station.station_y_m, z_m)
+            yield self.env.timeout(station.docking_check_period_s)
 
 
 @dataclass(eq=False)

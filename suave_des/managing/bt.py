@@ -177,7 +177,7 @@ class BehaviourTree(ManagingSubsystem):
 
 
 class ExtendedBehaviourTree(BehaviourTree):
-    """bt_extended: the same, but with a low battery the vehicle goes to recharge first."""
+    """bt_extended: the same, but with a low battery the vehicle goes to recharge; the way there then stays active."""
 
     @property
     def depends_on(self) -> Dependencies:
@@ -188,10 +188,10 @@ class ExtendedBehaviourTree(BehaviourTree):
         """Make the tree; without a battery there is no station to go to."""
         if self.system.scenario.battery is None:
             return super().make_tree()
-        # Once under way, the vehicle continues until the level has risen: the station recharges the battery at once.
-        go = Behaviour("->", "low", (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
-        stay = self._set(GENERATE_RECHARGE_PATH, UNGROUND_MODE)
-        return Behaviour("=>", "mission", (*self._branches(), Behaviour("?", GENERATE_RECHARGE_PATH, (go, stay))))
+        # A guard on the level halts the exemplar's sequence as soon as the battery is full, before the last step, which
+        # would make the function inactive: it goes on sending the station, whatever else is done.
+        go = Behaviour("->", GENERATE_RECHARGE_PATH, (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
+        return Behaviour("=>", "mission", (*self._branches(), go))
 
     def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
         if self.system.scenario.battery is not None and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):

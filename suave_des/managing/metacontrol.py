@@ -6,7 +6,6 @@ design's name. Source of what revisions do differently: kas-lab/suave with its r
 """
 
 from collections.abc import Callable, Collection, Hashable
-from functools import partial
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
@@ -25,7 +24,7 @@ from suave_des.knowledge.state import (
 )
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
-from suave_des.scenario.quantities import draw
+from suave_des.scenario.quantities import draw, support
 from suave_des.scenario.revision import MetacontrolRevision
 
 _cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = WeakKeyDictionary()
@@ -74,10 +73,7 @@ class Metacontrol(ManagingSubsystem):
         self._recorded_statuses: frozenset[str] = frozenset()
         self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
         self._awaited = self._attributes_to_await()
-        latency, stream = scenario.latencies.inference_s, "metacontrol/inference"
-        self._latency_s: float | Callable[[], float] = (  # a number, or what draws one
-            latency if isinstance(latency, float) else partial(draw, latency, system.stream(stream))
-        )
+        self._longest_s = support(scenario.latencies.inference_s)[1]
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_tick_s("metacontrol", self.period_s)
         bridge_s = revision.task_bridge_period_s
@@ -96,13 +92,13 @@ class Metacontrol(ManagingSubsystem):
         reasoning = self._analyze_and_plan()
         if self.system.recorded:
             self.system.log_state(reasoning.inference.state)
-        latency_s = self._latency_s
-        if callable(latency_s):
-            return self.execute(reasoning, latency_s())
         # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
-        if latency_s < self.period_s and self._changes_nothing(reasoning):
+        if self._longest_s < self.period_s and self._changes_nothing(reasoning):
             return None
-        return self.execute(reasoning, latency_s)
+        latency = self.system.scenario.latencies.inference_s
+        if not isinstance(latency, float):  # from the cycle's own stream: a recorded mission goes through more cycles
+            latency = draw(latency, self.system.stream(f"metacontrol/inference/{self.system.now_s}"))
+        return self.execute(reasoning, latency)
 
     def monitor(self) -> None:
         """Read the measured values; components report by themselves, see `diagnostic`."""

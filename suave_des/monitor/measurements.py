@@ -223,21 +223,18 @@ def _crossings(values: bytes, thresholds: Thresholds) -> list[int]:
 
 @dataclass(eq=False)
 class BatteryMeasurements(Measurements):
-    """The battery's level, which falls linearly from 1 and is reset to 1 at the recharge station.
-
-    It is computed on demand, from where the vehicle was at each message.
+    """The battery's level, which falls linearly from 1 until it is recharged; computed on demand.
 
     Attributes:
-        is_at_station: whether the vehicle is at the station at a mission time.
         discharge_time_s: time from full to empty.
         timing: when it is measured.
         noise: draws the error of one measurement; None: there is none.
         is_lost: says which messages are not published; None: all are.
-        recharges: number of visits to the station so far.
+        recharges: how often it was recharged so far.
+        listeners: each is called when it has been recharged.
     """
 
     are_known: ClassVar[bool] = False
-    is_at_station: Callable[[float], bool]
     discharge_time_s: float
     timing: Timing
     noise: Callable[[], float] | None = None
@@ -246,8 +243,8 @@ class BatteryMeasurements(Measurements):
     times_s: list[float] = field(default_factory=list, init=False)
     values: list[float] = field(default_factory=list, init=False)
     recharges: int = field(default=0, init=False)
+    listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
     _full_at_s: float = field(default=0.0, init=False)
-    _was_at_station: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self._next_s = self.timing.phase_s
@@ -255,16 +252,24 @@ class BatteryMeasurements(Measurements):
     def count_until(self, t_s: float) -> int:
         """Count the values published by mission time t, which must not lie in the future."""
         while self._next_s <= t_s:
-            if at_station := self.is_at_station(self._next_s):
-                self._full_at_s = self._next_s
-                self.recharges += not self._was_at_station
-            self._was_at_station = at_station
-            error = 0.0 if self.noise is None else self.noise()
-            if self.is_lost is None or not self.is_lost(self._next_s):
-                self.times_s.append(self._next_s)
-                self.values.append(self._level(self._next_s) + error)
+            self._measure(self._next_s)
             self._next_s += self.timing.period_s
         return super().count_until(t_s)
+
+    def recharge(self, t_s: float) -> None:
+        """Fill the battery now, and publish its level."""
+        self.count_until(t_s)
+        self._full_at_s = t_s
+        self.recharges += 1
+        self._measure(t_s)
+        for listener in self.listeners:
+            listener()
+
+    def _measure(self, t_s: float) -> None:
+        error = 0.0 if self.noise is None else self.noise()
+        if self.is_lost is None or not self.is_lost(t_s):
+            self.times_s.append(t_s)
+            self.values.append(self._level(t_s) + error)
 
     def level(self, t_s: float) -> float:
         """Compute the true level at mission time t, which is now."""
@@ -277,8 +282,8 @@ class BatteryMeasurements(Measurements):
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         """Find the earliest time after t, which is now, at which the level can be in a different region.
 
-        The level falls, or is back at 1 at once. In the region that 1 is in, only falling leads to another one; waiting
-        until then saves a fifth of the CPU time of a mission of bt_extended.
+        In the region that 1 is in, only falling leads to another one; waiting until then saves a fifth of the CPU time
+        of a mission of bt_extended.
         """
         region = self.region(t_s, thresholds)
         if self.noise is not None or region != region_of(1.0, thresholds):
@@ -288,12 +293,18 @@ class BatteryMeasurements(Measurements):
         return max(self._next_s, self._full_at_s + falls_s - self.timing.period_s)
 
     def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
-        """Publish the level once a period, unless the message is lost."""
+        """Publish the level once a period, and when it has been recharged, unless the message is lost."""
         published_before = 0
-        yield until(env, self.timing.phase_s)
-        while True:
+
+        def report() -> None:
+            nonlocal published_before
             published = self.count_until(env.now)
             if published > published_before:
                 bus.publish(Diagnostic(env.now, Kind.QA_STATUS, self.key, self.values[published - 1]))
             published_before = published
+
+        self.listeners.append(report)
+        yield until(env, self.timing.phase_s)
+        while True:
+            report()
             yield env.timeout(self.timing.period_s)

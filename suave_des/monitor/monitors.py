@@ -14,7 +14,6 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
 from suave_des.vehicle.model import Pose
-from suave_des.vehicle.vehicle import Vehicle
 from suave_des.world import signals
 from suave_des.world.signals import Signal
 
@@ -43,20 +42,15 @@ def measure_signals(loaded: LoadedScenario, draws: Draws, duration_s: float) -> 
         yield SignalMeasurements.of(name, signal, duration_s, timing, described.time_step_s, noise, lost)
 
 
-def measure_battery(scenario: Scenario, draws: Draws, vehicle: Vehicle) -> BatteryMeasurements | None:
+def measure_battery(scenario: Scenario, draws: Draws) -> BatteryMeasurements | None:
     """Make the measurements of the battery's level in a run; None without a battery."""
     battery = scenario.battery
     if battery is None:
         return None
-
-    def is_at_station(t_s: float) -> bool:
-        x_m, y_m, _ = vehicle.position(t_s)
-        return max(abs(x_m - battery.station_x_m), abs(y_m - battery.station_y_m)) <= battery.station_radius_m
-
     timing = Timing.of(scenario, draws, "battery_monitor", battery.publishing_period_s)
     noise = None if battery.noise == 0.0 else draws.each_time("battery.noise", battery.noise)
     lost = message_loss("battery", battery, draws)
-    return BatteryMeasurements(is_at_station, battery.discharge_time_s, timing, noise, lost)
+    return BatteryMeasurements(battery.discharge_time_s, timing, noise, lost)
 
 
 def start_monitors(

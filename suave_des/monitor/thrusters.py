@@ -25,8 +25,7 @@ class Thrusters:
     Attributes:
         env: the mission's clock.
         vehicle: the vehicle.
-        revision: says how they fail, and whether a mission's first failure may have no effect.
-        draws: of the run.
+        revision: says how they fail, and from when on.
         log: adds an event to the mission's record.
         unrecoverable: thrusters that f_maintain_motion cannot recover at present.
         working: mission times at which thrusters failed or recovered, and how many worked from then on.
@@ -35,18 +34,14 @@ class Thrusters:
     env: simpy.Environment
     vehicle: Vehicle
     revision: ThrusterFailureRevision
-    draws: Draws
     log: Callable[[str, str, str], None]
     unrecoverable: set[int] = field(default_factory=set, init=False)
     working: list[tuple[float, int]] = field(default_factory=list, init=False)
-    _had_failure: bool = field(default=False, init=False)
 
     def apply(self, event: ThrusterEvent) -> None:
         """Let one of the scenario's events happen to the vehicle now."""
         fails = event.event == "failure"
-        is_first_failure = fails and not self._had_failure
-        self._had_failure |= fails
-        if is_first_failure and self._has_no_effect():
+        if fails and self.env.now < self.revision.effective_from_s:
             self.log("thruster_monitor", "failure_without_effect", THRUSTER_NAMES[event.thruster - 1])
             return
         if fails and not event.recoverable:
@@ -65,13 +60,6 @@ class Thrusters:
     def _set(self, thruster: int, state: ThrusterState) -> None:
         self.vehicle.set_thruster(self.env.now, thruster, state)
         self.working.append((self.env.now, self.vehicle.thrusters.count("works")))
-
-    def _has_no_effect(self) -> bool:
-        """Decide whether the mission's first failure, which happens now, has no effect on the vehicle."""
-        if self.env.now < self.revision.effective_from_s:
-            return True
-        probability = self.revision.loss_probability
-        return probability > 0.0 and self.draws.stream("thruster_failures").random() < probability
 
 
 def draw_schedule(scenario: Scenario, draws: Draws) -> list[tuple[ThrusterEvent, float]]:

@@ -385,7 +385,7 @@ class Scenario(Strict):
     def without_effect(self) -> Iterator[str]:
         """Yield what changes no mission, and why, in words: a failure that comes too early, or what comes too late."""
         monitors, earliest_s, latest_s = self.revision.monitors, 0.0, 0.0
-        had_failure, effective_s = False, self.revision.thruster_failures.effective_from_s
+        effective_s = self.revision.thruster_failures.effective_from_s
         times_s: dict[str, float] = {}
         for number, event in enumerate(self.thruster_events):
             low_s, high_s = (max(0.0, bound) for bound in support(event.time_s))
@@ -394,11 +394,9 @@ class Scenario(Strict):
             earliest_s = max(earliest_s, low_s)
             latest_s = max(latest_s, high_s) + monitors.thruster_check_period_s
             times_s[f"thruster_events.{number}"] = earliest_s
-            if event.event == "failure" and not had_failure:
-                had_failure = True
-                if latest_s <= effective_s:
-                    key = "revision.thruster_failures.effective_from_s"
-                    yield f"thruster_events.{number}: the first failure has no effect before {effective_s:g} s ({key})"
+            if event.event == "failure" and latest_s <= effective_s:
+                key = "revision.thruster_failures.effective_from_s"
+                yield f"thruster_events.{number}: failures have no effect before {effective_s:g} s ({key})"
         later = {f"signals.{name}": each.time_s for name, each in self.signals.items() if each.kind == "step"}
         later |= {} if self.leak is None else {"leak": self.leak.time_s}
         times_s |= {key: support(time_s)[0] for key, time_s in later.items()}

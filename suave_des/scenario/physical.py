@@ -304,7 +304,7 @@ class Battery(Monitor):
     """Altitude above the sea bed at which the station is approached."""
     mission_ends_at_level: Annotated[Real, Field(ge=0, lt=1)] | None = None
     """Level at which the mission ends; by default it continues with an empty battery."""
-    resend_period_s: Period = 10.0
+    docking_check_period_s: Period = 5.0
     """Period at which the station is sent to the autopilot again."""
 
 

@@ -16,7 +16,6 @@ from suave_des.scenario.quantities import (
     OffsetDistribution,
     Period,
     Real,
-    Share,
     Strict,
     Within,
     support,
@@ -110,14 +109,12 @@ class MonitorsRevision(Strict):
 
 
 class ThrusterFailureRevision(Strict):
-    """How thrusters fail; and whether a mission's first failure affects the vehicle. Later ones always do."""
+    """How thrusters fail; a failure is published in any case."""
 
-    failure_mode: Literal["frozen", "dead"] = "dead"
+    failure_mode: Literal["frozen", "dead"] = "frozen"
     """What a failed thruster does, unless its event says so: `frozen` keeps its last thrust, `dead` gives none."""
     effective_from_s: NotNegative = 0.0
-    """Before this mission time, the first failure has no effect."""
-    loss_probability: Share = 0.0
-    """Probability that the first failure has no effect after that time."""
+    """Before this mission time, failures have no effect."""
 
 
 class SetPointRevision(Strict):
@@ -188,7 +185,7 @@ class Revision(Strict):
     monitors: MonitorsRevision
     """Monitors and detection."""
     thruster_failures: ThrusterFailureRevision = ThrusterFailureRevision()
-    """How thrusters fail; and whether a mission's first failure, published in any case, affects the vehicle."""
+    """How thrusters fail."""
     set_points: SetPointRevision
     """How set-points reach the autopilot."""
     random: RandomRevision

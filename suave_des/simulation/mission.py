@@ -127,10 +127,10 @@ class Mission:
         self._start_m, self._origin_m = draw_start(draws)
         self._track = prepared.take_track()
         self._vehicle = prepared.make_vehicle(draws, self._start_m, self._track, manager_type.needs_knowledge)
-        self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, draws, recorder.log)
+        self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, recorder.log)
         signals = {each.key: each for each in measure_signals(loaded, draws, prepared.duration_s)}
         self._visibility = signals[WATER_VISIBILITY]
-        self._battery = measure_battery(described, draws, self._vehicle)
+        self._battery = measure_battery(described, draws)
         self._battery_only: Mapping[str, Measurements] = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
         self._measurements: Mapping[str, Measurements] = {**signals, **self._battery_only}
 
@@ -167,6 +167,8 @@ class Mission:
         )
         self._host = ManagerHost(manager_type, system, self.bus, self._error_of, learned, prepared.training is not None)
         self.manager = self._host.manager
+        if self._battery is not None:
+            self._battery.listeners.append(self._host.state_changed)
         self._start_processes()
 
     # Advancing.
@@ -358,10 +360,10 @@ class Mission:
             env, sender(domain.FOLLOW_PIPELINE), revision.follow, self._prepared.path, self._detector
         )
         nodes[domain.FOLLOW_PIPELINE] = self._follow
-        if (battery := described.battery) is not None:
-            station_m = battery.station_x_m, battery.station_y_m, domain.SEA_BED_Z_M + battery.approach_altitude_m
+        if self._battery is not None and (station := described.battery) is not None:
             recharge = domain.GENERATE_RECHARGE_PATH
-            nodes[recharge] = GenerateRechargePath(env, sender(recharge), station_m, battery.resend_period_s)
+            phase_s = draws.phase(recharge, station.docking_check_period_s)
+            nodes[recharge] = GenerateRechargePath(env, sender(recharge), station, self._battery, phase_s)
         self._surface = None if described.leak is None else Surface(env, sender(domain.SURFACE))
         if self._surface is not None:
             nodes[domain.SURFACE] = self._surface

@@ -114,7 +114,7 @@ def with_battery(level: float | None = None) -> AtWork:
 @pytest.mark.parametrize("level", [None, 1.0, 0.25])
 def test_with_enough_battery_it_searches(level: float | None) -> None:
     asked = dict(with_battery(level).adapt())
-    assert (asked[SEARCH], asked[RECHARGE]) == ("fd_spiral_high", "fd_unground")
+    assert asked[SEARCH] == "fd_spiral_high" and RECHARGE not in asked
 
 
 def test_with_a_low_battery_it_goes_to_recharge() -> None:
@@ -128,12 +128,12 @@ def test_recharging_still_recovers_thrusters() -> None:
     assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
 
 
-def test_recharged_it_goes_on() -> None:
+def test_recharged_it_goes_on_and_the_way_to_the_station_stays_active() -> None:
     at_work = with_battery(0.2)
     at_work.adapt()
     at_work.measured("battery_level", 1.0)
     asked = dict(at_work.adapt())
-    assert (asked[SEARCH], asked[RECHARGE]) == ("fd_spiral_high", "fd_unground")
+    assert asked[SEARCH] == "fd_spiral_high" and RECHARGE not in asked
 
 
 def test_following_is_interrupted_by_a_low_battery_too() -> None:

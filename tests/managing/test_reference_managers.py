@@ -4,6 +4,7 @@ import pytest
 
 from suave_des import InputError, load_scenario, run_campaign, run_mission
 from suave_des.registry import is_built_in, manager_class
+from suave_des.scenario.quantities import support
 from tests.helpers.managers_at_work import AtWork
 
 SEARCH = "f_generate_search_path"
@@ -47,8 +48,8 @@ def test_threshold_adapts_at_metacontrols_times(scenario: str) -> None:
         next(t_s for t_s, detail in requests(manager, scenario) if detail.startswith(f"{SEARCH} -> fd_spiral"))
         for manager in ("threshold", "metacontrol")
     )
-    reasoning_s = load_scenario(scenario).scenario.latencies.inference_s
-    assert metacontrol_s - threshold_s == pytest.approx(reasoning_s)
+    shortest_s, longest_s = support(load_scenario(scenario).scenario.latencies.inference_s)
+    assert shortest_s - 1e-9 <= metacontrol_s - threshold_s <= longest_s + 1e-9
 
 
 @pytest.mark.parametrize(("visibility_m", "mode"), [(3.25, "fd_spiral_high"), (3.2499, "fd_spiral_medium")])

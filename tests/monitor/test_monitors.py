@@ -239,64 +239,64 @@ def test_a_negative_time_after_another_event_fires_at_the_next_look(subscriber: 
 # Battery
 
 
-def battery(docked: set[float]) -> BatteryMeasurements:
-    return BatteryMeasurements(lambda t_s: t_s in docked, 200.0, Timing(1.0, 0.5))
+def battery(*recharged_s: float) -> BatteryMeasurements:
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5))
+    for t_s in recharged_s:
+        level.recharge(t_s)
+    return level
 
 
-def battery_levels(subscriber: Subscriber, until_s: float, docked: set[float]) -> list[tuple[float, float]]:
-    subscriber.env.process(battery(docked).publish(subscriber.env, subscriber.bus))
+def battery_levels(subscriber: Subscriber, until_s: float, *recharged_s: float) -> list[tuple[float, float]]:
+    level = battery()
+    subscriber.env.process(level.publish(subscriber.env, subscriber.bus))
+    for t_s in recharged_s:
+        subscriber.env.timeout(t_s).callbacks.append(lambda _: level.recharge(subscriber.env.now))
     subscriber.env.run(until=until_s)
     return [(each.time_s, each.value) for each in subscriber.received]
 
 
 def test_battery_falls_by_a_two_hundredth_a_second(subscriber: Subscriber) -> None:
-    levels = battery_levels(subscriber, 151.0, docked=set())
+    levels = battery_levels(subscriber, 151.0)
     assert levels[:2] == [(0.5, 0.9975), (1.5, 0.9925)] and levels[-1] == (150.5, pytest.approx(0.2475))
 
 
 def test_an_empty_battery_stays_empty(subscriber: Subscriber) -> None:
-    assert battery_levels(subscriber, 300.0, docked=set())[-1][1] == 0.0
+    assert battery_levels(subscriber, 300.0)[-1][1] == 0.0
 
 
-def test_battery_is_full_at_once_at_the_station(subscriber: Subscriber) -> None:
-    levels = dict(battery_levels(subscriber, 200.0, docked={160.5}))
-    assert (levels[159.5], levels[160.5], levels[161.5]) == pytest.approx((0.2025, 1.0, 0.995))
-
-
-def test_a_stay_at_the_station_is_one_recharge() -> None:
-    level = battery({160.5, 161.5, 162.5, 170.5})
-    level.count_until(165.0)
-    assert level.recharges == 1
-    level.count_until(200.0)
-    assert level.recharges == 2
+def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber: Subscriber) -> None:
+    levels = dict(battery_levels(subscriber, 200.0, 160.7))
+    assert (levels[160.5], levels[160.7], levels[161.5]) == pytest.approx((0.1975, 1.0, 0.996))
 
 
 def test_a_level_looked_up_is_the_one_published_last(subscriber: Subscriber) -> None:
-    received = battery_levels(subscriber, 200.0, docked={160.5})
-    level = battery({160.5})
-    assert level.count_until(0.4) == 0
-    assert level.count_until(160.7) == 161 and level.values[160] == 1.0
+    received = battery_levels(subscriber, 200.0, 160.7)
+    level = battery()
+    assert level.count_until(0.4) == 0 and level.count_until(150.4) == 150
+    level.recharge(160.7)
+    assert level.count_until(160.7) == 162 and level.values[161] == 1.0 and level.recharges == 1
     assert level.count_until(199.9) == len(received) and list(zip(level.times_s, level.values, strict=True)) == received
     assert level.count_until(30.5) == 31  # of those known by now
 
 
 def test_a_level_may_cross_a_threshold_at_each_message_to_come() -> None:
-    level = battery({160.5})
+    level = battery()
     assert (level.region(0.4, (0.25,)), level.region(149.9, (0.25,)), level.region(150.5, (0.25,))) == (-1, 2, 0)
     assert level.next_crossing_s(150.6, (0.25,)) == 151.5
+    level.recharge(160.5)
     assert level.region(160.5, (0.25, 1.0)) == 3
 
 
 @given(
     st.lists(st.sampled_from((-1.0, 0.0, 0.2475, 0.25, 0.5, 0.9975, 1.0, 1.25)), unique=True).map(sorted),
-    st.lists(st.integers(0, 250).map(lambda message: message + 0.5), min_size=1, max_size=4),
+    st.lists(st.integers(0, 250).map(lambda message: message + 0.5), min_size=1, max_size=4).map(sorted),
     st.sampled_from((0.2, 1.2, 2.0, 40.0, 149.9, 152.0)),
 )
 def test_no_level_is_in_another_region_before_the_next_crossing(
-    thresholds: list[float], docked: list[float], later_s: float
+    thresholds: list[float], recharged_s: list[float], later_s: float
 ) -> None:
-    edges, plain, t_s = tuple(thresholds), battery(set(docked)), docked[0] + later_s
-    region, crossing_s = plain.region(t_s, edges), battery(set(docked)).next_crossing_s(t_s, edges)
+    edges, plain, t_s = tuple(thresholds), battery(*recharged_s), recharged_s[-1] + later_s
+    region, crossing_s = plain.region(t_s, edges), battery(*recharged_s).next_crossing_s(t_s, edges)
     messages = [message + 0.5 for message in range(500) if t_s < message + 0.5 < crossing_s]
     assert all(plain.region(message, edges) == region for message in messages)
 

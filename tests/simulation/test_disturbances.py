@@ -54,7 +54,7 @@ def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves
     lost = ", ".join(f'"({thruster},failure,0)"' for thruster in range(1, 7))
     wave = "{mean_m_per_s: 0.05, amplitude_m_per_s: 0.2, period_s: 100, direction_rad: 0.0}"
     result = fly(
-        "base: release15.yaml\nrevision: {thruster_failures: {effective_from_s: 0.0, loss_probability: 0.0}}\n"
+        "base: release15.yaml\nrevision: {thruster_failures: {failure_mode: dead, effective_from_s: 0.0}}\n"
         "mission: {time_limit_s: 215}\n"
         f"thruster_events: [{lost}]\ncurrent: {{wave: {wave}}}\n"
     )

@@ -41,9 +41,8 @@ def test_the_vehicle_sets_off_for_the_station_when_the_battery_is_below_a_quarte
     assert 0.0 < set_off_s[0] - low_s < 4.0
 
 
-@RECHARGES
-def test_nothing_else_moves_the_vehicle_on_the_way(manager: str) -> None:
-    result = flown(manager)
+def test_nothing_else_moves_the_vehicle_on_the_way() -> None:
+    result = flown("metacontrol")
     on_way = is_on_the_way(result)
     began = on_way.index(True)
     way = result.trajectory[began : began + on_way[began:].index(False)]  # the first time
@@ -59,10 +58,9 @@ def test_the_battery_is_full_again_at_the_station(manager: str) -> None:
     assert set(rises) == {1.0}
 
 
-@RECHARGES
-def test_the_search_goes_on_around_the_same_centre(manager: str) -> None:
+def test_the_search_goes_on_around_the_same_centre() -> None:
     """With no pipeline to find, the vehicle comes back to where it was, and goes on outwards."""
-    result = flown(manager, pipeline__vertices_m=((500.0, 500.0, -20.0), (510.0, 500.0, -20.0)))
+    result = flown("metacontrol", pipeline__vertices_m=((500.0, 500.0, -20.0), (510.0, 500.0, -20.0)))
     centre = result.trajectory[0]
     distance_m = [max(abs(p.x_m - centre.x_m), abs(p.y_m - centre.y_m)) for p in result.trajectory]
     on_way = is_on_the_way(result)
@@ -71,14 +69,25 @@ def test_the_search_goes_on_around_the_same_centre(manager: str) -> None:
     assert distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0  # a turn of a minute adds up to 3.5 m
 
 
-@RECHARGES
-def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept(manager: str) -> None:
-    result = flown(manager, mission__time_limit_s=900.0, battery__discharge_time_s=240.0)
+def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept() -> None:
+    result = flown("metacontrol", mission__time_limit_s=900.0, battery__discharge_time_s=240.0)
     assert result.metrics.distance_inspected_m > 20.0
     followed = [p for p in result.trajectory if p.mode == "fd_follow_pipeline"]
     first_leg = [p for p in followed if p.t_s < times_s(result, "battery_crossing", "falls below")[0]]
     # The second leg begins at the station, and inspects what lies beyond the first: it passes no place twice.
     assert min(p.x_m for p in followed) < min(p.x_m for p in first_leg) - 3.0
+
+
+def test_the_trees_way_to_the_station_stays_active_and_draws_the_vehicle_back() -> None:
+    """The guard on the level halts the sequence that recharges before its last step, as in the exemplar."""
+    result = flown("bt_extended")
+    assert [each.detail for each in result.events if each.event == "mode_set" and "recharge" in each.detail] == [
+        "generate_recharge_path = normal"
+    ]
+    (recharged_s,) = times_s(result, "battery_crossing", "rises to")
+    assert recharged_s < times_s(result, "mode_set", "f_follow_pipeline = fd_follow_pipeline")[1] < recharged_s + 1.0
+    x_m = [each.x_m for each in result.trajectory if each.t_s > recharged_s]
+    assert sum(later > earlier + 0.1 for earlier, later in pairwise(x_m)) > 5
 
 
 def test_the_level_is_the_knowledge_bases_and_not_the_codes() -> None:
