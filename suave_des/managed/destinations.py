@@ -18,18 +18,15 @@ from suave_des.scenario.physical import Battery
 ABOVE_M = 3.0
 """Height of the set-point above the surface: an autopilot that stops short of it still surfaces."""
 SURFACED_M = 0.1
-CHECKS_A_SECOND = 2
-RESEND_CHECKS = 20
+CHECKS_A_SECOND, RESEND_CHECKS = 2, 20
 
 
 @dataclass(eq=False)
 class GenerateRechargePath(ProcessNode):
-    """The recharge function: while active, at each tick a docked vehicle is recharged, and the station is sent.
+    """The recharge function: at each tick while active a docked vehicle is recharged, and the station is sent.
 
     Attributes:
-        station: where the recharge station is, and how often the timer ticks.
-        level: the battery's.
-        phase_s: mission time of a tick.
+        station, level: where the station is, and how often docking is checked; the battery's level.
     """
 
     sender: SetPointSender
