@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from operator import itemgetter
 from typing import Any
 
+import numpy as np
 import simpy
 
 from suave_des.domain import GENERATE_RECHARGE_PATH, MAINTAIN_MOTION
@@ -61,15 +62,12 @@ class ReactionMeter:
 
     def _fitting_altitudes(self) -> Iterator[_Entry]:
         """The messages from which on another altitude fits than before."""
-        altitudes_m = (None, *self.settings.expected_altitudes_m[::-1])
-        thresholds_m, reached_before = self.settings.visibility_thresholds_m[::-1], -1
-        for t_s in self.visibility.crossings_s(thresholds_m):
-            if t_s > self.env.now:
+        settings, times_s = self.settings, self.visibility.times_s
+        altitudes_m = (None, *settings.expected_altitudes_m[::-1])
+        for message, reached in _levels(self.visibility.arrays[1].tobytes(), settings.visibility_thresholds_m[::-1]):
+            if times_s[message] > self.env.now:
                 break
-            reached = bisect_right(thresholds_m, self.visibility.values[self.visibility.count_until(t_s) - 1])
-            if reached != reached_before:
-                yield t_s, _OpenEvents.expect, altitudes_m[reached]
-            reached_before = reached
+            yield times_s[message], _OpenEvents.expect, altitudes_m[reached]
 
     def _low_battery(self) -> Iterator[_Entry]:
         if self.battery is not None:
@@ -83,10 +81,6 @@ class _OpenEvents:
 
     The altitude is compared at every visibility message of the whole mission, except while the battery is low: then an
     open mismatch is dropped. It ends when the expected altitude is set, not when the visibility comes back.
-
-    Args:
-        next_message_s: gives the time of the next visibility message, changed or not.
-        altitude_m: the search's altitude before any mode is set.
     """
 
     def __init__(self, next_message_s: Callable[[float], float], altitude_m: float) -> None:
@@ -149,6 +143,14 @@ class _OpenEvents:
                 self._since_s.setdefault("mismatch", message_s)
             elif self._since_s.get("mismatch", -math.inf) >= message_s:
                 del self._since_s["mismatch"]
+
+
+@lru_cache(maxsize=64)
+def _levels(values: bytes, thresholds: tuple[float, ...]) -> list[tuple[int, int]]:
+    """Find which values (float64; without noise the same in each run) reach more or fewer thresholds; and how many."""
+    reached = np.searchsorted(thresholds, np.frombuffer(values), side="right")
+    changes = np.flatnonzero(np.diff(reached, prepend=-1))
+    return list(zip(changes.tolist(), reached[changes].tolist(), strict=True))
 
 
 _Entry = tuple[float, Callable[[_OpenEvents, float, Any], None], Any]
