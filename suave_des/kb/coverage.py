@@ -6,18 +6,23 @@ model reaches is told apart, and the least set of states that covers the rest is
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
+from suave_des.errors import number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import testable_order
 from suave_des.kb.situations import Body, Probes, Situation
 from suave_des.kb.space import States
 from suave_des.knowledge.rules import COMPARISON_OF, COMPARISONS, Rule, write_atom
 from suave_des.knowledge.state import KnowledgeState
+from suave_des.tables import Table
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
+#: Goals that no state reaches, on a terminal.
+_GOALS_SHOWN: Final = 8
 #: How the values of a comparison can relate, with the sign that says so and words for it.
 ORDERS: Final[Mapping[str, tuple[str, str]]] = {
     "less": ("<", "with the first value less than the second"),
@@ -74,51 +79,73 @@ def _questions(rules: Iterable[Rule]) -> Iterator[_Question]:
                 yield _Question(Goal(rule.name, number, FAILS, text), before, (*before, atom))
 
 
-class _Asked:
-    """A knowledge base that is asked which goals situations cover."""
+def _covering(knowledge: KnowledgeBase, questions: Sequence[_Question]) -> Callable[[Situation], frozenset[Goal]]:
+    """Make a function that finds the goals that a situation covers."""
+    bodies = (body for each in questions for body in (each.holds, each.fails) if body)
+    probes = Probes(knowledge.base, knowledge.limit, bodies)
 
-    def __init__(self, knowledge: KnowledgeBase, questions: Collection[_Question]) -> None:
-        self.questions = questions
-        self.bodies = list(dict.fromkeys(body for each in questions for body in (each.holds, each.fails) if body))
-        self.probes = Probes(knowledge.base, knowledge.limit, self.bodies)
+    def covered(situation: Situation) -> frozenset[Goal]:
+        holding = {(), *(probes.holding(situation) or ())}
+        return frozenset(goal for goal, holds, fails in questions if holds in holding and fails not in holding)
 
-    def covered(self, situation: Situation) -> frozenset[Goal]:
-        """The goals that a situation covers."""
-        holding = {(), *(self.bodies[number] for number in self.probes.holding(situation))}
-        return frozenset(goal for goal, holds, fails in self.questions if holds in holding and fails not in holding)
-
-
-class RuleCoverage(NamedTuple):
-    """What tests cover of one rule.
-
-    Attributes:
-        rule: its name.
-        fired, not_fired: number of situations.
-        covered: goals that are covered.
-        missing: goals that are not, but that a state of the model reaches.
-        unreachable: goals that no state of the model reaches, and that no test covers.
-    """
-
-    rule: str
-    fired: int
-    not_fired: int
-    covered: tuple[Goal, ...]
-    missing: tuple[Goal, ...]
-    unreachable: tuple[Goal, ...]
+    return covered
 
 
 class Coverage(NamedTuple):
     """What tests cover of all enabled rules.
 
     Attributes:
-        rules: of each rule, by name.
+        goals: all goals.
+        covered: number of situations that cover each goal; none if it is missing.
+        missing: goals that no situation covers, but that a state of the model reaches; further ones nothing reaches.
         proposed: the least set of states that would cover what is missing, each with what it would add.
         states: number of kinds of states that were looked at for that.
     """
 
-    rules: tuple[RuleCoverage, ...]
+    goals: tuple[Goal, ...]
+    covered: Counter[Goal]
+    missing: frozenset[Goal]
     proposed: tuple[tuple[KnowledgeState, tuple[Goal, ...]], ...]
     states: int
+
+    @property
+    def unreachable(self) -> frozenset[Goal]:
+        """Goals that no state of the model reaches, and that no test covers."""
+        return frozenset(self.goals) - self.missing - self.covered.keys()
+
+    def table(self) -> Table:
+        """The goals of each rule."""
+        rows = []
+        for rule in sorted({goal.rule for goal in self.goals}):
+            own = [goal for goal in self.goals if goal.rule == rule]
+            covered, missing, no_state = (
+                sum(goal in kind for goal in own) for kind in (self.covered, self.missing, self.unreachable)
+            )
+            fired, not_fired = (str(self.covered[Goal(rule, -1, outcome)]) for outcome in (FIRES, FIRES_NOT))
+            share = f"{covered}/{covered + missing}"
+            rows.append((rule, fired, not_fired, share, str(missing or ""), str(no_state or "")))
+        covered, reachable = len(self.covered), len(self.covered) + len(self.missing)
+        title = f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
+        return Table(("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll")
+
+    def lines(self, max_failed: int) -> Iterator[str]:
+        """What is missing, and states that would cover it."""
+        if self.missing:
+            yield "not covered"
+            yield from (f"  {goal}" for goal in sorted(self.missing))
+        if unreachable := sorted(self.unreachable):
+            components = number_of(max_failed, "component")
+            words = f"of {self.states} kinds of states of this model, with at most {components} reporting"
+            yield f"not reached in any state ({words}), but facts in a test may reach it"
+            yield from (f"  {goal}" for goal in unreachable[:_GOALS_SHOWN])
+            if len(unreachable) > _GOALS_SHOWN:
+                yield f"  and {len(unreachable) - _GOALS_SHOWN} more"
+        if self.proposed:
+            count = len(self.proposed)
+            yield f"a smallest set of states that would cover the rest: {count} (write them as tests with --write FILE)"
+            for state, goals in self.proposed:
+                yield f"  {state}"
+                yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
 
 
 def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], max_failed: int) -> Coverage:
@@ -134,38 +161,21 @@ def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], 
         KnowledgeError: the reasoner takes too long.
     """
     questions = list(_questions(rule for rule in knowledge.base.content.enabled_rules if rule.body))
-    asked = _Asked(knowledge, questions)
-    by_situation = [asked.covered(each) for each in dict.fromkeys(situations)]
-    covered = frozenset[Goal]().union(*by_situation)
-    goals = frozenset(each.goal for each in questions)
-    missing = goals - covered
-    open_questions = [each for each in questions if each.goal in missing]
-    candidates, states = _reached(knowledge, open_questions, max_failed) if missing else ({}, 0)
-    reachable = frozenset[Goal]().union(*candidates.values())
-    kinds = (covered, missing & reachable, missing - reachable)
-    rules = tuple(
-        RuleCoverage(
-            name,
-            sum(Goal(name, -1, FIRES) in each for each in by_situation),
-            sum(Goal(name, -1, FIRES_NOT) in each for each in by_situation),
-            *(tuple(sorted(goal for goal in kind if goal.rule == name)) for kind in kinds),
-        )
-        for name in sorted({goal.rule for goal in goals})
-    )
-    chosen = least_cover(candidates)
-    return Coverage(rules, tuple((state, tuple(sorted(candidates[state]))) for state in chosen), states)
-
-
-def _reached(
-    knowledge: KnowledgeBase, questions: Collection[_Question], max_failed: int
-) -> tuple[dict[KnowledgeState, frozenset[Goal]], int]:
-    """Which goals each state of the policy covers; one state for each different set of them."""
-    asked = _Asked(knowledge, questions)
-    found: dict[frozenset[Goal], KnowledgeState] = {}
-    states = States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space)
-    for state in states:
-        found.setdefault(asked.covered(Situation(state)), state)
-    return {state: goals for goals, state in found.items() if goals}, len(states)
+    covering = _covering(knowledge, questions)
+    covered = Counter(goal for each in dict.fromkeys(situations) for goal in covering(each))
+    left = [each for each in questions if each.goal not in covered]
+    found: dict[frozenset[Goal], KnowledgeState] = {}  # one state for each different set of goals
+    states = 0
+    if left:
+        covering = _covering(knowledge, left)
+        every = States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space)
+        states = len(every)
+        for state in every:
+            found.setdefault(covering(Situation(state)), state)
+    candidates = {state: goals for goals, state in found.items() if goals}
+    proposed = tuple((state, tuple(sorted(candidates[state]))) for state in least_cover(candidates))
+    goals = tuple(sorted({each.goal for each in questions}))
+    return Coverage(goals, covered, frozenset[Goal]().union(*candidates.values()), proposed, states)
 
 
 def least_cover(candidates: Mapping[KnowledgeState, frozenset[Goal]]) -> Sequence[KnowledgeState]:

@@ -14,6 +14,7 @@ import rdflib
 from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
+from suave_des.estimates import Estimate, interval_text
 from suave_des.kb.policy import Policy, no_proof
 from suave_des.kb.situations import Probes, Situation
 from suave_des.kb.space import PolicySpace
@@ -22,17 +23,19 @@ from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.rules import literal_text
-from suave_des.records.metrics import DISTANCE, SEARCH_TIME
+from suave_des.records.metrics import DISTANCE, SEARCH_TIME, Metric, metric_of
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario_knowledge import open_base
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
-    from suave_des.estimates import Estimate
 
 #: Metrics of missions that are always compared; others are where they differ.
 METRICS: Final = (SEARCH_TIME, DISTANCE)
 _MANAGER: Final = "metacontrol"
+#: Numbers of missions that are listed.
+_MOST_RUNS: Final = 10
 _PLACES: Final = ("initial_", "detection_")
 
 
@@ -194,18 +197,15 @@ class PairedDifference(NamedTuple):
 
     Attributes:
         metric: column of runs.csv.
-        one, other: means.
-        difference: mean of other - one, run by run, with its 95% interval (Student's t).
+        pairs: its values with one (`a`) and with the other (`b`), by run, where both are known.
+        difference: mean of b - a, run by run, with its 95% interval (Student's t).
         changed: number of missions in which the metric differs.
-        extremes: (run, value with one, value with the other) of the largest changes each way.
     """
 
-    metric: str
-    one: float
-    other: float
+    metric: Metric
+    pairs: pandas.DataFrame
     difference: Estimate
     changed: int
-    extremes: tuple[tuple[int, float, float], ...]
 
 
 class MissionDifference(NamedTuple):
@@ -220,6 +220,30 @@ class MissionDifference(NamedTuple):
     missions: int
     changed: tuple[int, ...]
     metrics: tuple[PairedDifference, ...]
+
+    def table(self, decisions: PolicyDifference) -> Table:
+        """Decisions and missions in one table."""
+        rows: list[tuple[str, ...]] = [
+            ("decisions", "", "", "", "", f"{decisions.states} of {decisions.compared} states"),
+            ("missions", "", "", "", "", f"{len(self.changed)} of {self.missions}"),
+        ]
+        for metric, pairs, found, changed in self.metrics:
+            values = [*(f"{each:.2f}" for each in pairs.mean()), f"{found.value:+.2f}"]
+            rows.append((metric.brief, *values, interval_text(found.interval, "+.2f"), f"{changed} of {self.missions}"))
+        return Table(("", "A", "B", "B - A", "95% interval", "different"), rows)
+
+    def lines(self) -> Iterator[str]:
+        """Which missions differ, and the largest changes each way."""
+        more = len(self.changed) - _MOST_RUNS
+        numbers = ", ".join(map(str, self.changed[:_MOST_RUNS]))
+        yield f"runs that differ: {numbers}" + (f" and {more} more" if more > 0 else "")
+        yield "largest changes"
+        for metric, pairs, _, _ in self.metrics:
+            change = (pairs["b"] - pairs["a"]).to_numpy()
+            for at in sorted({change.argmin(), change.argmax()}) if metric.name in METRICS and change.any() else ():
+                if change[at]:
+                    run, (one, other) = pairs.index.to_numpy()[at], pairs.to_numpy()[at]
+                    yield f"  run {run}: {metric.title} {one:.1f} {metric.unit} -> {other:.1f} {metric.unit}"
 
 
 def compare_missions(
@@ -295,21 +319,14 @@ def firing_states(
 
 def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:
     """Compare rows of runs.csv with the same run numbers, which are their index."""
-    from numpy import isnan, nan
-
     from suave_des.results.statistics import mean_interval
 
     differs = before.ne(after) & ~(before.isna() & after.isna())
     others = [str(name) for name in before.select_dtypes("number") if differs[name].any()]
     metrics = []
     for name in dict.fromkeys((*METRICS, *(each for each in others if not each.startswith(_PLACES)))):
-        x, y = before[name].to_numpy(float), after[name].to_numpy(float)
-        known = ~(isnan(x) | isnan(y))
-        runs, x, y = before.index.to_numpy()[known], x[known], y[known]
-        change = y - x
-        places = {int(change.argmin()), int(change.argmax())} if len(change) else ()
-        extremes = tuple((int(runs[at]), float(x[at]), float(y[at])) for at in sorted(places) if change[at])
-        means = (float(x.mean()), float(y.mean())) if len(change) else (nan, nan)
-        changed = int(differs[name].sum())
-        metrics.append(PairedDifference(name, *means, mean_interval(change), changed, extremes))
+        pairs = pandas.DataFrame({"a": before[name], "b": after[name]}, dtype=float).dropna()
+        metric = metric_of(name) or Metric(name, name.replace("_", " "))
+        found = mean_interval((pairs["b"] - pairs["a"]).to_numpy())
+        metrics.append(PairedDifference(metric, pairs, found, int(differs[name].sum())))
     return MissionDifference(len(before), tuple(int(run) for run in before.index[differs.any(axis=1)]), tuple(metrics))

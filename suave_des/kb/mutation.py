@@ -14,17 +14,18 @@ Each operator is a function from a knowledge base to its mutants; OPERATORS list
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache, cached_property, partial
 from typing import Final, NamedTuple, TypeVar
 
-from suave_des.errors import KnowledgeError
+from suave_des.errors import KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import instance, matched
 from suave_des.kb.rule_tests import RuleTest, passes
-from suave_des.kb.situations import Body, Outcome, Probes, Situation, compare
+from suave_des.kb.situations import Body, Outcome, Probes, Situation, difference
 from suave_des.kb.space import PolicySpace, States
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
@@ -60,6 +61,7 @@ from suave_des.knowledge.rules import (
 from suave_des.knowledge.rules.checks import fatal_problems
 from suave_des.knowledge.rules.files import with_triples
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, Reasoning
+from suave_des.tables import Table
 
 _NOT_HORN: Final = (
     *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),
@@ -342,16 +344,11 @@ class _Original:
         self.knowledge = knowledge
         self.is_horn = is_horn(knowledge.base)
         self.planned_on = _planning_facts(knowledge.base)
-        numbers: dict[Body, int] = {}
-        self.mutants = []
-        for mutant in mutants:
-            bodies = list(touching(knowledge.base, mutant))
-            is_anywhere = not all(bodies)  # what is changed alone makes a rule fire
-            probes = None if is_anywhere else frozenset(numbers.setdefault(body, len(numbers)) for body in bodies)
-            self.mutants.append(_Changed(self, mutant, probes))
-        #: What follows and is decided; and numbers of the probes that hold, None where a situation contradicts itself.
+        self.mutants = [_Changed(self, mutant, frozenset(touching(knowledge.base, mutant))) for mutant in mutants]
+        bodies = {body: None for changed in self.mutants for body in changed.probes if all(changed.probes)}
+        #: What follows and is decided; and the conjunctions that hold, None where a situation contradicts itself.
         self.outcome = cache(knowledge.outcome)
-        self.holding = cache(Probes(knowledge.base, knowledge.limit, tuple(numbers)).asked)
+        self.holding = cache(Probes(knowledge.base, knowledge.limit, bodies).holding)
 
 
 def _planning_facts(base: Ontology) -> frozenset[Fact]:
@@ -367,13 +364,12 @@ class _Changed:
     Attributes:
         original: the knowledge base without the change.
         mutant: the change.
-        probes: numbers of the conjunctions of which one holds wherever the mutant can infer something else; None: it
-            can do so everywhere.
+        probes: conjunctions of which one holds wherever the mutant can infer something else; an empty one always does.
     """
 
     original: _Original
     mutant: Mutant
-    probes: frozenset[int] | None
+    probes: frozenset[Body]
 
     @cached_property
     def base(self) -> Ontology:
@@ -389,7 +385,7 @@ class _Changed:
 
     def touches(self, situation: Situation) -> bool:
         """Whether the change can make a difference to what is inferred in a situation."""
-        if self.probes is None or not self.original.is_horn:
+        if not all(self.probes) or not self.original.is_horn:
             return True
         holding = self.original.holding(situation)
         return holding is None or not holding.isdisjoint(self.probes)
@@ -475,8 +471,8 @@ def _compared(original: _Original, situations: Iterable[Situation], max_failed: 
 
     def look(situation: Situation, words: str = "") -> None:
         for changed in [each for each in left if not each.is_same(situation)]:
-            for difference in compare(original.outcome, changed.outcome, [situation]):
-                results.append(MutantResult(changed.mutant, SURVIVED, f"{difference}{words}", situation.state))
+            if found := difference(original.outcome(situation), changed.outcome(situation)):
+                results.append(MutantResult(changed.mutant, SURVIVED, f"{found}{words}", situation.state))
                 left.remove(changed)
 
     for situation in situations:
@@ -491,3 +487,27 @@ def _compared(original: _Original, situations: Iterable[Situation], max_failed: 
         look(Situation(state))
     reason = f"nothing differs in {len(states)} kinds of states"
     return [*results, *(MutantResult(changed.mutant, EQUIVALENT, reason) for changed in left)], len(states)
+
+
+def mutation_table(results: Sequence[MutantResult]) -> Table:
+    """What became of the mutants of each operator."""
+    kinds = (KILLED, SURVIVED, EQUIVALENT)
+    counts = Counter((each.mutant.operator, each.result) for each in results)
+    killed, survived, equivalent = (sum(each.result == kind for each in results) for kind in kinds)
+    share = killed / (killed + survived) if killed + survived else 1.0
+    title = f"mutation: {killed} of {killed + survived} mutants killed, {share:.0%}; {equivalent} equivalent"
+    operators = dict.fromkeys(each.mutant.operator for each in results)
+    return Table(
+        ("operator", *kinds), [(name, *(str(counts[name, kind]) for kind in kinds)) for name in operators], title
+    )
+
+
+def mutation_lines(results: Sequence[MutantResult], states: int, max_failed: int) -> Iterator[str]:
+    """Each survivor, with a state that tells it apart."""
+    survivors = [each for each in results if each.result == SURVIVED]
+    if survivors:
+        yield "survivors, which no test notices"
+    yield from (f"  {each.mutant}\n    {each.reason}\n    at {each.state}" for each in survivors)
+    if states:
+        components = number_of(max_failed, "component")
+        yield f"equivalent: {states} kinds of states, with at most {components} reporting"

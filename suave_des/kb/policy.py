@@ -94,7 +94,7 @@ def no_proof(computing: Sequence[str]) -> str:
 def make_policy(
     base: Ontology,
     settings: ManagingSettings,
-    decide: Decide[Situation],
+    decide: Decide,
     max_failed: int,
     space: PolicySpace | None = None,
     on_count: OnCount = lambda done, total: None,
@@ -163,7 +163,7 @@ def _keys(states: States, depends: Dependence) -> Iterator[Hashable]:
 
 
 def _rows(
-    states: States, functions: Sequence[str], outcomes: Iterator[Outcome], decide: Decide[Situation], space: PolicySpace
+    states: States, functions: Sequence[str], outcomes: Iterator[Outcome], decide: Decide, space: PolicySpace
 ) -> Iterator[tuple[Any, ...]]:
     """Rows of a policy's cases."""
     every = iter(states)

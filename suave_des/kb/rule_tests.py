@@ -271,7 +271,7 @@ class TestResult:
         return not self.failures
 
 
-Without = Callable[[Iterable[str]], Decide[Situation]]
+Without = Callable[[Iterable[str]], Decide]
 
 
 def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
@@ -292,7 +292,7 @@ def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
     return TestResult(test, tuple(found), time.perf_counter() - began)
 
 
-def passes(test: RuleTest, outcome: Decide[Situation], without: Without) -> bool:
+def passes(test: RuleTest, outcome: Decide, without: Without) -> bool:
     """Whether all that a test expects is so; nothing is explained.
 
     Args:
@@ -304,7 +304,7 @@ def passes(test: RuleTest, outcome: Decide[Situation], without: Without) -> bool
 
 
 def _unmet(
-    test: RuleTest, situation: Situation, outcome_of: Decide[Situation], without: Without
+    test: RuleTest, situation: Situation, outcome_of: Decide, without: Without
 ) -> Iterator[tuple[str, Fact | str | None]]:
     """Each expectation that does not hold in a situation, in words, and the fact or function that it is about."""
     try:

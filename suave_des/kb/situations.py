@@ -1,12 +1,12 @@
-"""Situations of a knowledge base: what follows and is decided in them, and in which two knowledge bases differ."""
+"""Situations of a knowledge base: what follows and is decided in them, and how two knowledge bases differ."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Generic, TypeVar
+from typing import Final
 
 from rdflib import BNode
 
@@ -77,61 +77,20 @@ class Outcome:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
         return INCONSISTENT if self.reasoning is None else self.changes.get(function, STAYS)
 
-    def is_like(self, other: Outcome) -> bool:
-        """Whether the same follows and is decided."""
-        is_consistent = self.reasoning is not None
-        return is_consistent == (other.reasoning is not None) and (
-            (self.inferred, self.changes) == (other.inferred, other.changes)
-        )
+
+Decide = Callable[[Situation], Outcome]
 
 
-S = TypeVar("S")
-Decide = Callable[[S], Outcome]
-
-
-@dataclass(frozen=True)
-class Difference(Generic[S]):
-    """A situation in which two knowledge bases infer or decide differently."""
-
-    situation: S
-    one: Outcome
-    other: Outcome
-
-    @property
-    def functions(self) -> tuple[str, ...]:
-        """Functions whose grounding is decided differently; none where one of them finds a contradiction."""
-        if self.one.reasoning is None or self.other.reasoning is None:
-            return ()
-        names = sorted({*self.one.changes, *self.other.changes})
-        return tuple(name for name in names if self.one.choice(name) != self.other.choice(name))
-
-    @property
-    def is_decided(self) -> bool:
-        """Whether another decision follows, or a contradiction, and not only other facts."""
-        return bool(self.functions) or (self.one.reasoning is None) != (self.other.reasoning is None)
-
-    def __str__(self) -> str:
-        """The first difference, in words about the second knowledge base."""
-        if (self.one.reasoning is None) != (self.other.reasoning is None):
-            return "it contradicts itself" if self.other.reasoning is None else "it no longer contradicts itself"
-        for name in self.functions:
-            return f"{name}: {self.other.choice(name)}, not {self.one.choice(name)}"
-        for missing in sorted(map(str, self.one.inferred - self.other.inferred)):
-            return f"{missing} does not follow"
-        return f"{min(map(str, self.other.inferred - self.one.inferred))} follows"
-
-
-def compare(one: Decide[S], other: Decide[S], situations: Iterable[S]) -> Iterator[Difference[S]]:
-    """Find the situations in which something else follows or is decided.
-
-    Args:
-        one, other: conclude what follows and is decided in a situation, such as KnowledgeBase.outcome.
-        situations: to look at.
-    """
-    for situation in situations:
-        before, after = one(situation), other(situation)
-        if not before.is_like(after):
-            yield Difference(situation, before, after)
+def difference(one: Outcome, other: Outcome) -> str:
+    """Tell the first difference in what follows and is decided, in words about the second; empty: none."""
+    if (one.reasoning is None) != (other.reasoning is None):
+        return "it contradicts itself" if other.reasoning is None else "it no longer contradicts itself"
+    for name in sorted({*one.changes, *other.changes}):
+        if one.choice(name) != other.choice(name):
+            return f"{name}: {other.choice(name)}, not {one.choice(name)}"
+    for missing in sorted(map(str, one.inferred - other.inferred)):
+        return f"{missing} does not follow"
+    return next((f"{more} follows" for more in sorted(map(str, other.inferred - one.inferred))), "")
 
 
 class Probes:
@@ -141,7 +100,7 @@ class Probes:
     it changes nothing.
 
         probes = Probes(base, TimeLimit(), [rule.body for rule in base.rules])
-        probes.holding(Situation(state))  # numbers of the rules that fire
+        probes.holding(Situation(state))  # bodies of the rules that fire
 
     Args:
         base: ontologies and rules.
@@ -152,21 +111,17 @@ class Probes:
         KnowledgeError: Pellet cannot use them.
     """
 
-    def __init__(self, base: Ontology, limit: TimeLimit, bodies: Sequence[Body]) -> None:
+    def __init__(self, base: Ontology, limit: TimeLimit, bodies: Iterable[Body]) -> None:
+        self._base, self._limit, self._bodies = base, limit, tuple(dict.fromkeys(bodies))
         rules = (
             Rule(f"probe {number}", "", Path(), True, BNode(), (), body, (_head(number),))
-            for number, body in enumerate(bodies)
+            for number, body in enumerate(self._bodies)
         )
-        self._base, self._limit = base, limit
         probed = base.with_rules((*base.rules, *map(with_triples, rules)))
         self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
 
-    def holding(self, situation: Situation) -> frozenset[int]:
-        """Return the numbers of the conjunctions that hold; none in a situation that contradicts itself."""
-        return self.asked(situation) or frozenset()
-
-    def asked(self, situation: Situation) -> frozenset[int] | None:
-        """Return the numbers of the conjunctions that hold; None for a situation that contradicts itself.
+    def holding(self, situation: Situation) -> frozenset[Body] | None:
+        """Return the conjunctions that hold; None for a situation that contradicts itself.
 
         Raises:
             KnowledgeError: Pellet takes too long.
@@ -176,7 +131,8 @@ class Probes:
             found = self._limit.run(lambda: self._pellet.infer(asserted), reasoning_on(situation.state))
         except ContradictionError:
             return None
-        return frozenset(int(value.text) for _, name, value in found if name == _HOLDS and isinstance(value, Lit))
+        numbers = (value.text for _, name, value in found if name == _HOLDS and isinstance(value, Lit))
+        return frozenset(self._bodies[int(number)] for number in numbers)
 
 
 def _head(number: int) -> Atom:

@@ -34,7 +34,6 @@ from suave_des.knowledge.rdf import (
     RDFS,
     TOMASYS,
     Lit,
-    Triple,
     reached,
 )
 from suave_des.knowledge.reasoner import Regions, regions_of
@@ -264,32 +263,23 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
 
 def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
     """Group the components that can be exchanged: doing so maps ontologies and rules onto themselves."""
-    groups: list[list[str]] = []
+    groups: dict[str, list[str]] = {}
     for name in base.components:
-        group = next((each for each in groups if _exchangeable(base, each[0], name)), None)
-        if group is None:
-            groups.append([name])
-        else:
-            group.append(name)
-    return tuple(map(tuple, groups))
+        first = next((each for each in groups if _exchangeable(base, each, name)), name)
+        groups.setdefault(first, []).append(name)
+    return tuple(map(tuple, groups.values()))
 
 
 def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     model, content = base.model, base.content
     a, b = model.components[one], model.components[other]
-    if any(f"<{iri}>" in line for iri in (a, b) for line in content.structure):
-        return False
-    if any(Named(iri) in atom.arguments for iri in (a, b) for rule in content.enabled_rules for atom in rule.atoms):
+    rules = (Named(iri) in atom.arguments for iri in (a, b) for rule in content.enabled_rules for atom in rule.atoms)
+    if any(rules) or any(f"<{iri}>" in line for iri in (a, b) for line in content.structure):
         return False
     swap: dict[str | Lit, str] = {a: b, b: a}
-
-    def swapped(triple: Triple) -> Triple:
-        subject, predicate, value = triple
-        return swap.get(subject, subject), predicate, swap.get(value, value)
-
     known = (*content.triples, *model.initial.get(one, ()), *model.initial.get(other, ()))
     own = {triple for triple in known if triple[0] in swap or triple[2] in swap}
-    return set(map(swapped, own)) == own
+    return own == {(swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own}
 
 
 def component_statuses(base: Ontology) -> tuple[str, ...]:
@@ -408,13 +398,9 @@ class Dependence:
     @classmethod
     def of(cls, base: Ontology, space: PolicySpace) -> Dependence:
         """Find out from ontologies and rules, for the attributes of a space."""
-        return cls(
-            {
-                function: frozenset(name for name in space.attributes if has_effect(base, name, [function]))
-                for function in {*base.functions, *space.functions}
-            },
-            _regions(base, space.attributes),
-        )
+        functions = {*base.functions, *space.functions}
+        attributes = {f: frozenset(name for name in space.attributes if has_effect(base, name, [f])) for f in functions}
+        return cls(attributes, _regions(base, space.attributes))
 
     def places(self, measured: Iterable[tuple[str, Decimal]]) -> dict[str, Hashable]:
         """By attribute, what of a measured value a decision can depend on."""
@@ -432,7 +418,7 @@ def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] 
         for one, other in _compared(rule):
             concerned = measured & (one | other)
             if _ANY in one | other:
-                if not (_are_numbers(one) or _are_numbers(other)):
+                if not any(all(isinstance(each, Decimal) for each in side) for side in (one, other)):
                     return None
                 concerned = measured
             elif len(concerned) > 1:
@@ -449,10 +435,6 @@ def _values(base: Ontology, attribute: str) -> set[Decimal]:
     typed = {subject for subject, predicate, value in triples if predicate == IS_QA_TYPE and value == attribute}
     values = (value for subject, predicate, value in triples if predicate == HAS_VALUE and subject in typed)
     return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
-
-
-def _are_numbers(side: _Side) -> bool:
-    return all(isinstance(each, Decimal) for each in side)
 
 
 def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:

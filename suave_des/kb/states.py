@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
@@ -61,20 +61,20 @@ class FactReader:
             InputError: it is not a fact, or a name in it is unknown.
         """
         atom = _parsed(text)
-        if not 1 <= len(atom.arguments) <= 2:
-            raise InputError(f"{shown(text)} is not a fact", remedy="write Class(individual) or property(one, other)")
-        if any(isinstance(term, Variable) for term in atom.arguments):
-            remedy = "name the individual, as in fg_status(fg_spiral_high, IN_ERROR_NFR)"
-            raise InputError(f"{shown(text)} has a variable, and so is not a fact", remedy=remedy)
-        kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
-        predicate, kind = self._predicate(atom.predicate, kinds)
+        if not 1 <= len(atom.arguments) <= 2 or any(isinstance(term, Variable) for term in atom.arguments):
+            remedy = "name the individuals, as in Component(c_thruster_1) or fg_status(fg_spiral_high, IN_ERROR_NFR)"
+            what = "has a variable, and so is not" if "?" in text else "is not"
+            raise InputError(f"{shown(text)} {what} a fact", remedy=remedy)
         subject = self._individual(atom.arguments[0])
-        if kind == "class":
-            return subject, RDF_TYPE, predicate
+        if len(atom.arguments) == 1:
+            return subject, RDF_TYPE, self._predicate(atom.predicate, ("class",))[0]
         value = atom.arguments[1]
-        if kind == "object property":
-            return subject, predicate, self._individual(value)
-        return subject, predicate, self._value(predicate, value)
+        predicate, kind = self._predicate(atom.predicate, ("object property", "data property"))
+        return (
+            subject,
+            predicate,
+            self._individual(value) if kind == "object property" else self._value(predicate, value),
+        )
 
     def fact(self, text: str) -> Fact:
         """Read one fact, in the form in which inferences have it.
@@ -404,24 +404,23 @@ def recorded_states(folder: Path, run: int | None = None) -> tuple[KnowledgeReco
     if not (folder / CAMPAIGN_KNOWLEDGE_FILE).is_file():
         remedy = "give the folder of suave-des run --manager metacontrol --out FOLDER"
         raise InputError(f"{folder} has no recorded states", remedy=remedy)
-    missions = list(read_missions(folder / CAMPAIGN_KNOWLEDGE_FILE))
-    for mission in missions:
-        if mission.run == run:
-            return mission.records
-    runs = sorted({mission.run for mission in missions})
-    remedy = f"give run: a number from {runs[0]} to {runs[-1]}" if runs else "record a campaign with --record-knowledge"
-    raise InputError(f"{folder} has no states of run {shown(run)}", remedy=remedy)
+    runs: dict[int, tuple[KnowledgeRecord, ...]] = {}
+    for mission in read_missions(folder / CAMPAIGN_KNOWLEDGE_FILE):
+        runs.setdefault(mission.run, mission.records)
+    if run not in runs:
+        numbers = f"a number from {min(runs)} to {max(runs)}" if runs else "of a campaign with --record-knowledge"
+        raise InputError(f"{folder} has no states of run {shown(run)}", remedy=f"give run: {numbers}")
+    return runs[run]
 
 
-def recorded_state(records: Iterable[KnowledgeRecord], at_s: float) -> KnowledgeState:
+def recorded_state(records: Sequence[KnowledgeRecord], at_s: float) -> KnowledgeState:
     """Return the last state recorded up to a mission time.
 
     Raises:
         InputError: the first state was recorded later.
     """
-    known = list(records)
-    before = [record for record in known if record.t_s <= at_s]
+    before = [record.state for record in records if record.t_s <= at_s]
     if not before:
-        first = f"the first one is at {known[0].t_s:.2f} s" if known else "there are none"
+        first = f"the first one is at {records[0].t_s:.2f} s" if records else "there are none"
         raise InputError(f"no state was recorded until {at_s:g} s", remedy=first)
-    return before[-1].state
+    return before[-1]

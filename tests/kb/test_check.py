@@ -95,57 +95,10 @@ def test_formats_and_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "| ERROR | " in capsys.readouterr().out
 
 
-def entity_bomb() -> str:
-    entities = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10 if n else "x" * 10}">' for n in range(30))
-    return f"<!DOCTYPE r [{entities}]><r>&e29;</r>" + "<!-- -->" * 1_300_000
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("", "the file is empty"),
-        ("<?xml version='1.0'?>\n<rdf:RDF", "line 2"),
-        (entity_bomb(), "line 1"),
-        ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', "line 1"),
-        ("<html/>", "not RDF/XML"),
-        (
-            '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">'
-            '\n<owl:Ontology rdf:about="http://x.org/">\n<owl:imports rdf:resource="http://x.org/none"/>'
-            "</owl:Ontology></rdf:RDF>",
-            "line 3: import http://x.org/none does not resolve",
-        ),
-    ],
-    ids=["empty", "cut", "bomb", "external", "page", "import"],
-)
-def test_what_cannot_be_read_exits_with_2(
-    content: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "bad.owl"
-    path.write_text(content, encoding="utf-8")
-    assert command("--ontology", str(path)) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1
-    assert path.read_text(encoding="utf-8") == content
-
-
 @pytest.mark.parametrize(("option", "name"), [("--rules", "none.swrl"), ("--ontology", "n.owl")])
 def test_missing_files_exit_with_2(option: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(option, name) == 2
     assert "Traceback" not in capsys.readouterr().err
-
-
-def test_another_ontology_altogether_lacks_what_the_mission_needs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "wine.owl"
-    path.write_text(
-        '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">'
-        '<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Bordeaux"/></rdf:RDF>',
-        encoding="utf-8",
-    )
-    assert command("--ontology", str(path)) == 1
-    assert "there is no function f_maintain_motion, which the mission needs" in capsys.readouterr().out
 
 
 def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(tmp_path: Path) -> None:
@@ -187,11 +140,6 @@ class TestBeforeItRuns:
     def test_what_was_skipped_is_said(self, tmp_path: Path) -> None:
         findings = found_by_pellet(tmp_path, "A: Role(?x) -> Role(?y)")
         assert only(findings, "not checked with Pellet").level is Level.INFO
-
-    def test_individuals_can_be_the_same_or_different(self, tmp_path: Path) -> None:
-        rules = "A: FunctionDesign(?x) ^ FunctionDesign(?y) ^ differentFrom(?x, ?y) -> Role(?x)\n"
-        (tmp_path / "mine.swrl").write_text(rules + "B: sameAs(?x, ?y) ^ Role(?x) -> Role(?y)\n", encoding="utf-8")
-        assert {"A", "B"} <= {rule.name for rule in Ontology.load(rules=[tmp_path / "mine.swrl"]).rules}
 
 
 def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:

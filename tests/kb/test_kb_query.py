@@ -39,10 +39,6 @@ def test_columns_of_all_variables_are_by_name(knowledge):
     assert found.columns == ("a", "b", "c", "m", "z1", "zone")
 
 
-def test_no_answer_is_reported(command):
-    assert command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")[:2] == (0, "d\nno rows\n")
-
-
 @pytest.mark.parametrize(
     ("query", "notes"),
     [

@@ -11,7 +11,7 @@ import pytest
 
 from suave_des import run_mission
 from suave_des.kb import KnowledgeBase
-from suave_des.kb.coverage import FIRES, Goal, least_cover, measure_coverage
+from suave_des.kb.coverage import FIRES, FIRES_NOT, Goal, least_cover, measure_coverage
 from suave_des.kb.mutation import (
     EQUIVALENT,
     KILLED,
@@ -24,7 +24,7 @@ from suave_des.kb.mutation import (
     sample,
 )
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
-from suave_des.kb.situations import Situation, compare
+from suave_des.kb.situations import Situation, difference
 from suave_des.kb.space import PolicySpace, States, interchangeable_components
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import QA_OPERATOR
@@ -240,12 +240,7 @@ def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_p
 
     def covered(**components: str) -> set[Goal]:
         state = knowledge.state(objectives=[SEARCH], components=components)
-        found = measure_coverage(knowledge, [Situation(state)], max_failed=1)
-        missing = {goal for each in found.rules for goal in (*each.missing, *each.unreachable)}
-        goals = {Goal("own", -1, "fires"), Goal("own", -1, "does not fire")} | {
-            Goal("own", number, outcome) for number in range(3) for outcome in ("holds", "fails")
-        }
-        return goals - missing
+        return set(measure_coverage(knowledge, [Situation(state)], max_failed=1).covered)
 
     # Nobody reports: there are components, of which none is FALSE. requiredBy is not even asked.
     assert covered() == {Goal("own", -1, "does not fire"), Goal("own", 0, "holds"), Goal("own", 1, "fails")}
@@ -294,7 +289,7 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
     for found in (each for each in results if each.state is not None):
         situation = Situation(found.state)
         changed = small.changed(found.mutant.applied(small.base))
-        assert [str(each) for each in compare(small.outcome, changed.outcome, [situation])] == [found.reason]
+        assert difference(small.outcome(situation), changed.outcome(situation)) == found.reason
 
 
 @pytest.mark.parametrize("all_rules", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -307,13 +302,12 @@ def test_coverage_names_what_is_missing_and_the_least_set_of_states_for_it(
         knowledge = KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
     situations = [situation for test in tests for situation in test.situations]
     coverage = measure_coverage(knowledge, situations, max_failed=0)
-    rules = {each.rule: each for each in coverage.rules}
-    assert (rules["QAWaterVisibility"].fired, rules["QAWaterVisibility"].not_fired) == (1, 1)
-    assert "equal" in {goal.outcome for goal in rules["QAWaterVisibility"].missing}
-    assert Goal("S10", -1, FIRES) in rules["S10"].unreachable
+    fired, not_fired = (Goal("QAWaterVisibility", -1, outcome) for outcome in (FIRES, FIRES_NOT))
+    assert (coverage.covered[fired], coverage.covered[not_fired]) == (1, 1)
+    assert "equal" in {goal.outcome for goal in coverage.missing if goal.rule == "QAWaterVisibility"}
+    assert Goal("S10", -1, FIRES) in coverage.unreachable
     proposed = [Situation(state) for state, _ in coverage.proposed]
-    again = measure_coverage(knowledge, [*situations, *proposed], max_failed=0)
-    assert not any(each.missing for each in again.rules)
+    assert not measure_coverage(knowledge, [*situations, *proposed], max_failed=0).missing
 
 
 def test_the_set_that_covers_all_is_the_least() -> None:

@@ -185,14 +185,6 @@ def test_of_what_does_not_hold_that_is_told_which_no_state_can_make_hold(knowled
     )
 
 
-def test_before_a_measurement_the_rule_lacks_it(knowledge):
-    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"})
-    with pytest.raises(InputError) as error:
-        knowledge.explain(state, "fg_status(fg_spiral_high, IN_ERROR_NFR)")
-    assert "rule QAWaterVisibility: " in str(error.value)
-    assert "hasQAvalue(" in str(error.value)
-
-
 def test_a_contradiction_names_the_rules_and_derives_both_sides(tmp_path):
     rules = tmp_path / "clash.swrl"
     rules.write_text(CLASH)

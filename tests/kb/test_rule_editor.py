@@ -198,23 +198,14 @@ def test_what_cannot_be_done_leaves_the_file_alone(owl: Path, edit, words: str) 
     assert [entry.name for entry in owl.parent.iterdir()] == ["suave.owl"]
 
 
-def entity_bomb(path: Path) -> None:
-    entities = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10 if n else "x" * 10}">' for n in range(30))
-    path.write_text(f"<!DOCTYPE r [{entities}]><r>&e29;</r>" + "<!-- -->" * 1_300_000, encoding="utf-8")
-
-
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda path: path.write_bytes(b""),
-        lambda path: path.write_bytes(path.read_bytes()[:9000]),
         lambda path: path.write_text("<html/>", encoding="utf-8"),
-        entity_bomb,
-        lambda path: path.write_text('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', encoding="utf-8"),
         lambda path: path.write_bytes(path.read_text(encoding="utf-8").encode("utf-16")),
         lambda path: path.unlink(),
     ],
-    ids=["empty", "cut", "page", "bomb", "external", "utf-16", "missing"],
+    ids=["page", "utf-16", "missing"],
 )
 def test_files_that_cannot_be_edited(owl: Path, spoil) -> None:
     spoil(owl)
@@ -249,16 +240,6 @@ def test_a_rule_of_many_atoms(owl: Path, atoms: int) -> None:
     assert new[1].count("hasValue") == atoms
     remove_rule(owl, "Long")
     assert said(owl) == before
-
-
-def test_line_ends_of_the_file_are_kept(owl: Path) -> None:
-    before = owl.read_bytes().replace(b"\n", b"\r\n")
-    owl.write_bytes(before)
-    add_rules(owl, BATTERY)
-    set_enabled(owl, "Battery", enabled=False)
-    assert owl.read_bytes().count(b"\n") == owl.read_bytes().count(b"\r\n")
-    remove_rule(owl, "Battery")
-    assert owl.read_bytes() == before
 
 
 def test_other_formats_are_not_edited(owl: Path) -> None:

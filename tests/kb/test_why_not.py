@@ -93,7 +93,7 @@ def test_a_rule_fires_where_pellet_says_so(knowledge, probes, design, statuses, 
     holding = probes.holding(Situation(state))
     questions = RuleQuestions(knowledge.base)
     answers = {rule.name: questions.of(rule, state).fires for rule in knowledge.base.rules}
-    assert answers == {rule.name: number in holding for number, rule in enumerate(knowledge.base.rules)}
+    assert answers == {rule.name: rule.body in holding for rule in knowledge.base.rules}
 
 
 def test_a_measured_attribute_that_no_design_estimates_is_told_as_kb_check_tells_it(knowledge, tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,15 +11,9 @@ import typer
 from suave_des.cli.console import progress
 from suave_des.cli.kb.options import MaxFailed, ReasonerOptions, counting_states, shown
 from suave_des.cli.options import Modes, Quiet, Seed, Workers
-from suave_des.estimates import interval_text
-from suave_des.records.metrics import Metric, metric_of
-from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.kb.difference import MissionDifference, PairedDifference, PolicyDifference
-
-_MOST_RUNS = 10
-"""Numbers of missions that are listed."""
+    from suave_des.kb.difference import MissionDifference
 
 
 @dataclass(frozen=True)
@@ -66,8 +59,8 @@ def diff(
     print(*difference.lines(), sep="\n")
     if missions is not None:
         print()
-        print(shown(_table(difference, missions)))
-        print(*_mission_lines(both, mission_options, missions), sep="\n")
+        print(shown(missions.table(difference)))
+        print(*missions.lines() if missions.changed else [_firing(both, mission_options)], sep="\n")
 
 
 def _missions(both: list[ReasonerOptions], options: MissionOptions) -> MissionDifference:
@@ -86,38 +79,13 @@ def _missions(both: list[ReasonerOptions], options: MissionOptions) -> MissionDi
         )
 
 
-def _table(difference: PolicyDifference, missions: MissionDifference) -> Table:
-    """Decisions and missions in one table."""
-    rows = [
-        ("decisions", "", "", "", "", f"{difference.states} of {difference.compared} states"),
-        ("missions", "", "", "", "", f"{len(missions.changed)} of {missions.missions}"),
-    ]
-    for each in missions.metrics:
-        found, changed = each.difference, f"{each.changed} of {missions.missions}"
-        values = f"{each.one:.2f}", f"{each.other:.2f}", f"{found.value:+.2f}", interval_text(found.interval, "+.2f")
-        rows.append((_metric(each).brief, *values, changed))
-    return Table(("", "A", "B", "B - A", "95% interval", "different"), rows)
-
-
-def _metric(each: PairedDifference) -> Metric:
-    return metric_of(each.metric) or Metric(each.metric, each.metric.replace("_", " "))
-
-
-def _mission_lines(both: list[ReasonerOptions], options: MissionOptions, missions: MissionDifference) -> Iterator[str]:
-    from suave_des.kb.difference import METRICS, firing_states
+def _firing(both: list[ReasonerOptions], options: MissionOptions) -> str:
+    """Whether rules that only one of the two has fire at all."""
+    from suave_des.kb.difference import firing_states
     from suave_des.knowledge.pellet import TimeLimit
 
-    if not missions.changed:
-        replaced = [each.replacements | {"modes_file": options.modes} for each in both]
-        limit = TimeLimit(both[0].time_limit, "--time-limit")
-        firing, states = firing_states(both[0].scenario, missions.missions, *replaced, seed=options.seed, limit=limit)
-        yield f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"
-        return
-    numbers = ", ".join(map(str, missions.changed[:_MOST_RUNS]))
-    more = len(missions.changed) - _MOST_RUNS
-    yield f"runs that differ: {numbers}" + (f" and {more} more" if more > 0 else "")
-    yield "largest changes"
-    for each in missions.metrics:
-        metric = _metric(each)
-        for run, before, after in each.extremes if each.metric in METRICS else ():
-            yield f"  run {run}: {metric.title} {before:.1f} {metric.unit} -> {after:.1f} {metric.unit}"
+    assert options.missions is not None
+    replaced = [each.replacements | {"modes_file": options.modes} for each in both]
+    limit = TimeLimit(both[0].time_limit, "--time-limit")
+    firing, states = firing_states(both[0].scenario, options.missions, *replaced, seed=options.seed, limit=limit)
+    return f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"

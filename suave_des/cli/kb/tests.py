@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -23,20 +22,15 @@ from suave_des.errors import InputError, did_you_mean, number_of
 from suave_des.errors import shown as quoted
 from suave_des.files import check_output_file, write_files
 from suave_des.resources import shipped_folder
-from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.kb import KnowledgeBase
-    from suave_des.kb.coverage import Coverage
-    from suave_des.kb.mutation import MutantResult
     from suave_des.kb.rule_tests import RuleTest, Tested, TestResult
     from suave_des.knowledge.state import KnowledgeState
 
 FAILED = 1
 """Exit status when a test fails."""
 _WIDTH = 80
-_LINES_SHOWN = 8
-"""Goals that no state reaches, on a terminal."""
 
 
 @dataclass(frozen=True)
@@ -251,7 +245,7 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     for about, knowledge, tests in suites:
         situations = [situation for test in tests for situation in test.situations]
         found = measure_coverage(knowledge, situations, max_failed)
-        print("", shown(_coverage_table(found)).rstrip("\n"), *_coverage_lines(found, max_failed), sep="\n")
+        print("", shown(found.table()).rstrip("\n"), *found.lines(max_failed), sep="\n")
         if file is not None and found.proposed:
             states: list[tuple[str, KnowledgeState]] = [(str(goals[0]), state) for state, goals in found.proposed]
             text = tests_text(about, knowledge, states, "States that other tests do not cover.")
@@ -261,43 +255,9 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
             print("nothing to write")
 
 
-def _coverage_table(coverage: Coverage) -> Table:
-    rows = []
-    for each in coverage.rules:
-        share = f"{len(each.covered)}/{len(each.covered) + len(each.missing)}"
-        counts = (each.fired, each.not_fired, share)
-        rows.append((each.rule, *map(str, (*counts, len(each.missing) or "", len(each.unreachable) or ""))))
-    covered = sum(len(each.covered) for each in coverage.rules)
-    reachable = covered + sum(len(each.missing) for each in coverage.rules)
-    title = f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
-    return Table(("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll")
-
-
-def _coverage_lines(coverage: Coverage, max_failed: int) -> Iterator[str]:
-    missing, unreachable = (
-        [goal for each in coverage.rules for goal in getattr(each, kind)] for kind in ("missing", "unreachable")
-    )
-    if missing:
-        yield "not covered"
-        yield from (f"  {goal}" for goal in missing)
-    if unreachable:
-        components = number_of(max_failed, "component")
-        words = f"of {coverage.states} kinds of states of this model, with at most {components} reporting"
-        yield f"not reached in any state ({words}), but facts in a test may reach it"
-        yield from (f"  {goal}" for goal in unreachable[:_LINES_SHOWN])
-        if len(unreachable) > _LINES_SHOWN:
-            yield f"  and {len(unreachable) - _LINES_SHOWN} more"
-    if coverage.proposed:
-        count = len(coverage.proposed)
-        yield f"a smallest set of states that would cover the rest: {count} (write them as tests with --write FILE)"
-        for state, goals in coverage.proposed:
-            yield f"  {state}"
-            yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
-
-
 def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
     """Show which mutants of each knowledge base the tests kill."""
-    from suave_des.kb.mutation import mutants_of, mutate, sample
+    from suave_des.kb.mutation import mutants_of, mutate, mutation_lines, mutation_table, sample
 
     for suite in suites:
         found = mutants_of(suite.knowledge.base)
@@ -313,29 +273,7 @@ def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions)
             began = time.perf_counter()
             results, states = mutate(suite.knowledge, suite.tests, chosen, options.max_failed, advance)
             duration_s = time.perf_counter() - began
-        print(*_mutation_lines(results, states, options.max_failed), sep="\n")
+        lines = mutation_lines(results, states, options.max_failed)
+        print("", shown(mutation_table(results)).rstrip("\n"), *lines, sep="\n")
         each_ms = 1000 * duration_s / max(1, len(results))
         print(f"{number_of(len(results), 'mutant')} in {duration_s:.1f} s, {each_ms:.0f} ms each")
-
-
-def _mutation_lines(results: Sequence[MutantResult], states: int, max_failed: int) -> Iterator[str]:
-    """A table of the operators, and each survivor with a state that tells it apart."""
-    from suave_des.kb.mutation import EQUIVALENT, KILLED, SURVIVED
-
-    kinds = (KILLED, SURVIVED, EQUIVALENT)
-    by_operator: dict[str, Counter[str]] = {}
-    for each in results:
-        by_operator.setdefault(each.mutant.operator, Counter())[each.result] += 1
-    killed, survived, equivalent = (sum(counts[kind] for counts in by_operator.values()) for kind in kinds)
-    share = killed / (killed + survived) if killed + survived else 1.0
-    title = f"mutation: {killed} of {killed + survived} mutants killed, {share:.0%}; {equivalent} equivalent"
-    rows = [(operator, *(str(counts[kind]) for kind in kinds)) for operator, counts in by_operator.items()]
-    yield "\n" + shown(Table(("operator", *kinds), rows, title)).rstrip("\n")
-    if survived:
-        yield "survivors, which no test notices"
-    for each in results:
-        if each.result == SURVIVED:
-            yield f"  {each.mutant}\n    {each.reason}\n    at {each.state}"
-    if states:
-        components = number_of(max_failed, "component")
-        yield f"equivalent: {states} kinds of states, with at most {components} reporting"
