@@ -24,7 +24,7 @@ _PART = ".part"
 
 DERIVED = (
     *("paper_table.md", "paper_table.csv"),
-    *("validation.csv", "validation_pairs.csv", "validation_shares.csv", "validation_positions.csv"),
+    *("validation.csv", "validation_pairs.csv", "validation_shares.csv"),
     *("validation_targets.csv", "validation.json", "distributions.png", "detections.png"),
     *("replay.html", "report.html"),
 )

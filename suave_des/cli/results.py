@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -95,7 +95,7 @@ def compare(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write .csv, .json, .md or .tex instead of printing; with --assisted-by also .png, .pdf or .svg.",
+            help="Write .csv, .json, .md or .tex instead of printing.",
         ),
     ] = None,
 ) -> None:
@@ -108,7 +108,7 @@ def compare(
     from suave_des.results.comparison import ENDINGS
 
     if out is not None:
-        _check_out(out, (*ENDINGS, *(() if assisted_by is None else (".png", ".pdf", ".svg"))))
+        _check_out(out, ENDINGS)
     names, columns = comma_separated(managers), comma_separated(metrics)
     comparison: Comparison | AssistedComparison
     if assisted_by is not None or population is not None or plan:
@@ -125,14 +125,9 @@ def compare(
             half_widths=half_width or (),
             unpaired=unpaired,
         )
-    if out is not None and out.suffix.lower() in ENDINGS:
+    if out is not None:
         write_files(out.parent, {out.name: getattr(comparison, ENDINGS[out.suffix.lower()])()})
         print(f"compared in {out}")
-    elif out is not None:
-        from suave_des.results.figures import draw_assisted, write_picture
-
-        write_picture(draw_assisted(cast("AssistedComparison", comparison)), out)
-        print(f"drawn in {out}")
     elif as_format is CompareFormat.TABLE:
         print(comparison.text(min(output().width, TEXT_WIDTH)), end="")
     else:

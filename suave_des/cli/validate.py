@@ -126,7 +126,9 @@ def validate(
         simulated = simulated.assign(**{CONDITION: conditions.numbers(simulated)})
     validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
     console = output()
-    notes = [*real.notes, *(conditions.listing() if conditions is not None else ())]
+    notes = list(real.notes)
+    if conditions is not None:
+        notes += [f"Condition {number}: {conditions.text(number)}" for number in range(1, len(conditions) + 1)]
     for line in [*notes, ""] if notes else ():
         console.print(line)
     for table in tables(validation, word):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -27,9 +27,6 @@ from suave_des.results import style
 from suave_des.results.missions import Group, Missions, first_alike, first_and_last, runs_sharing_draw, time_limit_s
 from suave_des.results.statistics import Sample
 from suave_des.results.style import folded, key_words, value_words
-
-if TYPE_CHECKING:
-    from suave_des.results.assisted import AssistedComparison
 
 _ROW_IN = 0.62
 """Height of a row of a figure that has one for each manager."""
@@ -146,33 +143,6 @@ def _draw_row_of_differences(
     for (value, run), (side, shift) in zip(first_and_last(apart), sides, strict=True) if has_numbers else ():
         look: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
         axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **look)
-
-
-def draw_assisted(found: AssistedComparison) -> style.Picture:
-    """Draw real against simulated means of each condition, and each manager's mean alone and assisted, by metric."""
-    names = list(dict.fromkeys(found.estimates["group"]))
-    looks = dict(zip(names, style.looks(names), strict=True))
-    figure = style.Picture(figsize=(style.WIDTH_IN, 2.4 * len(found.metrics)), layout="constrained")
-    for (left, right), metric in zip(figure.subplots(len(found.metrics), 2, squeeze=False), found.metrics, strict=True):
-        conditions = found.conditions[found.conditions["metric"] == metric.name]
-        estimates = found.estimates[(found.estimates["metric"] == metric.name) & (found.estimates["other"] == "")]
-        for row, (name, number) in enumerate(looks.items()):
-            mark: dict[str, Any] = {"marker": style.marker(number), "color": style.line(number)["color"]}
-            part = conditions[conditions["manager"] == name]
-            left.scatter(metric.scale * part["same"], metric.scale * part["real"], s=14, label=style.text(name), **mark)
-            for each in estimates[estimates["group"] == name].to_dict("records"):
-                for kind, shift, fill_colour in (("alone", -0.15, "white"), ("assisted", 0.15, mark["color"])):
-                    ends = np.array([each[kind], each[f"{kind}_ci95_low"], each[f"{kind}_ci95_high"]], float)
-                    value, low, high = metric.scale * ends
-                    errors = [[value - low], [high - value]]
-                    right.errorbar(value, row + shift, xerr=errors, mfc=fill_colour, ms=4.0, capsize=2.0, **mark)
-        ends = metric.scale * conditions[["same", "real"]].to_numpy()
-        left.plot([ends.min(), ends.max()], [ends.min(), ends.max()], color=style.GREY, lw=0.7, zorder=0)
-        left.set(xlabel=f"{metric.heading}: simulated, by condition", ylabel="real")
-        right.set(xlabel=f"{metric.brief}: alone (open), assisted", ylim=(len(names) - 0.5, -0.5))
-        right.set_yticks(range(len(names)), [style.text(name) for name in names])
-    figure.axes[0].legend()
-    return figure
 
 
 def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:

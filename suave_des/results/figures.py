@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas
 from matplotlib.figure import Figure
@@ -18,9 +17,6 @@ from suave_des.results import campaign_figures, style
 from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
 from suave_des.results.missions import Group, Missions, grouped, missions_of, read_missions
 from suave_des.results.style import key_words
-
-if TYPE_CHECKING:
-    from suave_des.results.assisted import AssistedComparison
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -142,12 +138,6 @@ def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
     """
     with style.publication():
         return _of_missions(missions_of(frame), kind, ())
-
-
-def draw_assisted(found: AssistedComparison) -> Figure:
-    """Draw a comparison of real missions, assisted by simulated ones: the conditions, and the intervals of means."""
-    with style.publication():
-        return campaign_figures.draw_assisted(found)
 
 
 def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:

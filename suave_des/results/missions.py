@@ -555,18 +555,14 @@ def _never_found(groups: Sequence[Group]) -> Iterator[str]:
 
 
 def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:
-    for are_missions, what in (
-        (True, f"missions without a {metric.title}"),
-        (False, f"averages over missions of which some have no {metric.title}"),
-    ):
-        counts = [
-            f"{group.name} {n - known} of {n}"
-            for group in groups
-            if group.is_of_missions is are_missions
-            and 0 < (known := len(group.known_values(metric.name))) < (n := len(group.frame))
-        ]
-        if counts:
-            yield f"{what} ({listed(counts)}) are left out of it; they may be those that went worst"
+    known = [(group, len(group.known_values(metric.name))) for group in groups]
+    counts = [
+        f"{group.name} {len(group.frame) - n} of {len(group.frame)}" for group, n in known if 0 < n < len(group.frame)
+    ]
+    if counts:
+        what = "missions" if all(group.is_of_missions for group in groups) else "missions, or averages over missions,"
+        without = f"{what} without a {metric.title} ({listed(counts)})"
+        yield f"{without} are left out of it; they may be those that went worst"
 
 
 def printable(name: str) -> str:

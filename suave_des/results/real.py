@@ -8,7 +8,7 @@ the share of missions that there may be in them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Unpack
@@ -40,7 +40,6 @@ _RELATIVE, _ABSOLUTE = 1e-3, 0.01
 """Data files give conditions rounded; values as near as this are the same."""
 _START_M = 0.25
 """Starts under the same condition differ by no more, apart from a shift that all have."""
-_LISTED = 12
 _TOLERANCE = 1e-6
 """Places come from sums of steps; an interval must contain the values that it names."""
 
@@ -169,13 +168,6 @@ class Conditions:
     def text(self, number: int) -> str:
         """Return a condition's values, such as "start.y_m=2.455"."""
         return ", ".join(f"{name}={value}" for name, value in zip(self.names, self.values[number - 1], strict=True))
-
-    def listing(self) -> Iterator[str]:
-        """Yield a line for each condition with its values; of very many, only of the first."""
-        for number in range(1, min(len(self), _LISTED) + 1):
-            yield f"Condition {number}: {self.text(number)}"
-        if len(self) > _LISTED:
-            yield f"... and {len(self) - _LISTED} more"
 
     def numbers(self, runs: pandas.DataFrame) -> NDArray[np.int64] | None:
         """Return the number of each mission's condition, by what its columns say.

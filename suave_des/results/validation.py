@@ -24,8 +24,6 @@ from suave_des.results.statistics import SIGNIFICANCE, Sample
 
 COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
-POSITION_STEP_M = 0.5
-"""Spacing of the pipeline points on its long pieces, and so of places of detection."""
 _LEAST_AGREEMENT = 0.5
 _TARGET = ("kind", "subject", "what", "value", "low", "high", "met")
 _SIGNIFICANT_DIGITS = 8
@@ -37,7 +35,6 @@ TABLES = {
     "cells": "validation.csv",
     "pairs": "validation_pairs.csv",
     "shares": "validation_shares.csv",
-    "positions": "validation_positions.csv",
     "conditions": "validation_conditions.csv",
     "targets": "validation_targets.csv",
 }
@@ -56,7 +53,6 @@ class Validation:
         cells: a row for each metric and manager: both samples, their difference and its tests.
         pairs: a row for each metric and pair of managers.
         shares: a row for each cluster or other region, and manager.
-        positions: a row for each manager and place of detection.
         conditions: a row for each metric, manager and condition, where conditions are known; else empty.
         targets: a row for each requirement; `met` is True, False, or None if it cannot be judged.
         not_found_s: search time that counts for missions that never found the pipeline; none if there are none.
@@ -66,7 +62,6 @@ class Validation:
     cells: pandas.DataFrame
     pairs: pandas.DataFrame
     shares: pandas.DataFrame
-    positions: pandas.DataFrame
     conditions: pandas.DataFrame
     targets: pandas.DataFrame
     not_found_s: float | None
@@ -163,8 +158,7 @@ def validate(
     counted = compare_shares(shares, real, ours, managers)
     conditions = compare_conditions(real, ours, managers, COMPARED)
     targets = _judged(_targets(cells, pairs, counted, over_conditions(conditions), limits))
-    places = compare_places(real, ours, managers)
-    return Validation(tuple(managers), cells, pairs, counted, places, conditions, targets, not_found_s)
+    return Validation(tuple(managers), cells, pairs, counted, conditions, targets, not_found_s)
 
 
 def common_limit(*sides: pandas.DataFrame) -> float | None:
@@ -253,7 +247,7 @@ def _pair(
     }
 
 
-# Shares and places
+# Shares
 
 
 def compare_shares(
@@ -284,23 +278,6 @@ def _proportions(published: tuple[int, int], simulated: tuple[int, int]) -> dict
     for side, (number, n) in (("published", published), ("simulated", simulated)):
         row |= {f"{side}_count": number, f"{side}_n": n, **share_of(number, n, "exact").columns(f"{side}_share")}
     return row
-
-
-def compare_places(
-    published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
-) -> pandas.DataFrame:
-    """Count the detections at each place, to the nearest POSITION_STEP_M.
-
-    Returns:
-        A row for each manager, in the order given, and place, with the columns of validation_positions.csv.
-    """
-    rows = []
-    for manager in managers:
-        steps = [(sample(runs, manager, "detection_x_m") / POSITION_STEP_M).round() for runs in (published, simulated)]
-        for place in np.unique(np.concatenate(steps)).tolist():
-            counts = ((int((side == place).sum()), len(side)) for side in steps)
-            rows.append({"manager": manager, "detection_x_m": place * POSITION_STEP_M, **_proportions(*counts)})
-    return pandas.DataFrame(rows)
 
 
 # Conditions

@@ -124,7 +124,6 @@ def tables(validation: Validation, real: str) -> Iterator[Table]:
     columns = (*head, ("|difference|", "{difference:.2f}"), *stds)
     within = over_conditions(validation.conditions)
     found.append(_table(within, "Within conditions: medians over the conditions", "ll", *columns))
-    found.append(_places(validation, real))
     rows = [_target(each) for each in _rows(validation.targets)]
     found.append(Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl"))
     yield from (table for table in found if table.rows)
@@ -163,26 +162,6 @@ def _power(validation: Validation, real: str) -> Iterator[str]:
 
 def _rows(frame: pandas.DataFrame) -> list[dict[Any, Any]]:
     return frame.to_dict("records")
-
-
-def _places(validation: Validation, real: str) -> Table:
-    """Return the places of detection, with managers across."""
-    known = {(each["manager"], each["detection_x_m"]): each for each in _rows(validation.positions)}
-    none = {"published_n": 0, "simulated_share": None}
-    rows = []
-    for x_m in sorted({x_m for _, x_m in known}):
-        row = [f"{x_m:.1f}"]
-        for manager in validation.managers:
-            found = known.get((manager, x_m), none)
-            share = found["simulated_share"]
-            row += [
-                str(found["published_count"]) if found["published_n"] else "",
-                "" if share is None else percent(share),
-            ]
-        rows.append(row)
-    headings = ["x, m", *(heading for manager in validation.managers for heading in (manager, "simulated"))]
-    title = f"Places of detection, by x of the point seen first: {real} number, simulated share"
-    return Table(headings, rows, title, "r")
 
 
 def _target(each: Mapping[str, Any]) -> tuple[str, ...]:

@@ -51,7 +51,7 @@ def test_a_sweep_averages_a_metric_only_of_runs_that_have_it_at_all_points() -> 
     assert found.n == 20
     assert found.difference.value == 0.0
     assert [(each.n, each.missing) for each in comparison.summaries] == [(40, 0), (20, 20)]
-    assert any("b 20 of 40" in note and "no mean reaction time" in note for note in comparison.notes)
+    assert any("b 20 of 40" in note and "without a mean reaction time" in note for note in comparison.notes)
     search = compare_frame(frame, metrics=["search_time_s"]).differences[0]
     assert search.n == 40
 

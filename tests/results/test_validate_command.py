@@ -56,7 +56,6 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
         "validation.csv",
         "validation_pairs.csv",
         "validation_shares.csv",
-        "validation_positions.csv",
         "validation_targets.csv",
         "validation.json",
         "distributions.png",

@@ -8,7 +8,7 @@ from suave_des.errors import InputError
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.results.real import Share, count, read_targets, targets_beside
-from suave_des.results.validation import compare_places, compare_shares
+from suave_des.results.validation import compare_shares
 
 UNKNOWN = math.nan
 
@@ -50,17 +50,6 @@ def test_no_mission_has_no_share(missions):
     assert count(share, frame) == (0, 0)
     (row,) = compare_shares([share], frame.assign(pipeline_found=math.nan), frame, ["none"]).to_dict("records")
     assert row["published_share"] is None
-
-
-def test_places_are_counted_to_the_nearest_half_metre_on_both_sides(missions):
-    published = missions({"none": [(1, 1, -19.0), (1, 1, -17.5), (1, 1, UNKNOWN)]})
-    simulated = missions({"none": [(1, 1, -19.0003), (1, 1, -19.0), (1, 1, -16.0), (1, 1, -17.5)]})
-    found = compare_places(published, simulated, ["none"]).set_index("detection_x_m")
-    assert found[["published_count", "published_n", "simulated_count", "simulated_n"]].T.to_dict("list") == {
-        -19.0: [1, 2, 2, 4],
-        -17.5: [1, 2, 1, 4],
-        -16.0: [0, 2, 1, 4],
-    }
 
 
 def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their_targets():
