@@ -14,7 +14,7 @@ from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.inputs import check_inputs, provenance
 from suave_des.campaign.progress import OnProgress
-from suave_des.campaign.spec import RUNS_LIMIT, CampaignSpec, check_range, check_seed
+from suave_des.campaign.spec import CampaignSpec, check_mission
 from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.metrics.result import MissionResult
 from suave_des.records.knowledge import KNOWLEDGE_FILE
@@ -99,8 +99,7 @@ def run_mission(
     folder = None if out is None else Path(out)
     if folder is not None:
         check_output_folder(folder, "mission", overwrite=overwrite)
-    check_range("run", run, 1, RUNS_LIMIT)
-    check_seed(seed)
+    check_mission(run, seed)
     name = name_of(manager)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs([loaded], [name], replacements)

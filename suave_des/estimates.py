@@ -74,11 +74,6 @@ def known(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def interval_text(interval: Interval | None, style: str) -> str:
-    """Write an interval for a table, with its ends in a number format; empty for None."""
-    return "" if interval is None else f"{interval[0]:{style}} to {interval[1]:{style}}"
-
-
 def percent(share: float) -> str:
     """Write a share in whole per cent: "100%" of all only, and "0%" of none only; empty for nan."""
     if math.isnan(share):

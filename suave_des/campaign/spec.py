@@ -188,12 +188,13 @@ def check_range(what: str, number: int, least: int, greatest: int) -> None:
         raise InputError(f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}")
 
 
-def check_seed(seed: int) -> None:
-    """Check that a seed fits into result files.
+def check_mission(run: int, seed: int) -> None:
+    """Check that a run's number, or that of the runs, and a seed fit into result files.
 
     Raises:
-        InputError: it does not.
+        InputError: they do not.
     """
+    check_range("run", run, 1, RUNS_LIMIT)
     check_range("seed", seed, 0, SEED_LIMIT)
 
 

@@ -8,7 +8,7 @@ from typing import Any, Unpack
 
 from suave_des.arguments import plain_arguments
 from suave_des.campaign.inputs import check_inputs
-from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
+from suave_des.campaign.spec import RUNS_LIMIT, check_mission, check_range
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
 from suave_des.learned import Learned, read_file
@@ -55,7 +55,7 @@ def train(
     """
     check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)
-    check_seed(seed)
+    check_mission(1, seed)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs([loaded], [manager], {})
     before = None if start is None else read_file(Path(start))

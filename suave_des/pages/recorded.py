@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from suave_des.campaign.campaign import opened_campaign
 from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.missions import MissionRunner
-from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
+from suave_des.campaign.spec import check_mission
 from suave_des.errors import InputError
 from suave_des.metrics.result import MissionResult
 from suave_des.records.mission_folder import MISSION_FILE, MissionRecord, read_mission, record_of
@@ -122,8 +122,7 @@ def missions_run(loaded: LoadedScenario, chosen: MissionSelection) -> list[Recor
     """
     managers = chosen.managers or ("metacontrol",)
     _check_number(len(managers))
-    check_range("run", chosen.run, 1, RUNS_LIMIT)
-    check_seed(chosen.seed)
+    check_mission(chosen.run, chosen.seed)
     check_inputs([loaded], managers, {})
     simulator = Simulator(loaded)
     return [recorded_result(loaded, simulator.run(each, chosen.run, chosen.seed, record=True)) for each in managers]
