@@ -14,7 +14,7 @@ import rdflib
 from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
-from suave_des.estimates import Estimate, interval_text
+from suave_des.estimates import Estimate
 from suave_des.kb.policy import Policy, no_proof
 from suave_des.kb.situations import Probes, Situation
 from suave_des.kb.space import PolicySpace
@@ -229,7 +229,7 @@ class MissionDifference(NamedTuple):
         ]
         for metric, pairs, found, changed in self.metrics:
             values = [*(f"{each:.2f}" for each in pairs.mean()), f"{found.value:+.2f}"]
-            rows.append((metric.brief, *values, interval_text(found.interval, "+.2f"), f"{changed} of {self.missions}"))
+            rows.append((metric.brief, *values, found.text("+.2f"), f"{changed} of {self.missions}"))
         return Table(("", "A", "B", "B - A", "95% interval", "different"), rows)
 
     def lines(self) -> Iterator[str]:
