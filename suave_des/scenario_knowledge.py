@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -47,9 +47,6 @@ def read_base(
     scenario: Scenario,
     ontologies: Sequence[Path] | None = None,
     rules: Sequence[Path] | None = None,
-    *,
-    more_rules: Sequence[Path] = (),
-    disabled_rules: Collection[str] = (),
 ) -> Ontology:
     """Read ontologies and rules with a scenario's values, and with what its revision assumes.
 
@@ -57,8 +54,6 @@ def read_base(
         scenario: the scenario.
         ontologies: files; None: those that the scenario names.
         rules: files of rules as text; None: those that the scenario names.
-        more_rules: files of rules as text besides these.
-        disabled_rules: names of rules to switch off besides the scenario's.
 
     Raises:
         KnowledgeError: the ontologies or rules cannot be read.
@@ -69,8 +64,8 @@ def read_base(
     return Ontology.load(
         named,
         values=_values(scenario),
-        rules=[*texts, *more_rules],
-        disabled_rules=[*knowledge.disabled_rules, *disabled_rules],
+        rules=texts,
+        disabled_rules=knowledge.disabled_rules,
         operators=scenario.revision.comparison_operators,
     )
 

@@ -139,14 +139,12 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
     )
 
 
-def _with_atoms(rule: Rule, body: Sequence[Atom], head: Sequence[Atom]) -> tuple[Rule, Rule]:
+def _with_atom(rule: Rule, number: int, atom: Atom | None) -> tuple[Rule, Rule]:
+    """The rule with another atom in a place of its body or head; None: with none there."""
+    body, head = list(rule.body), list(rule.head)
+    side, at = (body, number) if number < len(body) else (head, number - len(body))
+    side[at : at + 1] = [] if atom is None else [atom]
     return rule, with_triples(replace(rule, body=tuple(body), head=tuple(head)))
-
-
-def _with_atom(rule: Rule, number: int, atom: Atom) -> tuple[Rule, Rule]:
-    """The rule with another atom in a place of its body or head."""
-    atoms = [*rule.atoms[:number], atom, *rule.atoms[number + 1 :]]
-    return _with_atoms(rule, atoms[: len(rule.body)], atoms[len(rule.body) :])
 
 
 def _with_argument(rule: Rule, number: int, place: int, term: Term) -> tuple[Rule, Rule]:
@@ -184,7 +182,7 @@ def _shifted(sign: str) -> str:
 def _dropped(base: Ontology) -> Iterator[_Change]:
     for rule in base.content.enabled_rules:
         for number in range(len(rule.body)) if len(rule.body) > 1 else ():
-            yield _with_atoms(rule, (*rule.body[:number], *rule.body[number + 1 :]), rule.head)
+            yield _with_atom(rule, number, None)
 
 
 def _next(one: _T, alike: Sequence[_T]) -> _T:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -29,7 +29,6 @@ from suave_des.knowledge.state import NONE_LEFT
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
-from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 
@@ -123,12 +122,6 @@ def try_rules(
     rule: str | None = None,
     *,
     disabled: str | None = None,
-    scenario: str | None = None,
-    values: Mapping[str, Any] = {},
-    ontologies: Sequence[Path] = (),
-    rules: Sequence[Path] = (),
-    disabled_rules: Sequence[str] = (),
-    reasoner: str | None = None,
     limit_s: float = TIME_LIMIT_S,
 ) -> Iterator[MissionReplay]:
     """Try adding or disabling rules on recorded missions, one after the other.
@@ -139,11 +132,6 @@ def try_rules(
         folder: output folder of a mission or of a campaign that recorded its knowledge, or a folder of such folders.
         rule: a rule as text, or a file of rules; they replace those of the same name.
         disabled: alternatively, the name of a rule to disable.
-        scenario: file or name of a scenario in place of that of the missions.
-        values: of that scenario, by key path.
-        ontologies, reasoner: in place of the scenario's.
-        rules: files of rules as text, in addition to the scenario's.
-        disabled_rules: names of rules to switch off with and without the change.
         limit_s: of the reasoner, for one state.
 
     Raises:
@@ -152,19 +140,14 @@ def try_rules(
     """
     if (rule is None) == (disabled is None):
         raise InputError("give a rule, or --disable NAME", remedy="one of the two")
-    if values and scenario is None:
-        raise InputError("the recorded scenario cannot be changed", place="--set", remedy="name one with --scenario")
-    given = None if scenario is None else load_scenario(scenario, values=values)
     limit = TimeLimit(limit_s, "--time-limit")
     trial: _Trial | None = None
     for mission in _recorded_missions(folder):
-        used = given.scenario if given else mission.scenario
+        used = mission.scenario
         if trial is None or trial.scenario != used:
-            named, texts = (given.ontologies, given.rules) if given else (None, None)
-            base = read_base(used, ontologies or named, texts, more_rules=rules, disabled_rules=disabled_rules)
-            settings, name = ManagingSettings.of(used), reasoner or used.knowledge.reasoner
             is_first = trial is None
-            trial = _Trial(used, KnowledgeBase.of(base, settings, name, limit), rule, disabled)
+            before = KnowledgeBase.of(read_base(used), ManagingSettings.of(used), used.knowledge.reasoner, limit)
+            trial = _Trial(used, before, rule, disabled)
             if is_first and rule is not None:
                 trial.warn()
         cycles = tuple(each for each in map(trial.replay, mission.records) if each is not None)

@@ -34,11 +34,6 @@ def test_infer_decides_with_the_values_that_are_set(command, improves: str, func
     assert [each["function"] for each in json.loads(out)["plan"]] == functions
 
 
-def test_a_name_without_a_dot_is_a_measured_value(command) -> None:
-    _, out, _ = command("kb", "infer", "--format", "json", *STATE)
-    assert json.loads(out)["state"]["measurements"] == {"water_visibility": "4"}
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -51,12 +46,9 @@ def test_a_name_without_a_dot_is_a_measured_value(command) -> None:
         ("rules",),
         ("diff", "suave.owl", "suave.owl"),
         ("test",),
-        ("try", "--on", ".", "r: Binding(?b) -> Binding(?b)", "--scenario", "seams2023"),
     ],
 )
 def test_every_command_that_takes_a_scenario_refuses_an_unknown_key(command, arguments: tuple[str, ...]) -> None:
-    if arguments[0] == "try":
-        command("run", "seams2023", "--out", ".")
     status, out, err = command("kb", *arguments, "--set", "mission.time_limt_s=9")
     assert (status, out) == (2, "")
     assert "--set" in err and "did you mean 'time_limit_s'" in err
@@ -72,12 +64,6 @@ def test_missions_that_diff_runs_have_the_values_that_are_set(command) -> None:
         (row,) = (line for line in out.splitlines() if line.startswith("search time, s"))
         means.append(float(row.split()[3]))
     assert means[0] <= 21.0 < means[1]
-
-
-def test_values_of_a_recorded_scenario_stay_as_they_are(command) -> None:
-    command("run", "seams2023", "--out", "mission")
-    status, _, err = command("kb", "try", "--on", "mission", "--disable", "x", "--set", "knowledge.reasoner=pellet")
-    assert status == 2 and "name one with --scenario" in err
 
 
 def test_tests_that_are_written_cannot_have_values_that_are_set(command) -> None:

@@ -20,7 +20,6 @@ ASKING = {
     "explain": STATE,
     "policy": ("--max-failed", "0"),
     "query": ("SELECT ?s WHERE { ?s a ?t } LIMIT 1", "--inferred"),
-    "try": (RULE, "--on", "flown"),
 }
 EDITING = {"add-rule": (RULE,), "remove-rule": ("S1a",), "enable-rule": ("S1a",), "disable-rule": ("S1a",)}
 NAMESPACES = (
@@ -106,7 +105,6 @@ def test_an_ontology_of_something_else_is_told_apart_from_a_broken_one(folder, c
         "infer": "there is no quality attribute, component or function 'water_visibility'",
         "explain": "there is no quality attribute, component or function 'water_visibility'",
         "policy": "no function has a function design",
-        "try": "FunctionGrounding is not defined",
     }.items():
         refused(command, name, (*ASKING[name], "--ontology", "wine.owl"), said)
     refused(command, "diff", ("wine.owl", "wine.owl", "--max-failed", "0"), "no function has a function design")
@@ -119,7 +117,7 @@ def test_a_rule_with_unbalanced_parentheses_is_refused_with_its_column(folder, c
     bad, said = RULE.replace("?fg)", "?fg", 1), "line 1, column 29: expected , or ) instead of -"
     Path("bad.swrl").write_text(bad)
     Path("suave.owl").write_bytes((shipped_folder("ontology") / "suave.owl").read_bytes())
-    for name in ("rules", "infer", "explain", "policy", "query", "try"):
+    for name in ("rules", "infer", "explain", "policy", "query"):
         refused(command, name, (*ASKING[name], "--rules", "bad.swrl"), f"bad.swrl: {said}")
     refused(command, "add-rule", ("suave.owl", bad), said)
     refused(command, "try", (bad, "--on", "flown"), said)

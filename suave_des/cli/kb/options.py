@@ -38,10 +38,6 @@ MaxFailed = Annotated[
         "--max-failed", min=0, metavar="N", help="Include states with up to N components failed or recovered."
     ),
 ]
-OtherScenario = Annotated[
-    str | None,
-    typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the one that the files name."),
-]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb.options import KnowledgeOptions, OtherScenario, TimeLimitS
-from suave_des.cli.options import KnowledgeFiles, Modes, Reasoner
+from suave_des.cli.kb.options import KnowledgeOptions, TimeLimitS
+from suave_des.cli.options import Modes
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
@@ -139,17 +139,7 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
         print(f"rule {name} is {word} in {file} already")
 
 
-@dataclass(frozen=True)
-class ReplayOptions(KnowledgeFiles):
-    """Options that replace or add to the knowledge base of recorded missions."""
-
-    scenario: OtherScenario = None
-    reasoner: Reasoner = None
-    time_limit: TimeLimitS = 60.0
-
-
 def try_(
-    options: ReplayOptions,
     on: Annotated[
         Path,
         typer.Option(
@@ -164,6 +154,7 @@ def try_(
     disable: Annotated[
         str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
     ] = None,
+    time_limit: TimeLimitS = 60.0,
 ) -> None:
     """Show when a rule would have fired in recorded missions, and which decisions would have been different.
 
@@ -172,16 +163,4 @@ def try_(
     """
     from suave_des.kb.replay import summary, try_rules
 
-    replayed = try_rules(
-        on,
-        rule,
-        disabled=disable,
-        scenario=options.scenario,
-        values=options.values,
-        ontologies=options.ontology or (),
-        rules=options.rules or (),
-        disabled_rules=options.disable_rule or (),
-        reasoner=options.reasoner,
-        limit_s=options.time_limit,
-    )
-    print(*summary(list(replayed)), sep="\n")
+    print(*summary(list(try_rules(on, rule, disabled=disable, limit_s=time_limit))), sep="\n")

@@ -16,7 +16,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 from suave_des.cli.console import output
-from suave_des.cli.kb.options import MaxFailed, OtherScenario, TimeLimitS, shown
+from suave_des.cli.kb.options import MaxFailed, TimeLimitS, shown
 from suave_des.cli.options import KnowledgeFiles
 from suave_des.errors import InputError, did_you_mean, number_of
 from suave_des.errors import shown as quoted
@@ -37,7 +37,10 @@ _WIDTH = 80
 class TestOptions(KnowledgeFiles):
     """Options that replace or add to what the files of tests say of their knowledge base."""
 
-    scenario: OtherScenario = None
+    scenario: Annotated[
+        str | None,
+        typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the one that the files name."),
+    ] = None
     time_limit: TimeLimitS = 60.0
 
     def apply(self, about: Tested) -> Tested:
