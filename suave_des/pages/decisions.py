@@ -77,10 +77,16 @@ def _base(mission: Recorded) -> tuple[Ontology, str]:
     """Open the mission's ontologies, with a note where one of them has changed since."""
     if mission.loaded is not None:
         return open_base(mission.loaded), ""
-    base = read_base(mission.scenario)
-    files = InputFiles()
-    for name in (*mission.scenario.knowledge.ontologies, *mission.scenario.knowledge.rules):
-        files.ontology(find(name, "ontology"))
+    knowledge, files = mission.scenario.knowledge, InputFiles()
+    # A file beside the scenario has its name from there in the scenario, and its path among the inputs.
+    paths = {Path(name).name: Path(name) for name in mission.record.inputs if Path(name).is_file()}
+    ontologies, rules = (
+        [paths.get(Path(name).name) or find(name, "ontology") for name in names]
+        for names in (knowledge.ontologies, knowledge.rules)
+    )
+    base = read_base(mission.scenario, ontologies, rules)
+    for path in (*ontologies, *rules):
+        files.ontology(path)
     before = {Path(name).name: digest for name, digest in mission.record.inputs.items()}
     changed = [
         Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest

@@ -12,6 +12,7 @@ from suave_des.cli.main import main
 from suave_des.pages.recorded import recorded
 from suave_des.pages.replay import mission_on_page
 from suave_des.records.mission_folder import read_mission
+from suave_des.resources import shipped_folder
 
 
 def status(*arguments):
@@ -59,6 +60,18 @@ def test_decisions_of_metacontrol_are_explained_as_they_were_made(tmp_path):
         assert (function, None if before == "ungrounded" else before, rest.partition(":")[0]) in changes
     rules = {fact["rule"] for each in page["cycles"]["inferences"] for fact in each["facts"] if fact["rule"]}
     assert rules <= page["cycles"]["rules"].keys()
+
+
+def test_an_ontology_beside_the_scenario_is_found_from_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own").mkdir()
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    (tmp_path / "own" / "suave.owl").write_text(text.replace(">3.25<", ">2.75<"), encoding="utf-8")
+    (tmp_path / "own" / "own.yaml").write_text(
+        "base: seams2023\nknowledge: {ontologies: [suave.owl]}\n", encoding="utf-8"
+    )
+    run_mission("own/own.yaml", "metacontrol", 1, 1, tmp_path / "mission")
+    assert mission_on_page(recorded(read_mission(tmp_path / "mission")))["cycles"]["note"] == ""
 
 
 def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_path):
