@@ -172,7 +172,11 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
             part = _Part(path, cells, line, needed)  # a header again, as in files that were put together
             parts.append(part)
         else:
-            part.add(line, cells)
+            if len(cells) != len(part.header):
+                problem = f"has {number_of(len(cells), 'value')}, but the header has {len(part.header)}"
+                raise line_error(path, line, problem, "give each column a value, if only an empty one")
+            part.rows.append(cells)
+            part.lines.append(line)
     frames = [each.frame() for each in parts if each.lines]
     if not frames:
         raise line_error(path, 1, "has no missions under its header", "one line for each mission is needed")
@@ -222,14 +226,6 @@ class _Part:
             if column not in self.header:
                 remedy = f"the columns {', '.join(wanted)} are needed"
                 raise line_error(path, line, f"has no column {column!r}", remedy)
-
-    def add(self, line: int, cells: Sequence[str]) -> None:
-        """Add a row."""
-        if len(cells) != len(self.header):
-            problem = f"has {number_of(len(cells), 'value')}, but the header has {len(self.header)}"
-            raise line_error(self.path, line, problem, "give each column a value, if only an empty one")
-        self.rows.append(cells)
-        self.lines.append(line)
 
     def frame(self) -> pandas.DataFrame:
         """Check and convert the cells; a frame with COLUMNS and the further ones, indexed by line."""

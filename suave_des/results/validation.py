@@ -341,16 +341,12 @@ def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
         a condition), and the ratio of these, simulated / real, `std_ratio`; nan for what is not known.
     """
     rows = []
-    for metric in dict.fromkeys(compared["metric"] if len(compared) else ()):
-        of_metric = compared[compared["metric"] == metric]
-        for manager in (*dict.fromkeys(of_metric["manager"]), "all"):
-            own = of_metric if manager == "all" else of_metric[of_metric["manager"] == manager]
-            stds = own[["real_std", "simulated_std"]].astype(float).dropna().median()
+    for metric, of_metric in compared.groupby("metric", sort=False) if len(compared) else ():
+        for manager, own in [*of_metric.groupby("manager", sort=False), ("all", of_metric)]:
+            real, ours = own[["real_std", "simulated_std"]].astype(float).dropna().median().tolist()
             row = {"manager": manager, "metric": metric, "conditions": len(own)}
-            row["difference"] = own["difference_of_medians"].abs().median()
-            real_std, simulated_std = float(stds["real_std"]), float(stds["simulated_std"])
-            ratio = simulated_std / real_std if real_std else math.nan
-            rows.append({**row, "real_std": real_std, "simulated_std": simulated_std, "std_ratio": ratio})
+            row |= {"difference": own["difference_of_medians"].abs().median(), "real_std": real, "simulated_std": ours}
+            rows.append({**row, "std_ratio": ours / real if real else math.nan})
     return pandas.DataFrame(rows)
 
 

@@ -8,7 +8,6 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.records.metrics import METRICS, metric_of
 from suave_des.records.runs import read_runs
-from suave_des.resources import shipped_folder
 
 OWN = "manager,search_time_s,distance_inspected_m"
 
@@ -22,11 +21,6 @@ def write(tmp_path: Path):
         return tmp_path / name
 
     return write_file
-
-
-def test_places_of_detection_are_known_for_19_missions_of_none_and_17_of_metacontrol():
-    frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
-    assert frame.groupby("manager")["detection_x_m"].count().to_dict() == {"none": 19, "random": 0, "metacontrol": 17}
 
 
 def test_a_campaigns_file_is_read_with_its_places_and_scenario(write):
@@ -93,12 +87,6 @@ def test_a_wrong_file_is_named_with_its_line_and_what_would_be_right(write, cont
     assert caught.value.place == f"line {line}"
     assert problem in caught.value.problem
     assert caught.value.remedy
-
-
-@pytest.mark.parametrize("name", ["missing.csv", "."])
-def test_a_file_that_is_missing_or_a_folder_is_named(tmp_path: Path, name):
-    with pytest.raises(InputError, match=r"no such file|is a folder"):
-        read_runs(tmp_path / name)
 
 
 def test_a_simulated_file_must_have_each_manager(write):
