@@ -317,7 +317,8 @@ def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
         elif not isinstance(here, dict):
             raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")
         elif part not in here:
-            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, here))))
+            named = (*here, "visibility", *here["signals"]) if here is data and "signals" in here else here
+            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, named))))
         holder, key = here, int(part) if isinstance(here, list) else part
         here = here[key]
     return holder, key

@@ -97,6 +97,7 @@ def test_options_of_the_command_line(folder: Path, settable: str) -> None:
         (("--set", "mission.time_limit_s=soon"), "time_limit_s"),
         (("--set", "mission.time_limit_s={"), "is not YAML"),
         (("--set", "misson.time_limit_s=3"), "did you mean 'mission'"),
+        (("--set", "visiblity.period_s=40"), "did you mean 'visibility'"),
         (("--manager-option", "=3"), "is not KEY=VALUE"),
         (("--manager-option", "other:Manager.mode=x"), "is for none of the managers"),
     ],
