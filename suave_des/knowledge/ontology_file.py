@@ -1,6 +1,6 @@
 """Read ontology files, and resolve their imports to local files. Nothing is ever fetched.
 
-Files are in RDF/XML, or, according to their extension, in Turtle, N-Triples or JSON-LD.
+Files are in RDF/XML, or, according to their extension, in Turtle or N-Triples.
 
 lxml reads the XML first: it stops at entities that expand too far, and knows line numbers. Simple internal entities, as
 Protégé writes them, are accepted.
@@ -39,11 +39,11 @@ from suave_des.resources import shipped_folder
 MAX_BYTES: Final = 64 * 2**20
 _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
-_OTHER_NOTATION: Final = "save it in Protégé as RDF/XML, or give it the ending of what it is: .ttl, .nt, .jsonld"
+_OTHER_NOTATION: Final = "save it in Protégé as RDF/XML, or give it the ending of what it is: .ttl, .nt"
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
 _EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
-_FORMATS: Final = {".ttl": ("turtle", "Turtle"), ".nt": ("nt", "N-Triples"), ".jsonld": ("json-ld", "JSON-LD")}
+_FORMATS: Final = {".ttl": ("turtle", "Turtle"), ".nt": ("nt", "N-Triples")}
 _ENDINGS: Final = (".owl", ".rdf", ".xml", *_FORMATS)
 #: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
 _SHIPPED: Final = {"tomasys": "tomasys.owl", "mros": "tomasys.owl", "suave": "suave.owl"}
@@ -197,9 +197,6 @@ def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     graph = Graph()
     form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
-    if form == "json-ld" and re.search(r'"@(context|import)"\s*:\s*(\[[^\]]*)?"', text):
-        problem = "its @context is elsewhere, and nothing is fetched from the network"
-        raise KnowledgeError(problem, file=path, remedy="write the @context out in the file")
     try:
         with _literals_as_written():
             # A file without xml:base gets a base that reveals nothing of this machine's folders.

@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from decimal import Decimal, InvalidOperation
-from typing import Final, NamedTuple, TypeVar, overload
+from typing import Final, NamedTuple, TypeVar
 
 from rdflib import BNode, Literal, URIRef
 from rdflib.term import Node
@@ -63,22 +63,9 @@ O_STATUS: Final = TOMASYS + "o_status"
 DECISION_PROPERTIES: Final = tuple(
     TOMASYS + name
     for name in (
-        "fd_error_log",
-        "fd_realisability",
-        "fg_status",
-        "hasNFR",
-        "hasQAestimation",
-        "hasQAvalue",
-        "hasValue",
-        "isQAtype",
-        "o_always_improve",
-        "o_status",
-        "o_updatable",
-        "qa_comparison_operator",
-        "solvesF",
-        "solvesO",
-        "typeF",
-        "typeFD",
+        *("fd_error_log", "fd_realisability", "fg_status", "hasNFR", "hasQAestimation", "hasQAvalue", "hasValue"),
+        *("isQAtype", "o_always_improve", "o_status", "o_updatable", "qa_comparison_operator"),
+        *("solvesF", "solvesO", "typeF", "typeFD"),
     )
 )
 
@@ -115,6 +102,7 @@ Triple = tuple[str, str, str | Lit]
 RdfTriple = tuple[Node, Node, Node]
 
 _T = TypeVar("_T")
+_Term = TypeVar("_Term", Lit, str | Lit)
 _WHOLE: Final = (
     *("integer", "int", "long", "short", "byte"),
     *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
@@ -181,11 +169,7 @@ def number_in(value: object) -> Decimal | None:
     return number if number.is_finite() else None
 
 
-@overload
-def canonical(value: Lit) -> Lit: ...
-@overload
-def canonical(value: str | Lit) -> str | Lit: ...
-def canonical(value: str | Lit) -> str | Lit:
+def canonical(value: _Term) -> _Term:
     """Return the same form for all numbers that Pellet treats as equal; other values are unchanged.
 
     A rule's 2.00 is meant to match a measured 2.0. Whole numbers of all datatypes are compared by value, and never

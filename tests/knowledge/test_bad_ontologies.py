@@ -31,7 +31,7 @@ BAD_FILES: dict[str, tuple[str, str]] = {
     "web page": ("<!DOCTYPE html>\n<html><body/></html>", "the root element is <html>"),
     "owl/xml": ('<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "the root element is <Ontology>"),
     "turtle": ("# mine\n@prefix : <http://x.org/y#> .\n", "save it in Protégé as RDF/XML, or give it the ending"),
-    "json": ('{"@context": {}}', "give it the ending of what it is: .ttl, .nt, .jsonld"),
+    "json": ('{"@context": {}}', "give it the ending of what it is: .ttl, .nt"),
     "rdf alone": (HEAD + '<rdf:Description rdf:about="http://x.org/y"/></rdf:RDF>', "no owl:Ontology"),
     "bad rdf": (HEAD + '<owl:Ontology rdf:about="http://x.org/y" rdf:ID="z"/></rdf:RDF>', "not RDF/XML"),
     "spaces in an iri": (HEAD + '<owl:Ontology rdf:about="http://x.org/a b"/></rdf:RDF>', "is not an IRI"),

@@ -12,7 +12,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import read_ontology
 
 
-@pytest.mark.parametrize(("ending", "form"), [("ttl", "turtle"), ("nt", "nt"), ("jsonld", "json-ld")])
+@pytest.mark.parametrize(("ending", "form"), [("ttl", "turtle"), ("nt", "nt")])
 def test_the_format_goes_by_the_ending(ending: str, form: str, kb: Ontology, shipped: Path, tmp_path: Path) -> None:
     path = tmp_path / f"suave.{ending}"
     path.write_text(read_ontology(shipped / "suave.owl").graph.serialize(format=form), encoding="utf-8")
@@ -35,9 +35,6 @@ def test_xml_is_read_in_the_encoding_that_it_declares(encoding: str, shipped: Pa
     [
         ("bad.ttl", "@prefix a: <http://x.org/#> .\na:b a:c .\n", "line 2: not Turtle: "),
         ("bad.nt", "<http://x.org/a> .\n", "not N-Triples: "),
-        ("bad.jsonld", "{", "not JSON-LD: "),
-        ("far.jsonld", '{"@context": "http://x.org/context"}', "its @context is elsewhere"),
-        ("far.jsonld", '{"@context": [{"a": "b"}, "http://x.org/context"]}', "its @context is elsewhere"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_reported_by_its_format(

@@ -22,15 +22,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from suave_des.errors import nearest
+from suave_des.errors import nearest, shown
 from suave_des.knowledge.rdf import PREFIXES, XSD, Lit, is_well_formed, local_name
-from suave_des.knowledge.rules import BUILTINS, Atom, Named, ParsedRule, Place, RuleError, Term, Variable
+from suave_des.knowledge.rules import Atom, Named, ParsedRule, Place, RuleError, Term, Variable
 
 if TYPE_CHECKING:
     from lark import Lark, Token
 
-#: Prefixes of further built-ins, which Protégé's SWRLTab has and Pellet has not.
-_FOREIGN_BUILTINS: Final = ("sqwrl", "swrlm", "swrlx", "temporal")
 MAX_DIGITS: Final = 400
 _WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
 #: Where a rule's name is expected, lark's contextual lexer reads a word alone; elsewhere "my:seen" is a prefixed name.
@@ -76,20 +74,10 @@ _EXPECTED: Final = (
     ("_LPAR", "(", None),
     ("_COLON", ":", "a rule is name: body -> head"),
 )
-#: Signs and words of other languages: what SWRL does not have, if that is so, and what would be right.
-_FOREIGN: Final = (
-    (re.compile(r"=>|⇒"), None, "write ->"),
-    (re.compile(r"&&?|(?i:and)\b"), None, "write ^"),
+#: What SWRL does not have, and what to do without it.
+_LACKING: Final = (
     (re.compile(r"\|\|?|∨|(?i:or)\b"), "'or'", "write a rule for each case"),
     (re.compile(r"[¬!~]|(?i:not)\b"), "negation", "say what holds instead"),
-    (re.compile(r"[‘’“”']"), None, 'write texts as "text"'),
-)
-_COMPARISON: Final = re.compile(r"(\?[\w-]+)\s*(<=|>=|!=|==?|[<>≤≥≠])")
-_COMPARING: Final = (
-    dict.fromkeys(("=", "=="), "equal")
-    | dict.fromkeys(("!=", "≠"), "notEqual")
-    | {"<": "lessThan", "<=": "lessThanOrEqual", "≤": "lessThanOrEqual"}
-    | {">": "greaterThan", ">=": "greaterThanOrEqual", "≥": "greaterThanOrEqual"}
 )
 _HEADER: Final = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE)
 _ESCAPE: Final = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
@@ -166,37 +154,21 @@ def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> R
     before = text[:at].split()[-1:] if len(accepted) == 1 else []
     if before and accepted <= {"_COLON", "_LPAR"} and before[0].lower() in ("and", "or", "not"):
         at = text.rindex(before[0], 0, at)  # it was taken for the name of a rule or of a predicate
-        before, accepted = [], {"_AND", "DISABLED"} if "_COLON" in accepted else {"PREFIXED"}
+        before, accepted = [], {"_ARROW"} if "_COLON" in accepted else {"PREFIXED"}
     place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
-    lacking, right = _foreign(text, at)
-    if lacking is not None:
-        return RuleError(f"SWRL has no {lacking}", file=file, place=place, remedy=right)
+    for word, lacking, remedy in _LACKING:
+        if word.match(text, at):
+            return RuleError(f"SWRL has no {lacking}", file=file, place=place, remedy=remedy)
     if text.startswith('"', at) and "STRING" in accepted:
         return RuleError("this text has no closing quote on its line", file=file, place=place)
-    expected, remedy = next((words, right) for name, words, right in _EXPECTED if name in accepted)
+    expected, right = next((words, right) for name, words, right in _EXPECTED if name in accepted)
     if before == ["^^"] or text[:at].endswith("^^"):
         expected = "a datatype, such as xsd:decimal,"
     elif accepted & {"_COLON", "_LPAR"} and before:
         expected += f" after {before[0][-30:]},"
-    elif {"_AND", "DISABLED"} <= accepted:
-        expected = "^ or the next rule's name"
-    elif {"PREFIXED", "_ARROW"} <= accepted:
-        expected += " or ->"
     found = _FOUND.match(text, at)
-    if found is None:
-        instead = "but the text ends here"
-    else:
-        shown = found.group() if len(found.group()) <= 30 else found.group()[:27] + "..."
-        instead = f"instead of {shown if shown.isprintable() else ascii(shown)}"
-    return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=right or remedy)
-
-
-def _foreign(text: str, at: int) -> tuple[str | None, str | None]:
-    """Recognize what other languages have: what SWRL does not have, if so, and what would be right."""
-    if comparison := _COMPARISON.match(text, at):
-        variable, operator = comparison.groups()
-        return None, f"write {_COMPARING[operator]}({variable}, ...)"
-    return next(((lacking, right) for word, lacking, right in _FOREIGN if word.match(text, at)), (None, None))
+    instead = f"instead of {shown(found.group(), 32)}" if found else "but the text ends here"
+    return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=right)
 
 
 class _Builder:
@@ -251,13 +223,9 @@ class _Builder:
         if token.type == "IRI":
             return self._place(token), self._iri(token, f"{token} is not an absolute IRI")
         prefix, _, local = token.partition(":")
-        if prefix in _FOREIGN_BUILTINS and prefix not in self._prefixes:
-            known = f"known are those of swrlb: {', '.join(sorted(map(local_name, BUILTINS)))}"
-            remedy = "kb query asks questions, in SPARQL" if prefix == "sqwrl" else known
-            raise self._wrong(token, f"Pellet has no built-ins of the prefix {prefix}:", remedy)
         if prefix not in self._prefixes:
-            remedy = f"declare it: prefix {prefix}: <...>; known: {', '.join(sorted(self._prefixes))}"
-            raise self._wrong(token, f"unknown prefix {prefix}:", nearest(prefix, self._prefixes) or remedy)
+            remedy = nearest(prefix, self._prefixes) or f"declare it: prefix {prefix}: <...>"
+            raise self._wrong(token, f"unknown prefix {prefix}:", remedy)
         return self._place(token), self._prefixes[prefix] + local
 
     def term(self, parts: Sequence[Any]) -> tuple[Place, Term]:
