@@ -112,20 +112,6 @@ def test_names_of_other_vocabularies_may_be_defined_elsewhere(tmp_path: Path) ->
     assert [each.message for each in warnings(findings)] == ["function f_new has no function design"]
 
 
-def test_a_number_with_a_comma(tmp_path: Path) -> None:
-    path = tmp_path / "edited.owl"
-    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    path.write_text(text.replace(">3.25<", ">3,25<"), encoding="utf-8")
-    assert only(findings_of(Subject([path])), "hasValue '3,25' is not an xsd:decimal").remedy == "a number such as 2.25"
-
-
-def test_modes_without_a_design_are_noted(tmp_path: Path) -> None:
-    modes = {"f_follow_pipeline": ["fd_follow_pipeline", "fd_unground", "fd_fast", "normal"]}
-    note = only(found(tmp_path, modes=modes), "modes of f_follow_pipeline without function design")
-    assert note.level is Level.INFO
-    assert note.message.endswith("metacontrol never chooses: fd_fast, normal")
-
-
 def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path: Path) -> None:
     known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
     warning = only(found(tmp_path, **known), "fd_spiral_medium expects a visibility of 2.25 m")
@@ -140,11 +126,6 @@ def test_shipped_scenarios_have_no_warning(scenario: str, capsys: pytest.Capture
     with pytest.raises(SystemExit) as ended:
         main(["kb", "check", "--scenario", scenario, "--fail-on", "warn"])
     assert not ended.value.code, capsys.readouterr().out
-
-
-def test_a_design_whose_name_is_nearly_that_of_a_mode(tmp_path: Path) -> None:
-    findings = found(tmp_path, modes={"f_follow_pipeline": ["fd_folow_pipeline"]})
-    assert only(findings, "fd_follow_pipeline has no mode").remedy == "did you mean fd_folow_pipeline?"
 
 
 @pytest.mark.parametrize("kind", ["FunctionDesign", "QAvalue"])
@@ -185,14 +166,6 @@ def test_a_thing_may_be_of_two_kinds_if_the_ontology_or_a_rule_says_so(tmp_path:
     subclass = f'<owl:Class rdf:about="{SUAVE}Module">{below}</owl:Class>'
     for more, extra in (("", both), ("", subclass), ("B: Role(?c) -> FunctionDesign(?c)", "")):
         assert not any("?c is a Component" in one.message for one in found(tmp_path, rule + more, extra))
-
-
-def test_a_class_that_an_axiom_misspells(tmp_path: Path) -> None:
-    below = f'<rdfs:subClassOf rdf:resource="{TOMASYS}Compnent"/>'
-    error = only(
-        found(tmp_path, extra=f'<owl:Class rdf:about="{SUAVE}Pump">{below}</owl:Class>'), "subClassOf Compnent"
-    )
-    assert (error.level, error.remedy) == (Level.ERROR, "did you mean Component?")
 
 
 def same(name: str) -> str:

@@ -9,8 +9,8 @@ from decimal import Decimal
 import pytest
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState, exact
-from tests.helpers.knowledge_states import SEARCH, searching
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState, exact
+from tests.helpers.knowledge_states import SEARCH
 
 
 @pytest.mark.parametrize(
@@ -40,18 +40,6 @@ def test_the_order_in_which_a_state_is_given_does_not_matter() -> None:
 def test_a_function_has_one_objective() -> None:
     with pytest.raises(KnowledgeError, match=f"{SEARCH} has two objectives"):
         KnowledgeState.of([ObjectiveState(SEARCH), ObjectiveState(SEARCH, "UNGROUNDED")])
-
-
-def test_a_state_tells_what_is_grounded_and_measured() -> None:
-    state = searching("fd_spiral_low", 1.5)
-    assert state.grounded(SEARCH) == "fd_spiral_low"
-    assert state.grounded("f_other") is None
-    assert state.measured("water_visibility") == (Decimal("1.5"),)
-    assert state.measured("battery_level") == ()
-
-
-def test_a_fact_reads_like_a_rule_atom() -> None:
-    assert str(Fact("fd_x", "fd_realisability", False)) == "fd_realisability(fd_x, false)"
 
 
 def test_importing_the_room_starts_and_loads_nothing() -> None:

@@ -35,10 +35,7 @@ def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: Ontology) -> None:
     [
         ("fd_spiral_high", 3.2499, True),
         ("fd_spiral_high", 3.25, False),
-        ("fd_spiral_high", 3.2501, False),
-        ("fd_spiral_medium", 2.24, True),
         ("fd_spiral_medium", 2.25, False),
-        ("fd_spiral_low", 1.2, True),
         ("fd_spiral_low", 1.25, False),
     ],
 )
@@ -48,10 +45,6 @@ def test_visibility_below_what_the_design_expects_is_an_error(
     inference = pellet.analyze(searching(design, visibility))
     assert inference.grounding_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
     assert inference.objective_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
-
-
-def test_a_grounding_without_measurement_is_not_in_error(pellet: Reasoner) -> None:
-    assert inferred(pellet, searching("fd_spiral_high")) == set()
 
 
 def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_error(pellet: Reasoner) -> None:

@@ -33,35 +33,23 @@ def refused(write, content: str, **options: object) -> InputError:
         # keys
         (HEAD + "misson: {}\n", "line 2, misson", "unknown key 'misson' (did you mean 'mission'?"),
         (VISIBILITY + "{perod_s: 3}\n", "line 3, signals.water_visibility.perod_s", "did you mean 'period_s'?"),
-        (WHOLE + "{kind: sinusoid, perod_s: 80, minimum: 1, maximum: 2}\n", "line 3, ", "'perod_s' (did"),
         (WHOLE + "{kind: sinusoid, minimum: 1, maximum: 2}\n", "line 3, signals.water_visibility.period_s", "missing"),
         (HEAD + "start: {x: 1}\nfoo: 1\nbar: 2\n", "line 2, start.x", "and 2 more"),
         ("signals: {}\n", "line 1, signals", "no signal named water_visibility"),
-        (HEAD + "signals: {water_visibility: null}\n", "line 2, signals", "no signal named water_visibility"),
         ("revision: 2023\n", "line 1, signals", "is missing"),
         (WHOLE + "{kind: constant, value: 2}\n  my sea: {kind: constant, value: 1}\n", "line 4, ", "'my sea' is not a"),
         (HEAD + "name: my scenario\n", "line 2, name", "'my scenario' is not a valid name"),
-        (HEAD + "name: 15\n", "line 2, name", "15 should be a string"),
         # keys in the wrong place
         (HEAD + "time_limit_s: 300\n", "line 2, time_limit_s", "it belongs under mission"),
-        (HEAD + "mission: {signals: {}}\n", "line 2, mission.signals", "it belongs at the top level"),
         (HEAD + "acceptance_m: 3\n", "line 2, ", "under revision.spiral or under revision.follow"),
-        (HEAD + "thruster: 3\n", "line 2, thruster", "it belongs under thruster_events[]"),
-        (HEAD + "minimum: 3\n", "line 2, minimum", "it belongs under signals.NAME"),
         # numbers
         (HEAD + "start: {x_m: .inf}\n", "line 2, start.x_m", ".inf should be a finite number"),
-        (HEAD + "knowledge: {values: {qa: .NaN}}\n", "line 2, knowledge.values.qa", ".nan should be a finite number"),
         (HEAD + "pipeline: {points_per_piece: 2.5}\n", "line 2, pipeline.", "2.5 should be a whole number"),
-        (VISIBILITY + "{noise: {distribution: normal, mean: 0, std: .nan}}\n", "line 3, ", ".nan should be a finite"),
         (VISIBILITY + "{period_s: '80'}\n", "line 3, signals.water_visibility.period_s", "'80' should be a number"),
-        (VISIBILITY + "{period_s: true}\n", "line 3, ", "true should be a number"),
-        (VISIBILITY + "{period_s: }\n", "line 3, ", "nothing should be a number"),
         (VISIBILITY + "{period_s: 0}\n", "line 3, ", "0 should be greater than or equal to 0.001"),
-        (HEAD + "mission: {time_limit_s: 1e9}\n", "line 2, mission.time_limit_s", "less than or equal to 100000"),
         (HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n", "line 2, ", ".inf should be a finite number"),
         # relations
         (VISIBILITY + "{minimum: 9}\n", "line 3, signals.water_visibility.minimum", "minimum 9 is above maximum 3.75"),
-        (VISIBILITY + "{maximum: 0}\n", "line 3, signals.water_visibility.maximum", "minimum 1.25 is above maximum 0"),
         (HEAD + "battery: {}\nsignals: {battery_level: {kind: constant, value: 1}}\n", "line 2, battery", "remove one"),
         (HEAD + "reaction_metric: {visibility_thresholds_m: [1, 2, 3]}\n", "line 2, ", "is not in falling order"),
         (HEAD + "managers: {bt: {search_modes: [fd_spiral_low]}}\n", "line 2, ", "search_modes 1"),
@@ -72,36 +60,22 @@ def refused(write, content: str, **options: object) -> InputError:
             "(known: dropout_probability, outages_s",
         ),
         (VISIBILITY + "{kind: sinus}\n", "line 3, signals.water_visibility.kind", "did you mean 'sinusoid'?"),
-        (VISIBILITY + "{kind: [sinusoid]}\n", "line 3, ", "is not allowed"),
-        (VISIBILITY + "7\n", "line 3, signals.water_visibility", "7 should be a mapping"),
         (WHOLE + "{period_s: 80}\n", "line 3, signals.water_visibility", "kind is missing"),
-        (VISIBILITY + "{kind: table, file: t.csv, interpolation: spline}\n", "line 3, ", "allowed: previous, linear"),
         # distributions
         (
             HEAD + "start: {x_m: {distribution: gauss}}\n",
             "line 2, start.x_m.distribution",
             "is no distribution that is known (give a number, or",
         ),
-        (HEAD + "start: {x_m: {mean: 3}}\n", "line 2, start.x_m", "is no distribution that is known"),
-        (HEAD + "start: {x_m: [3]}\n", "line 2, start.x_m", "[3] should be a number"),
         (
             HEAD + "start:\n  x_m:\n    distribution: uniform\n    minimum: 3\n    maximum: 1\n",
             "line 5, start.x_m.minimum",
             "minimum 3 is above maximum 1",
         ),
-        (NORMAL + "std: -1}}\n", "line 2, start.x_m.std", "-1 should be greater than or equal to 0"),
         (NORMAL + "std: 1, minimum: 9}}\n", "line 2, start.x_m.minimum", "leaves next to nothing"),
         (NORMAL + "std: 1e6}}\n", "line 2, start.x_m.std", "must be at most 20000"),
-        (HEAD + "start: {x_m: {distribution: choice, values: []}}\n", "line 2, start.x_m.values", "at least 1 item"),
         (HEAD + "start: {x_m: {distribution: choice, values: [1, 2e4]}}\n", "line 2, start.x_m.values", "20000 is out"),
-        (HEAD + "start: {z_m: -20}\n", "line 2, start.z_m", "-20 is out of range"),
         (HEAD + "start: {heading_rad: 90}\n", "line 2, start.heading_rad", "at least -6.3 and at most 6.3"),
-        (
-            HEAD + "start: {z_m: {distribution: uniform, minimum: -3, maximum: 2}}\n",
-            "line 2, start.z_m.maximum",
-            "2 is out of range",
-        ),
-        (HEAD + "latencies: {inference_s: -1}\n", "line 2, latencies.inference_s", "-1 is out of range"),
         (
             HEAD + "latencies: {inference_s: {distribution: normal, mean: 1, std: 1}}\n",
             "line 2, latencies.inference_s",
@@ -110,22 +84,14 @@ def refused(write, content: str, **options: object) -> InputError:
         # thruster events, both spellings
         (EVENTS + "{thruster: 7, event: failure, time_s: 3}\n", "line 3, thruster_events[0].thruster", "equal to 6"),
         (EVENTS + "(0,failure,35)\n", "line 3, thruster_events[0].thruster", "greater than or equal to 1"),
-        (EVENTS + "(1.5,failure,35)\n", "line 3, thruster_events[0]", "is not a thruster event"),
-        (EVENTS + "(1,failure,soon)\n", "line 3, thruster_events[0]", "is not a thruster event"),
         (EVENTS + "(1,failure,nan)\n", "line 3, thruster_events[0].time_s", ".nan should be a finite number"),
         (EVENTS + "(1,failed,35)\n", "line 3, thruster_events[0].event", "did you mean 'failure'?"),
-        (EVENTS + "(1;failure;35)\n", "line 3, thruster_events[0]", "is not a thruster event"),
-        (HEAD + "thruster_events: (1,failure,35)\n", "line 2, thruster_events", "should be a list"),
         (EVENTS + "(1,failure,35)\n  - (9,failure,35)\n", "line 4, thruster_events[1].thruster", "9 should be"),
         # other parts
         (HEAD + "mission:\n", "line 2, mission", "nothing should be a mapping"),
-        (HEAD + "pipeline: {vertices_m: [[1, 2, 3]]}\n", "line 2, pipeline.vertices_m", "at least 2 items"),
         (HEAD + "pipeline: {vertices_m: [[1, 2], [3, 4, 5]]}\n", "line 2, pipeline.vertices_m[0][2]", "is missing"),
         (HEAD + "managers: {metacontroll: {}}\n", "line 2, managers.metacontroll", "did you mean 'metacontrol'?"),
-        (HEAD + "managers: {'mine:Manager': 3}\n", "line 2, managers.mine:Manager", "3 should be a mapping"),
         (HEAD + "managers: {'mine:Manager': {starts_s: .inf}}\n", "line 2, managers.mine:Manager", "not finite"),
-        (HEAD + "managers: {'mine:Manager': {steps: [1, .nan]}}\n", "line 2, managers.mine:Manager", "not finite"),
-        (HEAD + "managers: {bt: {visibility_thresholds_m: [.nan, 2, 1]}}\n", "line 2, managers.bt.", ".nan should be"),
         (HEAD + "knowledge: {ontologies: suave.owl}\n", "line 2, knowledge.ontologies", "'suave.owl' should be a list"),
         (
             HEAD + "knowledge:\n  reasoner: pelet\n",
@@ -134,24 +100,13 @@ def refused(write, content: str, **options: object) -> InputError:
         ),
         # revisions and vehicles
         (HEAD + "revision: 2024\n", "line 2, revision", "no such file: '2024'"),
-        (HEAD + "revision: {base: '1.6'}\n", "line 2, revision.base", "no such file: '1.6'"),
-        (HEAD + "revision: [2023]\n", "line 2, revision", "[2023] should be a mapping"),
-        (HEAD + "revision: true\n", "line 2, revision", "true is not a file name"),
         ("revision: {follow: {acceptance_m: 1}}\n", "line 1, revision.name", "is missing"),
         (HEAD + "revision: {follow: {acceptance: 1}}\n", "line 2, revision.follow.acceptance", "mean 'acceptance_m'?"),
-        (HEAD + "revision: {base: 1.5, follow: {acceptance_m: -1}}\n", "line 2, revision.follow.", "-1 should be"),
-        (HEAD + "revision: {spiral: {centre: here}}\n", "line 2, revision.spiral.centre", "origin, activation"),
-        (HEAD + "revision: {spiral: {restarts_on_activation: maybe}}\n", "line 2, ", "'maybe' should be a boolean"),
         (HEAD + "vehicle: bluerov3\n", "line 2, vehicle", "did you mean 'bluerov2.yaml'?"),
-        (HEAD + "vehicle: [1]\n", "line 2, vehicle", "[1] should be a mapping"),
-        (HEAD + "vehicle: {thrusters: []}\n", "line 2, vehicle.thrusters", "at least 6"),
         # other files
         ("base: nowhere.yaml\n", "line 1, base", "no such file: 'nowhere.yaml'"),
-        ("base: [a]\n", "line 1, base", "['a'] is not a file name"),
-        ("base: .\n", "line 1, base", "is a folder"),
         ("base: mine.yaml\n", "line 1, base", "mine.yaml -> mine.yaml"),
         (HEAD + "modes_file: nowhere.yaml\n", "line 2, modes_file", "suave_modes.yaml"),
-        (HEAD + "modes_file: ''\n", "line 2, modes_file", "at least 1 character"),
         (
             HEAD + "knowledge: {ontologies: [suav.owl]}\n",
             "line 2, knowledge.ontologies[0]",
@@ -165,11 +120,6 @@ def refused(write, content: str, **options: object) -> InputError:
             "'fd_spiral_low'?",
         ),
         (HEAD + "default_modes: {f_search: fd_spiral_low}\n", "line 2, default_modes.f_search", "function 'f_search'"),
-        (
-            HEAD + "managers: {bt: {search_modes: [fd_spiral_high, fd_spiral_low, fd_spiral_mid]}}\n",
-            "line 2, managers.bt.search_modes[2]",
-            "has no mode 'fd_spiral_mid'",
-        ),
         # YAML
         (HEAD + "description: !!python/object/apply:os.system [ls]\n", "line 2, description", "the tag"),
         (HEAD + "name: a\nname: b\n", "line 3, name", "appears twice, first in line 2"),
@@ -185,15 +135,9 @@ def test_a_wrong_scenario_is_refused_with_file_place_and_words(write, content, p
 @pytest.mark.parametrize(
     "content",
     [
-        "start: {x_m: 5000, y_m: -9999, heading_rad: 6.283185307179586}",
         "start: {x_m: {distribution: normal, mean: -17, std: 300}}",
-        "current: {x_m_per_s: 8, y_m_per_s: -8}",
-        "mission: {time_limit_s: 86400}",
-        "battery: {discharge_time_s: 1e9}",
         "latencies: {inference_s: {distribution: exponential, mean: 600}}",
-        "managers: {random: {adaptation_period_s: 1e6}}",
         "signals: {atmospheric_pressure: {kind: constant, value: 1.013e5}, rate: {kind: constant, value: 1e9}}",
-        "signals: {water_visibility: {period_s: 1e6}}",
         "thruster_events: ['(1,failure,0)', '(2,failure,1e6)']",
         "pipeline: {vertices_m: [[0, 0, -20], [5000, 0, -20]]}",
     ],
@@ -208,21 +152,13 @@ def test_the_whole_message_is_one_readable_line(write):
     )
 
 
-def test_a_long_value_is_cut(write):
-    assert len(str(refused(write, VISIBILITY + "{period_s: '" + "x" * 5000 + "'}\n"))) < 300
-
-
 @pytest.mark.parametrize(
     "content",
     [
         '"a\\nb": 1\n',
-        '"' + "a" * 5000 + '": 1\n',
-        'base: "a\\nb"\n',
-        HEAD + 'modes_file: "a\\nb"\n',
         HEAD + 'revision: "a\\nb"\n',
         HEAD + 'default_modes: {f_follow_pipeline: "a\\nb"}\n',
         EVENTS + '"(1,failure,\\n)"\n',
-        EVENTS + "(1," + "x" * 5000 + ")\n",
     ],
 )
 def test_line_breaks_and_long_texts_do_not_reach_the_message(write, content):
@@ -235,12 +171,6 @@ def test_a_value_that_is_wrong_in_the_base_is_reported_there(write):
     error = refused(write, "base: common/base.yaml\nmission: {time_limit_s: 100}\n")
     assert error.file == "common/base.yaml"
     assert error.place == "line 3, signals.water_visibility.period_s"
-
-
-def test_a_value_that_is_wrong_over_a_sound_base_is_reported_in_the_derived_file(write):
-    write("common/base.yaml", VISIBILITY + "{period_s: 80}\n")
-    error = refused(write, "base: common/base.yaml\nsignals:\n  water_visibility:\n    period_s: -80\n")
-    assert (error.file, error.place) == ("mine.yaml", "line 4, signals.water_visibility.period_s")
 
 
 def test_of_two_wrong_files_the_users_own_comes_first(write):
@@ -272,12 +202,6 @@ def test_bases_in_a_circle_are_refused_with_the_circle(write):
     assert "mine.yaml -> a.yaml -> b.yaml -> mine.yaml" in error.problem
     write("b.yaml", "base: a.yaml\n")
     assert "a.yaml -> b.yaml -> a.yaml" in refused(write, HEAD + "revision: a.yaml\n").problem
-
-
-def test_a_wrong_table_is_reported_in_the_table(write):
-    write("t.csv", "t_s,value\n0,1\n0,2\n")
-    error = refused(write, VISIBILITY + "{kind: table, file: t.csv}\n")
-    assert (error.file, error.place) == ("t.csv", "line 3")
 
 
 @pytest.mark.parametrize(

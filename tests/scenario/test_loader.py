@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.resources import find, shipped_folder
+from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Calibration
 from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, TableSignal, ThrusterEvent
@@ -78,11 +78,6 @@ def test_paper_table_values_differs_from_seams2023_in_the_knowledge_and_what_rea
     assert ours.model_copy(update=same) == other
 
 
-@pytest.mark.parametrize("individual", sorted(load_scenario("paper_table_values").scenario.knowledge.values))
-def test_the_ontology_has_each_individual_whose_value_is_replaced(individual):
-    assert f'suave#{individual}"' in find("suave.owl", "ontology").read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize("revision", ['"2023"', "2023", "'1.5'", "1.5"])
 def test_a_revision_needs_no_quotes(write, revision):
     path = write("mine.yaml", HEAD + f"revision: {revision}\n")
@@ -130,23 +125,9 @@ def test_a_derived_scenario_is_called_after_its_file_unless_it_says_otherwise(wr
     assert load_scenario(write("slow_sea.yaml", HEAD + "name: other\n")).scenario.name == "other"
 
 
-def test_bases_may_have_bases(write):
-    write("a.yaml", HEAD + "mission: {time_limit_s: 100}\nstart: {x_m: -16}\n")
-    write("b.yaml", "base: a.yaml\nmission: {time_limit_s: 200}\n")
-    scenario = load_scenario(write("c.yaml", "base: b.yaml\nstart: {y_m: 1}\n")).scenario
-    assert (scenario.mission.time_limit_s, scenario.start.x_m, scenario.start.y_m) == (200, -16, 1)
-
-
 def test_a_signal_of_another_kind_replaces_the_base_s(write):
     path = write("mine.yaml", HEAD + "signals: {water_visibility: {kind: constant, value: 2}}\n")
     assert load_scenario(path).scenario.signals["water_visibility"] == ConstantSignal(kind="constant", value=2)
-
-
-def test_a_distribution_of_another_kind_replaces_the_base_s(write):
-    path = write("mine.yaml", HEAD + "start: {y_m: {distribution: normal, mean: 2.57, std: 0.1}}\n")
-    start = load_scenario(path).scenario.start
-    assert start.y_m.distribution == "normal"
-    assert load_scenario(write("mine.yaml", HEAD + "start: {y_m: 2}\n")).scenario.start.y_m == 2
 
 
 def test_null_removes_a_signal_a_value_and_the_battery(write):
@@ -262,8 +243,3 @@ def test_a_loaded_scenario_travels_by_value(write):
     packed = pickle.dumps(loaded)
     shutil.rmtree("folder")
     assert pickle.loads(packed) == loaded
-
-
-def test_an_outside_manager_finds_its_settings(write):
-    path = write("mine.yaml", HEAD + "managers: {'my.module:Manager': {gain: 3}}\n")
-    assert load_scenario(path).scenario.managers.model_extra == {"my.module:Manager": {"gain": 3}}

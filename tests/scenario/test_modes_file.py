@@ -1,6 +1,5 @@
 """System Modes files: the modes of each function, and each way in which a file is refused."""
 
-import pickle
 
 import pytest
 
@@ -124,11 +123,6 @@ def test_a_function_of_several_parts_is_active_when_one_is(write):
     assert not table.mode("f", "none").active
 
 
-def test_a_table_can_be_pickled(write):
-    table = read_modes(write("m.yaml", SEARCH))
-    assert pickle.loads(pickle.dumps(table)) == table
-
-
 def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
     table = read_modes(write("m.yaml", SEARCH))
     with pytest.raises(
@@ -148,27 +142,15 @@ LOW = "low: {ros__parameters: {spiral_altitude: 1}}"
         (changed("parts: f_generate_search_path_node", "parts: f_search_node"), "line 4, ", "part 'f_search_node'"),
         (changed("    parts: f_generate_search_path_node\n", ""), "line 2, ", "ros__parameters.parts: is missing"),
         (changed("active.low", "active.lwo"), "line 7, ", "has no mode 'lwo' (did you mean 'low'?"),
-        (changed("active.low", "activ"), "line 7, ", "'activ' is not a state of a node"),
         (changed("active.low", "true"), "line 7, ", "true is not a state of a node"),
         (changed("{f_generate_search_path_node: active}", "{f_other: active}"), "line 9, ", "'f_other' is not a part"),
-        (
-            changed("{f_generate_search_path_node: active}", "{}"),
-            "line 9, ",
-            "does not set f_generate_search_path_node",
-        ),
         (changed("{f_generate_search_path_node: active}", "active"), "line 9, ", "fd_plain: 'active' should be a map"),
         (changed("spiral_altitude: 3.0", "spiral_altitude: high"), "line 16, ", "'high' should be a number"),
-        (changed("spiral_altitude: 3.0", "spiral_altitude: true"), "line 16, ", "true should be a number"),
         (changed("spiral_altitude: 3.0", "spiral_altitude: -3"), "line 16, ", "-3 should be greater than 0"),
-        (changed("spiral_altitude: 3.0", "spiral_altitude: 200"), "line 16, ", "less than or equal to 20"),
-        (changed("spiral_altitude: 3.0", "spiral_altitude: .inf"), "line 16, ", ".inf should be a finite number"),
         (changed("spiral_altitude: 3.0", "spiral_altitud: 3.0"), "line ", "nothing reads 'spiral_altitud' (did you"),
         (changed("camera: true", "camera: .nan"), "line 16, ", ".nan is not a value"),
-        (changed("camera: true", "camera: [1]"), "line 16, ", "[1] is not a value"),
         (changed(LOW, "low: {spiral_altitude: 1}"), "line 15, ", "belongs under NAME.ros__parameters.modes.NAME.ros"),
-        (changed(LOW, "low: {ros__parameters: 1}"), "line 15, ", "1 should be a mapping"),
         (changed("type: node", "type: nod"), "line 12, ", "'nod' is not allowed (did you mean 'node'?"),
-        (changed("    type: node\n", ""), "line 11, ", "type is missing"),
         (changed("    type: node\n", "    type: node\n    mods: {}\n"), "line 13, ", "did you mean 'modes'?"),
         ("f:\n  type: system\n", "line 2, f.type", "it belongs under NAME.ros__parameters"),
         (SEARCH + "f_generate_search_path: {}\n", "line 17, ", "appears twice"),
