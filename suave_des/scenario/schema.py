@@ -205,6 +205,8 @@ def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | 
             return f"{shown(word)} is not allowed", did_you_mean(word, allowed, "allowed")
         case "union_tag_not_found":
             return f"{context['discriminator'].strip(chr(39))} is missing", "add it"
+        case "json_invalid" | "json_type":
+            return f"{shown(value)} is not JSON", "write an object in JSON, as text"
         case "string_pattern_mismatch":
             return f"{shown(value)} is not a valid name", "use letters, digits, _ . and -, beginning with a letter"
     # Pydantic's own sentence, such as "Input should be a valid number", in the words of YAML.

@@ -390,7 +390,7 @@ class TestCampaign:
         ("old", "new", "place", "words"),
         [
             ("random_seed: 100", "random_seed: many", "line 6, ", "random_seed: 'many' should be a whole number"),
-            ("[-40, 40]", "[40, -40]", "line 9, ", "begins after its end"),
+            ("[-40, 40]", "[40, -40]", "line 9, ", "the beginning 40 is above the end -40"),
             (EXPERIMENT, '{"adaptation_manager": "bt"}', "line 17, ", "experiments[1].num_runs: is missing"),
             ("(2,failure,60)", "(2,failure)", "line 10, suave_runner_node.thruster_events[1]", "not a thruster event"),
         ],

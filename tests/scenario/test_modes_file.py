@@ -1,6 +1,5 @@
 """System Modes files: the modes of each function, and each way in which a file is refused."""
 
-
 import pytest
 
 from suave_des.errors import InputError

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, BeforeValidator, Field
+import yaml
+from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
@@ -37,7 +38,7 @@ from suave_des.scenario.exemplar import (
 from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import modes_of
-from suave_des.scenario.quantities import LONGEST_S, Real, wrong
+from suave_des.scenario.quantities import LONGEST_S, Real, ordered
 from suave_des.scenario.schema import validated
 from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, read_yaml
 
@@ -346,30 +347,13 @@ def _in_their_terms(error: InputError, values: Mapping[str, Value]) -> InputErro
 # The campaign.
 
 
-def _interval(value: Any) -> Any:
-    if not isinstance(value, list) or len(value) != 2:
-        raise wrong(f"{shown(value)} is not an interval", "give two numbers, as in [-1.0, 1.0]")
-    if all(isinstance(each, int | float) for each in value) and value[0] > value[1]:
-        raise wrong(f"{shown(value)} begins after its end", "give the smaller number first")
-    return value
-
-
-def _json_object(value: Any) -> Any:
-    """Return the object that a text is in JSON."""
-    content = value
-    if isinstance(value, str):
-        try:
-            content = json.loads(value)
-        except (ValueError, RecursionError):
-            content = None
-    if not isinstance(content, dict):
-        remedy = 'as in {"adaptation_manager": "metacontrol", "num_runs": 20}'
-        raise wrong(f"{shown(value)} is not a JSON object", remedy)
-    return content
+def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
+    ordered(*interval, "the beginning", "the end")
+    return interval
 
 
 _Limit = Annotated[Real, Field(ge=-LONGEST_S, le=LONGEST_S)]
-_Interval = Annotated[tuple[_Limit, _Limit], BeforeValidator(_interval)]
+_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(_ordered)]
 _Count = Annotated[int, Field(strict=True, ge=1)]
 
 
@@ -381,7 +365,7 @@ class _Experiment(BaseModel):
 
 
 class _RunnerSettings(BaseModel):
-    experiments: Annotated[tuple[Annotated[_Experiment, BeforeValidator(_json_object)], ...], Field(min_length=1)]
+    experiments: Annotated[tuple[Json[_Experiment], ...], Field(min_length=1)]
     random_interval: _Count = 5
     random_seed: Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)] = 100
     water_visibility_sec_shift_random_interval: _Interval = (0.0, 0.0)
@@ -441,8 +425,8 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
         line, launch = parameter.document.place((*parameter.key_path, index)).line, each.experiment_launch
         place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
         arguments = dict(re.findall(r"(\w+):=(\S*)", launch))
-        for node, names in ((EXPERIMENT, _json_object(parameter.value[index])), (LAUNCH, arguments)):
-            unknown = [f"{' '.join(name.split())}" for name in names if path_of(node, name, "?") == "?"]
+        for node, names in ((EXPERIMENT, json.loads(parameter.value[index])), (LAUNCH, arguments)):
+            unknown = [" ".join(name.split()) for name in names if path_of(node, name, "?") == "?"]
             notes += [f"{place}: not simulated: {name}: {shown(names.get(name))}" for name in unknown]
         manager = arguments.get("adaptation_manager", each.adaptation_manager)
         if manager != each.adaptation_manager:
@@ -566,7 +550,17 @@ def _perturbations(
 # YAML with comments that name the source of each value.
 
 _COMMENT_COLUMN = 43
-_WORDS = ("true", "false", "null", "yes", "no", "on", "off")
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes whole numbers without a decimal place."""
+
+    def represent_float(self, data: float) -> yaml.ScalarNode:
+        is_whole = data.is_integer() and abs(data) < 1e15
+        return self.represent_int(int(data)) if is_whole else super().represent_float(data)
+
+
+_Dumper.add_representer(float, _Dumper.represent_float)
 
 
 def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[str]) -> str:
@@ -586,16 +580,8 @@ def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[s
 
 
 def _flow(value: Any) -> str:
-    """A value in YAML's flow style."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_flow(key)}: {_flow(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_flow, value)) + "]"
-    if isinstance(value, str) and re.fullmatch(r"[A-Za-z][\w./-]*", value, re.ASCII) and value.lower() not in _WORDS:
-        return value  # plain, where YAML of any version reads just that text
-    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    return json.dumps(value)
+    text = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, sort_keys=False, width=1_000_000)
+    return text.removesuffix("\n").removesuffix("\n...")
 
 
 def _relative(path: Path, file: Path) -> str:
