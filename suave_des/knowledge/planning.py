@@ -12,8 +12,7 @@ from itertools import product
 from typing import Final
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.model import OPERATORS
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import OPERATORS, Ontology
 from suave_des.knowledge.rdf import PERFORMANCE, local_name
 from suave_des.knowledge.state import (
     NO_GROUNDING,

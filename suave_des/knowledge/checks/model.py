@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator
-from itertools import chain
 from typing import Final
 
 from rdflib import URIRef
@@ -18,8 +17,7 @@ from suave_des.errors import KnowledgeError, nearest, with_article
 from suave_des.findings import Level
 from suave_des.knowledge.checks.registry import Found, Material, check
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.model import OPERATORS, Model, assumption, wrong_values
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import OPERATORS, Model, Ontology, assumption, wrong_values
 from suave_des.knowledge.ontology_file import is_metamodel
 from suave_des.knowledge.rdf import (
     C_STATUS,
@@ -34,9 +32,7 @@ from suave_des.knowledge.rdf import (
     RDF_TYPE,
     RDFS,
     TOMASYS,
-    XSD,
     Lit,
-    canonical,
     local_name,
     memberships,
     namespace,
@@ -228,13 +224,11 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
     """
     missing = without_operator(base.content, base.model, measured)
     for rule, atom in rules_of_2023(base.content) if missing else ():
-        source = next((each for each in base.sources if each.path == rule.file), None)
-        line = None if source is None else source.line_of_rule(rule.name)
         raise KnowledgeError(
             f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
             f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator",
             file=rule.file,
-            place=rule.place or (f"line {line}" if line else None),
+            place=base.place_of(rule),
             remedy=f'write revision: "2023" in the scenario, or use ontologies of revision {revision}',
         )
 
@@ -261,54 +255,29 @@ _KINDS: Final = frozenset(
 def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that fire in no state, each with an atom of its body that can never hold.
 
-    An atom cannot hold if no ontology asserts it, no state adds it and no rule that can fire concludes it. Each
-    property is considered separately, and individuals are not distinguished. So every rule that is returned is dead,
-    but not every dead rule is returned.
+    An atom cannot hold if no ontology asserts its class or property, no state adds it and no rule that can fire
+    concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not every
+    dead rule is returned.
     """
     steps = [(one, str(other)) for one, name, other in content.triples if name in (*_LEADS, *_BOTH_WAYS)]
     steps += [
         (str(other), one) for one, name, other in content.triples if name in (*_BOTH_WAYS, RDFS + "subPropertyOf")
     ]
     structure = "".join(content.structure)
-    held = {
-        OWL + "Thing",
-        EXPRESSION,
-        C_STATUS,
-        O_STATUS,
-        *_IN_STATES,
-        *(name for _, name in memberships(content.triples)),
-    }
+    held = {OWL + "Thing", EXPRESSION, C_STATUS, O_STATUS, *_IN_STATES}
+    held |= {*(name for _, name in memberships(content.triples)), *(name for _, name, _ in content.triples)}
     held |= {TOMASYS + "QAvalue", IS_QA_TYPE, HAS_VALUE} if model.attributes else set()
     held |= {HAS_QA_VALUE} if any(model.estimated.values()) else set()
-    loose = {*_IN_STATES, IS_QA_TYPE, HAS_VALUE}  # properties that can have any value
-    values: dict[str, set[object]] = defaultdict(set)
-    for _, predicate, value in content.triples:
-        if not predicate.startswith(LANGUAGE_NAMESPACES):
-            values[predicate].add(canonical(value))
+    waiting, possible = list(content.enabled_rules), reached(held, steps)
 
     def allows(atom: Atom) -> bool:
-        if atom.kind not in ("class", "object", "data") or not atom.arguments:
-            return True
-        if atom.predicate not in possible:  # class expressions and property chains are not followed
-            return f"<{atom.predicate}>" in structure
-        wanted = atom.arguments[-1]
-        if not isinstance(wanted, Lit) or atom.predicate in loose | implied:
-            return True
-        is_text = atom.predicate in (C_STATUS, O_STATUS) and wanted.datatype == XSD + "string"
-        return is_text or canonical(wanted) in values[atom.predicate]
+        is_named = atom.kind in ("class", "object", "data") and atom.arguments
+        # Class expressions and property chains are not followed.
+        return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
 
-    waiting = list(content.enabled_rules)
-    possible = reached(held | values.keys(), steps)
-    implied = {other for one, other in steps if one in possible}
     while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
-        for atom in chain.from_iterable(rule.head for rule in firing):
-            held.add(atom.predicate)
-            if atom.arguments and isinstance(concluded := atom.arguments[-1], Lit):
-                values[atom.predicate].add(canonical(concluded))
-            else:
-                loose.add(atom.predicate)
-        possible = reached(held | values.keys(), steps)
-        implied = {other for one, other in steps if one in possible}
+        held.update(atom.predicate for rule in firing for atom in rule.head)
+        possible = reached(held, steps)
         waiting = [rule for rule in waiting if rule not in firing]
     return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
 
@@ -317,7 +286,7 @@ def rules_for_other_models(material: Material) -> list[Rule]:
     """Find the rules of TOMASys and mros that need what this model does not have; they have rules for any."""
     found = []
     for rule, _ in dead_rules(material.content, material.base.model):
-        source = material.source(rule)
+        source = material.base.source_of(rule)
         is_known = all(
             atom.kind == "builtin" or material.base.vocabulary.kinds.get(atom.predicate) for atom in rule.atoms
         )

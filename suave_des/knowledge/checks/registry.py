@@ -17,7 +17,7 @@ from typing import Final
 from suave_des.findings import Finding, Level
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
+from suave_des.knowledge.ontology_file import is_metamodel, place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import OWL, RDF_TYPE
 from suave_des.knowledge.rules import Place, Rule
@@ -91,13 +91,9 @@ class Material:
         kind = (RDF_TYPE, OWL + "FunctionalProperty")
         return frozenset(subject for subject, name, value in self.content.triples if (name, value) == kind)
 
-    def source(self, rule: Rule) -> OntologyFile | None:
-        """The ontology that a rule is from; None for a rule as text."""
-        return next((each for each in self.base.sources if each.path == rule.file), None)
-
     def is_own(self, rule: Rule) -> bool:
         """Whether a rule is in a file that the user gave, and that is not TOMASys, which has rules for any model."""
-        source, given = self.source(rule), (*self.subject.given, *self.subject.rules)
+        source, given = self.base.source_of(rule), (*self.subject.given, *self.subject.rules)
         return rule.file.resolve() in {path.resolve() for path in given} and not (source and is_metamodel(source))
 
     def finding(self, level: Level, found: Found) -> Finding:
@@ -108,11 +104,9 @@ class Material:
         if isinstance(what, str):
             file, line = place_of(what, self.base.sources)
             return Finding(level, message, str(file), line, remedy=remedy)
-        source = self.source(what)
-        line = None if source is None else source.line_of_rule(what.name)
         if level is Level.WARN and not self.is_own(what):
             level = Level.INFO
-        return about_rule(what, message, place, remedy, level, line)
+        return about_rule(what, message, place, remedy, level, self.base.place_of(what))
 
 
 #: With what something is wrong (a rule, a thing by its name, a file), where in the rule, in words, and the remedy.

@@ -73,7 +73,7 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Found]:
 def shared_names(material: Material) -> Iterator[Found]:
     """Find rules of one name, other than those of TOMASys and mros."""
     names = Counter(rule.name for rule in material.content.rules)
-    sources = {rule.file: material.source(rule) for rule in material.content.rules}
+    sources = {rule.file: material.base.source_of(rule) for rule in material.content.rules}
     others = {path for path, source in sources.items() if source is not None and is_metamodel(source)}
     own = {rule.name for rule in material.content.rules if rule.file not in others}
     for rule in material.content.rules:

@@ -216,7 +216,9 @@ def trace_contradiction(text: str) -> Trace:
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
     """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
     reason, axioms, numbers = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
-    rules = sorted(_rule_with_place(ontology, ontology.rules[number]) for number in numbers)
+    involved = [ontology.rules[number] for number in numbers]
+    places = [", ".join(filter(None, (rule.file.name, ontology.place_of(rule)))) for rule in involved]
+    rules = sorted(f"{rule.name} ({place})" for rule, place in zip(involved, places, strict=True))
     facts = [
         str(fact)
         for triple in assertions
@@ -233,14 +235,6 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
         file=_files(ontology),
         remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",
     )
-
-
-def _rule_with_place(ontology: Ontology, rule: Rule) -> str:
-    """A rule's name with its file and line, as far as the file shows where it is."""
-    files = {source.path: source for source in ontology.sources}
-    line = files[rule.file].line_of_rule(rule.name) if rule.file in files else None
-    place = rule.place or (f"line {line}" if line else None)
-    return f"{rule.name} ({', '.join(filter(None, (rule.file.name, place)))})"
 
 
 def _dropped(rule: Rule, warning: str) -> KnowledgeError:

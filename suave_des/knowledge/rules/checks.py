@@ -147,7 +147,7 @@ def about_rule(
     place: Place | None = None,
     remedy: str | None = None,
     level: Level = Level.ERROR,
-    line: int | None = None,
+    begins: str | None = None,
 ) -> Finding:
     """Make a finding about a rule, with the line where it begins, or where an atom of it is.
 
@@ -155,10 +155,10 @@ def about_rule(
         rule: the rule.
         message, remedy, level: of the finding.
         place: of the atom or argument.
-        line: of the rule in its file, if it is one of an ontology.
+        begins: where an ontology has the rule, as "line 12".
     """
-    if rule.place is not None:
-        line = int(rule.place.removeprefix("line ")) if place is None else place.line
+    begins = rule.place or begins
+    line = place.line if place and rule.place else int(begins.removeprefix("line ")) if begins else None
     return Finding(level, message, str(rule.file), line, rule.name, place.column if place else None, remedy)
 
 
