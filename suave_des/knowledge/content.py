@@ -27,10 +27,8 @@ from suave_des.knowledge.rdf import (
     RDFS,
     SWRL,
     SWRLA,
-    SWRLB,
     XSD,
     Lit,
-    RdfTriple,
     Triple,
     is_fact,
     local_name,
@@ -158,7 +156,8 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
         ontologies = set(source.graph.subjects(RDF.type, OWL_TERMS.Ontology))
         inside = {triple for rule in found for triple in rule.triples}
         for triple in sorted(set(source.graph) - inside):
-            if str(triple[1]) in _ANNOTATIONS or triple[0] in ontologies or _declares_builtin(triple):
+            # Protégé declares the built-ins, about which Pellet logs a warning.
+            if str(triple[1]) in _ANNOTATIONS or triple[0] in ontologies or triple[2] == URIRef(SWRL + "Builtin"):
                 continue
             if any(isinstance(term, BNode) for term in triple):
                 structure.append(n_triple_with_nodes(triple, f"f{number}", {}))
@@ -210,11 +209,6 @@ def _override(triples: tuple[Triple, ...], values: Mapping[str, Decimal]) -> tup
         else (subject, predicate, value)
         for subject, predicate, value in triples
     )
-
-
-def _declares_builtin(triple: RdfTriple) -> bool:
-    """Whether this is Protégé's declaration of a built-in, about which Pellet logs a warning."""
-    return triple[1] == RDF.type and triple[2] == URIRef(SWRL + "Builtin") and str(triple[0]).startswith(SWRLB)
 
 
 def _declarations(triples: Iterable[Triple], rules: Sequence[Rule]) -> list[Triple]:

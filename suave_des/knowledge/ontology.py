@@ -381,7 +381,7 @@ class Ontology:
         base = cls.merged(sources, files, RulesFile.rules, values or {}, disabled_rules, operators or {})
         for subject, problem, remedy in wrong_values(base.stated):
             raise wrong_in(subject, sources, problem, remedy)
-        check_property_use(base.stated, base.content.enabled_rules)
+        check_property_use(base.content.enabled_rules, base.vocabulary)
         return base
 
     @classmethod

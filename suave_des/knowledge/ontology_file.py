@@ -13,8 +13,7 @@ ontologies is the name of the file (tomasys, mros, suave).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -180,25 +179,14 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
     return root
 
 
-@contextmanager
-def _literals_as_written() -> Iterator[None]:
-    """Prevent rdflib from normalising literals: it would write the ill-formed decimal 1e3 as 1000."""
-    before = rdflib.NORMALIZE_LITERALS
-    rdflib.NORMALIZE_LITERALS = False
-    try:
-        with without_log():
-            yield
-    finally:
-        rdflib.NORMALIZE_LITERALS = before
-
-
 @lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
 def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     graph = Graph()
     form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
+    before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write the ill-formed 1e3 as 1000
     try:
-        with _literals_as_written():
+        with without_log():
             # A file without xml:base gets a base that reveals nothing of this machine's folders.
             graph.parse(data=text, format=form, publicID=f"http://ontology.invalid/{path.stem}")
     except Exception as error:  # the parser raises many kinds; each means that this file is not of its format
@@ -210,6 +198,8 @@ def _parse_rdf(path: Path, text: str) -> Graph:
         remedy = _SAVE_AS if form == "xml" else f"by its ending the file is {name}"
         problem = f"not {name}: {' '.join(reason.split())}"
         raise KnowledgeError(problem, file=path, place=place, remedy=remedy) from error
+    finally:
+        rdflib.NORMALIZE_LITERALS = before
     for subject, predicate, value in list(graph):
         if isinstance(value, Literal) and value.datatype is not None and value.datatype.startswith("xsd:"):
             # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.

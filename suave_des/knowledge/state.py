@@ -178,10 +178,6 @@ class Inference:
         """Equal for equal inferences."""
         return hash((self.state, self.facts))
 
-    def __repr__(self) -> str:
-        """State and inferred facts."""
-        return f"Inference({self.state!r}, {sorted(map(str, self.facts))})"
-
     @cached_property
     def _index(self) -> dict[tuple[str, str], tuple[Value, ...]]:
         index: dict[tuple[str, str], list[Value]] = {}
@@ -199,12 +195,12 @@ class Inference:
 
     def objective_status(self, function: str) -> str | None:
         """Status of a function's objective, asserted or inferred; None while it is met."""
-        return self._one(objective_name(function), "o_status")
+        return next(map(str, self.values(objective_name(function), "o_status")), None)
 
     def grounding_status(self, function: str) -> str | None:
         """Status of a function's current grounding; None if it has no problem, or if there is no grounding."""
-        design = self.state.grounded(function)
-        return None if design is None else self._one(grounding_name(design), "fg_status")
+        grounding = grounding_name(self.state.grounded(function) or "")
+        return next(map(str, self.values(grounding, "fg_status")), None)
 
     def is_updatable(self, function: str) -> bool:
         """Whether a better function design may have become available."""
@@ -224,10 +220,6 @@ class Inference:
             if (status := self.grounding_status(function)) is not None:
                 found.append(f"grounding of {design} is {status}")
         return frozenset(found)
-
-    def _one(self, subject: str, property_name: str) -> str | None:
-        values = self.values(subject, property_name)
-        return str(values[0]) if values else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -181,7 +181,7 @@ def first_error(rule: Rule, vocabulary: Vocabulary) -> RuleError | None:
     return None
 
 
-def check_property_use(triples: Iterable[Triple], rules: Iterable[Rule]) -> None:
+def check_property_use(rules: Iterable[Rule], vocabulary: Vocabulary) -> None:
     """Check that rules use each property as it is declared.
 
     Otherwise Pellet drops every rule with that property, and names the wrong ones.
@@ -189,15 +189,14 @@ def check_property_use(triples: Iterable[Triple], rules: Iterable[Rule]) -> None
     Raises:
         KnowledgeError: with the file and the rule.
     """
-    kinds = {OWL + "ObjectProperty": False, OWL + "DatatypeProperty": True}
-    declared = {s: kinds[o] for s, p, o in triples if p == RDF_TYPE and isinstance(o, str) and o in kinds}
-    words = {True: "data", False: "object"}
     for rule in rules:
-        for name, is_data in sorted(rule.properties):
-            if declared.get(name, is_data) != is_data:
-                used = f"declared as {words[not is_data]} property, but used as {words[is_data]} property"
-                where, remedy = f"rule {rule.name}", f"the rule is: {rule.text}"
-                raise KnowledgeError(f"{local_name(name)} is {used}", file=rule.file, place=where, remedy=remedy)
+        for atom in rule.atoms:
+            wanted, declared = _DECLARED_AS.get(atom.kind), vocabulary.kinds.get(atom.predicate, frozenset())
+            others = {"object property", "data property"} & declared if atom.kind in ("object", "data") else frozenset()
+            if others and wanted not in others:
+                problem = f"{local_name(atom.predicate)} is declared as {min(others)}, but used as {wanted}"
+                remedy = f"the rule is: {rule.text}"
+                raise KnowledgeError(problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy)
 
 
 def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterator[Problem]:

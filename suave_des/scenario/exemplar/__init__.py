@@ -115,11 +115,8 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
     if not fitting:
         problem = f"no revision of the exemplar has all of {', '.join(each for each in _TELLING if each in found)}"
         raise InputError(problem, remedy="say which it is: --revision")
-    mission = [key for key in KEYS if key.node not in (RUNNER, LAUNCH, EXPERIMENT)]
-    differ = dict.fromkeys(key.name for key in mission if len({key.is_read_by(each) for each in fitting}) > 1)
     problem = f"the files fit revisions {', '.join(fitting)} of the exemplar, which differ in their code"
-    listed = f", and in {', '.join(differ)}" if differ else ""
-    raise InputError(problem + listed, remedy=f"say which it is, as in --revision {fitting[-1]}")
+    raise InputError(problem, remedy=f"say which it is, as in --revision {fitting[-1]}")
 
 
 def read_by(revision: str) -> tuple[Key, ...]:
