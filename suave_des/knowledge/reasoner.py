@@ -111,66 +111,52 @@ def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[
 
 def regions_of(ontology: Ontology) -> Regions:
     """Find the regions of an ontology, and reasons why its rules may distinguish values within them."""
-    carriers = _carriers(ontology)
-    reasons = [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
-    return Regions(tuple(sorted(set(_numbers(ontology)))), tuple(dict.fromkeys(reasons)))
-
-
-def _carriers(ontology: Ontology) -> frozenset[str]:
-    """Properties that can have a measured value: hasValue, and properties that it implies."""
+    literals = list(_literals(ontology))
+    numbers = {Decimal(value.text.strip()) for _, value in literals if _NUMBER.fullmatch(value.text)}
+    thresholds = sorted(number for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT)
+    binary = dict.fromkeys(where for where, value in literals if value.datatype in _BINARY)
+    reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
     pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
-    return frozenset(reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)]))
+    carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])  # properties with a measured value
+    reasons += [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
+    return Regions(tuple(thresholds), tuple(dict.fromkeys(reasons)))
 
 
-def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
+def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
+    """Every literal in the knowledge base, with what has it."""
+    for subject, _, value in (*ontology.content.triples, *ontology.model.triples()):
+        if isinstance(value, Lit):
+            yield local_name(subject), value
+    for line in ontology.content.structure:
+        yield from (("a class expression", Lit(text, datatype)) for text, datatype in _LITERAL.findall(line))
+    for rule in ontology.content.enabled_rules:
+        terms = (term for atom in rule.atoms for term in atom.arguments)
+        yield from ((f"rule {rule.name}", term) for term in terms if isinstance(term, Lit))
+
+
+def _of_rules(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
     for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
                 yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
             if atom.kind == "range" or atom.predicate == EXPRESSION:
                 yield f"rule {rule.name} asks for a datatype or a class expression"
-            if any(isinstance(term, Lit) and term.datatype in _BINARY for term in atom.arguments):
-                yield f"rule {rule.name} has a binary number, which is compared inexactly"
         measured = {name for name, predicate in rule.read_values() if predicate in carriers}
         for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
             yield f"rule {rule.name} copies the value ?{name} to its head"
 
 
-def _of_ontologies(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
-    for name in sorted(carriers - {HAS_VALUE}):
+def _of_ontologies(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
+    for name in sorted({*carriers} - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
     for subject, predicate, value in ontology.content.triples:
-        if isinstance(value, Lit) and value.datatype in _BINARY:
-            yield f"{local_name(subject)} has a binary number, which is compared inexactly"
         if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
             yield f"{local_name(subject)} has a range other than decimal"
         if predicate == RDF_TYPE and value == RDFS + "Datatype":
             yield f"the ontology defines a datatype, {local_name(subject)}"
-    for line in ontology.content.structure:
-        for term in _XSD_TERM.findall(line):
-            if term not in _SIZELESS | _SIZES:
-                yield f"a class expression speaks of {local_name(term)}"
-        if any(datatype in _BINARY for _, datatype in _LITERAL.findall(line)):
-            yield "a class expression has a binary number, which is compared inexactly"
-
-
-def _numbers(ontology: Ontology) -> Iterator[Decimal]:
-    """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
-    triples = (*ontology.content.triples, *ontology.model.triples())
-    yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
-    for line in ontology.content.structure:
-        yield from _in_texts(text for text, _ in _LITERAL.findall(line))
-    for rule in ontology.content.enabled_rules:
-        for atom in rule.atoms:
-            yield from _in_texts(term.text for term in atom.arguments if isinstance(term, Lit))
-
-
-def _in_texts(texts: Iterator[str]) -> Iterator[Decimal]:
-    for text in texts:
-        if _NUMBER.fullmatch(text):
-            value = Decimal(text.strip())
-            if abs(value.adjusted()) <= MAX_EXPONENT:
-                yield value
+    for term in _XSD_TERM.findall("".join(ontology.content.structure)):
+        if term not in _SIZELESS | _SIZES:
+            yield f"a class expression speaks of {local_name(term)}"
 
 
 #: Inferences that a reasoner caches in this process, of which the oldest is dropped; some kB each.

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import yaml
 from yaml.reader import ReaderError
 
-from suave_des.errors import InputError, KeyPath, place_text, shown
+from suave_des.errors import InputError, KeyPath, line_error, place_text, shown
 from suave_des.files import decode, read_bytes
 from suave_des.resources import find, shipped_folder
 
@@ -133,20 +133,17 @@ def parse_yaml(text: str, path: Path, depth: int = 0, sha256: str = "") -> YamlD
         root = _composed(text)
         if not isinstance(root, yaml.MappingNode):
             problem, line = ("is empty", 1) if root is None else ("is not a mapping at its top level", _line(root))
-            raise InputError(problem, file=path, place=f"line {line}", remedy="write `key: value` lines")
+            raise line_error(path, line, problem, "write `key: value` lines")
         reading = _Reading(path, depth)
         data = reading.plain(root, ())
     except ReaderError as error:
-        problem, line = (
-            f"holds {chr(error.character)!r}, which YAML does not allow",
-            text.count("\n", 0, error.position) + 1,
-        )
-        raise InputError(problem, file=path, place=f"line {line}", remedy="remove it") from None
+        problem = f"holds {chr(error.character)!r}, which YAML does not allow"
+        raise line_error(path, text.count("\n", 0, error.position) + 1, problem, "remove it") from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = f"is not valid YAML: {error.problem or error.context or 'cannot be parsed'}"
         remedy = "check indentation, colons and quotes here and just above; indent with spaces, not tabs"
-        raise InputError(problem, file=path, place=f"line {mark.line + 1}" if mark else None, remedy=remedy) from None
+        raise line_error(path, mark.line + 1 if mark else 1, problem, remedy) from None
     except RecursionError:
         problem = "is nested too deep, or an alias stands for something that holds it"
         raise InputError(problem, file=path, remedy="write it out") from None

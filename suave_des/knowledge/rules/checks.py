@@ -133,11 +133,6 @@ class Vocabulary:
 #: What is wrong in a rule: where, in words, and what would be right, if that is known.
 Problem = tuple[Place | None, str, str | None]
 _DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
-_WRITTEN: Final = {
-    "class": "write {}(?x, ?y)",
-    "data": "its second argument is an individual, not a value",
-    "object": "its second argument is a value, not an individual",
-}
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
 
 
@@ -234,9 +229,8 @@ def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem
         return atom.place(), f"{wanted} {name} is not defined", remedy
     if "class" in declared:
         return atom.place(), f"{name} is a class, but is used as a property", f"write {name}(?x)"
-    found = next((kind for kind in ("object property", "data property") if kind in declared), None)
-    problem = f"{name} is {with_article(found or min(declared))}, but is used as {with_article(wanted)}"
-    return atom.place(), problem, _WRITTEN[atom.kind].format(name) if found else None
+    found = next((kind for kind in ("object property", "data property") if kind in declared), min(declared))
+    return atom.place(), f"{name} is {with_article(found)}, but is used as {with_article(wanted)}", None
 
 
 def _argument_problems(
