@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import yaml
 from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
@@ -550,17 +549,7 @@ def _perturbations(
 # YAML with comments that name the source of each value.
 
 _COMMENT_COLUMN = 43
-
-
-class _Dumper(yaml.SafeDumper):
-    """Writes whole numbers without a decimal place."""
-
-    def represent_float(self, data: float) -> yaml.ScalarNode:
-        is_whole = data.is_integer() and abs(data) < 1e15
-        return self.represent_int(int(data)) if is_whole else super().represent_float(data)
-
-
-_Dumper.add_representer(float, _Dumper.represent_float)
+_WORDS = ("true", "false", "null", "yes", "no", "on", "off")
 
 
 def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[str]) -> str:
@@ -580,8 +569,16 @@ def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[s
 
 
 def _flow(value: Any) -> str:
-    text = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, sort_keys=False, width=1_000_000)
-    return text.removesuffix("\n").removesuffix("\n...")
+    """A value in YAML's flow style."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_flow(key)}: {_flow(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, str) and re.fullmatch(r"[A-Za-z][\w./-]*", value, re.ASCII) and value.lower() not in _WORDS:
+        return value  # plain, where YAML of any version reads just that text
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return json.dumps(value)
 
 
 def _relative(path: Path, file: Path) -> str:
