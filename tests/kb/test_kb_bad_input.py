@@ -114,7 +114,7 @@ def test_an_ontology_of_something_else_is_told_apart_from_a_broken_one(folder, c
 
 
 def test_a_rule_with_unbalanced_parentheses_is_refused_with_its_column(folder, command):
-    bad, said = RULE.replace("?fg)", "?fg", 1), "line 1, column 29: expected , or ) instead of -"
+    bad, said = RULE.replace("?fg)", "?fg", 1), "line 1, column 29: expected , or ) instead of '-'"
     Path("bad.swrl").write_text(bad)
     Path("suave.owl").write_bytes((shipped_folder("ontology") / "suave.owl").read_bytes())
     for name in ("rules", "infer", "explain", "policy", "query"):
