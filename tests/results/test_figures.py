@@ -138,16 +138,6 @@ def test_no_parameter_is_left_out_silently() -> None:
         draw_sweep(missions_of(frame))
 
 
-@pytest.mark.parametrize(("points", "labels"), [(4, ["0", "1", "2", "3"]), (9, None)])
-def test_the_axis_of_a_sweep_has_its_values_if_they_are_few(points: int, labels: list[str] | None) -> None:
-    figure = draw_sweep(missions_of(sweep_frame(points, 2)), ["start.x_m"])
-    ticks = figure.axes[-1].get_xticks().tolist()
-    if labels is None:
-        assert len(ticks) < points
-    else:
-        assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == labels
-
-
 def test_a_manager_looks_the_same_in_every_figure() -> None:
     assert style.looks(["none", "random", "metacontrol", "bt"]) == [0, 1, 2, 3]
     assert style.looks(["mine", "metacontrol", "yours", "none"]) == [4, 2, 5, 0]

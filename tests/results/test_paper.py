@@ -68,14 +68,6 @@ def test_managers_without_missions_do_not_count() -> None:
 
 def test_the_analysis_script_makes_the_table_from_a_runs_csv(tmp_path: Path) -> None:
     runs = frame(none=[180.0, 190.0], random=[170.0, 200.0], metacontrol=[90.0, 110.0])
-    for column, value in (("scenario", "seams2023"), ("pipeline_found", True)):
-        runs[column] = value
-    for column in ("run", "seed", "adaptations"):
-        runs[column] = 1
-    for column in ("initial_x_m", "initial_y_m", "mission_duration_s", "mean_reaction_time_s"):
-        runs[column] = 1.0
-    for column in ("detection_time_s", "detection_x_m", "detection_y_m"):
-        runs[column] = 1.0
     runs.to_csv(tmp_path / "runs.csv", index=False)
     script = Path(__file__).parents[2] / "analysis" / "paper_table.py"
     ended = subprocess.run(
