@@ -194,7 +194,7 @@ class TestBattery:
 
     def test_it_is_drawn_and_named_as_a_cause(self, record: MissionRecord) -> None:
         assert any("battery" in axes.get_ylabel() for axes in draw_map(record).axes)
-        causes = {each.cause for each in adaptations(record) if each.function == "generate_recharge_path"}
+        causes = {each.cause for each in adaptations(record)}
         assert "battery recharged" in causes
         assert any(cause.startswith("battery at 2") for cause in causes)
 
