@@ -54,19 +54,13 @@ def test_set_points_are_1_25_m_above_the_bed(env: simpy.Environment, name: str) 
 
 
 @BOTH
-def test_points_are_visited_in_order(env: simpy.Environment, name: str) -> None:
+def test_points_are_visited_in_order_and_those_already_reached_at_once(env: simpy.Environment, name: str) -> None:
     vehicle = PlacedVehicle(obeys=True)
-    follow_of(env, name, vehicle).apply(ACTIVE)
-    env.run(until=100.0)
-    assert [(x, y) for x, y, _ in vehicle.commanded] == LINE
-
-
-@BOTH
-def test_points_already_reached_count_at_once(env: simpy.Environment, name: str) -> None:
-    follow = follow_of(env, name, PlacedVehicle(obeys=True))
+    follow = follow_of(env, name, vehicle)
     follow.apply(ACTIVE)
     env.run(until=0.01)
     assert follow.finished.triggered
+    assert [(x, y) for x, y, _ in vehicle.commanded] == LINE
 
 
 @BOTH
@@ -159,14 +153,13 @@ def last_reached(vehicle: MovingVehicle) -> float:
     return vehicle.commanded[-2][0]  # the last one sent was not reached any more
 
 
-def test_revision_2023_adds_the_way_from_the_last_point_when_switched_off(env: simpy.Environment) -> None:
-    follow, vehicle = switched_off(env, "2023")
-    assert follow.distance_m == pytest.approx(-last_reached(vehicle) + abs(-SPEED * 8.5 - last_reached(vehicle)))
-
-
-def test_revision_15_adds_nothing_when_switched_off(env: simpy.Environment) -> None:
-    follow, vehicle = switched_off(env, "1.5")
-    assert follow.distance_m == pytest.approx(-last_reached(vehicle))
+@pytest.mark.parametrize(("name", "adds"), [("2023", True), ("1.5", False)])
+def test_revision_2023_alone_adds_the_way_from_the_last_point_when_switched_off(
+    env: simpy.Environment, name: str, adds: bool
+) -> None:
+    follow, vehicle = switched_off(env, name)
+    way_m = abs(-SPEED * 8.5 - last_reached(vehicle))
+    assert follow.distance_m == pytest.approx(-last_reached(vehicle) + adds * way_m)
 
 
 def test_revision_2023_adds_nothing_before_a_first_point(env: simpy.Environment) -> None:
@@ -216,21 +209,15 @@ def test_switched_on_again_the_distance_counts_from_zero(env: simpy.Environment,
     assert follow.distance_m == pytest.approx(math.dist(new[0], new[-1]))
 
 
-def test_revision_2023_starts_the_path_again(env: simpy.Environment) -> None:
-    follow, vehicle = switched_off(env, "2023")
-    sent = len(vehicle.commanded)
+@pytest.mark.parametrize(("name", "starts_again"), [("2023", True), ("1.5", False)])
+def test_switched_on_again_revision_2023_starts_the_path_and_15_goes_on_with_the_point_not_reached(
+    env: simpy.Environment, name: str, starts_again: bool
+) -> None:
+    follow, vehicle = switched_off(env, name)
+    pending, sent = vehicle.commanded[-1], len(vehicle.commanded)
     follow.apply(ACTIVE)
     env.run(until=env.now + 0.1)
-    assert vehicle.commanded[sent][0] == 0.0
-
-
-def test_revision_15_goes_on_with_the_point_not_reached(env: simpy.Environment) -> None:
-    follow, vehicle = switched_off(env, "1.5")
-    pending = vehicle.commanded[-1]
-    sent = len(vehicle.commanded)
-    follow.apply(ACTIVE)
-    env.run(until=env.now + 0.1)
-    assert vehicle.commanded[sent] == pending
+    assert vehicle.commanded[sent] == ((0.0, *pending[1:]) if starts_again else pending)
 
 
 @BOTH

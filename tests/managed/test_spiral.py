@@ -88,17 +88,12 @@ def test_set_points_are_at_the_modes_altitude_above_the_bed(name: str, altitude_
     assert search.last[2] == -20.0 + altitude_m
 
 
-def test_ticks_come_once_a_second_in_the_nodes_phase() -> None:
-    search = searching("2023", obeys=True)
-    search.ticks(3)
-    assert search.vehicle.times_s == [0.25, 1.25, 2.25]
-
-
 @pytest.mark.parametrize("altitude_m", [1.0, 3.0])
-def test_a_reached_set_point_gives_the_next_one_each_tick(altitude_m: float) -> None:
+def test_a_reached_set_point_gives_the_next_one_each_tick_in_the_nodes_phase(altitude_m: float) -> None:
     search = searching("2023", altitude_m, obeys=True)
     search.ticks(40)
     assert search.spiral(ORIGIN) == [point(n, n, altitude_m) for n in range(1, 41)]
+    assert search.vehicle.times_s == [0.25 + n for n in range(40)]
 
 
 def test_a_change_of_altitude_skips_one_angle_step_but_no_radius() -> None:
@@ -151,15 +146,10 @@ def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name: str, 
     assert [z for _, _, z in search.vehicle.commanded] == pytest.approx([-19.0 - step_m * times for times in range(4)])
 
 
-def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short() -> None:
-    search = searching("2023", obeys=True, rise_m=0.5)
-    search.ticks(14)
-    assert search.vehicle.times_s == [0.25, 12.25, 13.25]
-
-
-def test_later_set_points_keep_the_lowered_command() -> None:
+def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short_and_stays() -> None:
     search = searching("2023", obeys=True, rise_m=0.5)
     search.ticks(20)
+    assert search.vehicle.times_s[:3] == [0.25, 12.25, 13.25]
     assert {z for _, _, z in search.vehicle.commanded[1:]} == {-19.5}
 
 
@@ -174,28 +164,12 @@ def test_offset_after_a_new_activation(name: str, z_m: float) -> None:
     assert search.last[2] == pytest.approx(z_m)
 
 
-def stalled_at_3_m() -> Search:
+def test_an_altitude_change_in_a_stall_locks_the_spiral_up_and_the_offset_goes_on_falling() -> None:
     search = searching("2023", 3.0, obeys=True, rise_m=0.5)
     search.ticks(5)
     search.node.apply(spiral_at(1.0))
-    return search
-
-
-def test_a_set_point_sent_again_in_a_stall_has_the_new_altitude() -> None:
-    search = stalled_at_3_m()
-    search.ticks(10)
-    assert search.last == pytest.approx((*search.vehicle.commanded[0][:2], -19.0 - 0.5))
-
-
-def test_altitude_change_in_a_stall_locks_the_spiral_up() -> None:
-    search = stalled_at_3_m()
-    search.ticks(100)
-    assert len({place[:2] for place in search.vehicle.commanded}) == 1
-
-
-def test_offset_goes_on_falling_in_a_lock_up() -> None:
-    search = stalled_at_3_m()
     search.ticks(50)
+    assert len({place[:2] for place in search.vehicle.commanded}) == 1
     assert [z for _, _, z in search.vehicle.commanded[1:]] == [-19.5, -20.0, -20.5, -21.0]
 
 

@@ -17,12 +17,8 @@ BOTH = pytest.mark.parametrize("revision", ["2023", "1.5"])
     [("search_pipeline", (SEARCH, "fd_spiral_low")), ("inspect_pipeline", (FOLLOW, "fd_follow_pipeline"))],
 )
 def test_none_sets_the_default_mode_at_a_tasks_request(revision: str, task: str, asked: tuple[str, str]) -> None:
-    assert AtWork("none", revision).request(task) == [asked]
-
-
-@BOTH
-def test_none_never_adapts(revision: str) -> None:
-    assert AtWork("none", revision).manager.period_s is None
+    at_work = AtWork("none", revision)
+    assert at_work.request(task) == [asked] and at_work.manager.period_s is None
 
 
 @BOTH
@@ -35,13 +31,10 @@ def test_a_cancelled_tasks_functions_are_set_to_fd_unground(name: str, revision:
 
 
 @pytest.mark.parametrize(("revision", "period_s"), [("2023", 15.0), ("1.5", 30.0)])
-def test_random_picks_every_period(revision: str, period_s: float) -> None:
-    assert AtWork("random", revision).manager.period_s == period_s
-
-
-@pytest.mark.parametrize(("revision", "period_s"), [("2023", 15.0), ("1.5", 30.0)])
-def test_the_phase_of_randoms_timer_is_another_one_in_each_run(revision: str, period_s: float) -> None:
-    starts = [AtWork("random", revision, seed=seed).manager.starts_s for seed in range(300)]
+def test_random_picks_every_period_with_another_phase_in_each_run(revision: str, period_s: float) -> None:
+    managers = [AtWork("random", revision, seed=seed).manager for seed in range(300)]
+    starts = [each.starts_s for each in managers]
+    assert {each.period_s for each in managers} == {period_s}
     assert min(starts) < period_s / 15 and period_s * 14 / 15 < max(starts) < period_s
 
 
@@ -90,11 +83,7 @@ def test_randoms_search_ends_at_the_detection_in_2023(revision: str, asked: list
     at_work.request("search_pipeline")
     assert at_work.detected() == asked
     assert {function for function, _ in at_work.adapt()} == ({SEARCH} if revision == "1.5" else set())
-
-
-def test_a_detection_while_random_has_no_search_changes_nothing() -> None:
-    at_work = AtWork("random", "2023")
-    assert at_work.detected() == []
+    assert AtWork("random", revision).detected() == []  # while it has no search
 
 
 def test_in_a_mission_of_2023_randoms_search_is_ungrounded_before_the_coordinators_poll() -> None:

@@ -56,28 +56,25 @@ def test_a_name_that_leads_to_no_manager_is_bad_input(name: str, words: str) -> 
         manager_class(name)
 
 
-def test_a_module_that_ends_the_program_on_import_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "leaving_manager_module.py").write_text("import sys\nsys.exit(0)\n")
+@pytest.mark.parametrize(
+    ("source", "problem", "place"),
+    [
+        ("import sys\nsys.exit(0)\n", "SystemExit", "line 2"),
+        ("def broken(:\n", "invalid syntax", "line 1"),
+        ("import math\n\nmath.sqrt(-1.0)\n", "ValueError", "line 3"),
+    ],
+    ids=["exits", "syntax", "raises"],
+)
+def test_a_module_that_fails_on_import_is_bad_input_with_its_line(
+    source: str, problem: str, place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = f"failing_{problem.replace(' ', '_')}"
+    (tmp_path / f"{module}.py").write_text(source)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="SystemExit"):
-        manager_class("leaving_manager_module:Mine")
-
-
-def test_a_module_that_fails_on_import_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "broken_manager_module.py").write_text("def broken(:\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="invalid syntax") as caught:
-        manager_class("broken_manager_module:Mine")
-    assert Path(str(caught.value.file)).name == "broken_manager_module.py" and caught.value.place == "line 1"
+    with pytest.raises(InputError, match=problem) as caught:
+        manager_class(f"{module}:Mine")
+    assert Path(str(caught.value.file)).name == f"{module}.py" and caught.value.place == place
     assert caught.value.remedy is None  # it is no question of where it is
-
-
-def test_what_a_module_raises_on_import_is_shown_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "raising_manager_module.py").write_text("import math\n\nmath.sqrt(-1.0)\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="ValueError") as caught:
-        manager_class("raising_manager_module:Mine")
-    assert Path(str(caught.value.file)).name == "raising_manager_module.py" and caught.value.place == "line 3"
 
 
 def test_a_module_that_another_thread_still_imports_is_waited_for(
