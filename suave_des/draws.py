@@ -27,18 +27,8 @@ class Streams:
 
     def stream(self, name: str) -> random.Random:
         """Create the generator of a name; two of the same name draw the same values."""
-        return random.Random(self._seed_of(name))
-
-    def once(self, name: str) -> random.Random:
-        """Return the generator of a name until the next call: for values drawn at once, in half of the time."""
-        _AT_ONCE.seed(self._seed_of(name))
-        return _AT_ONCE
-
-    def _seed_of(self, name: str) -> int:
-        return int.from_bytes(hashlib.blake2b((self._key + name).encode(), digest_size=16).digest(), "big")
-
-
-_AT_ONCE = random.Random()
+        digest = hashlib.blake2b((self._key + name).encode(), digest_size=16).digest()
+        return random.Random(int.from_bytes(digest, "big"))
 
 
 class Draws(Streams):
@@ -86,7 +76,7 @@ class Draws(Streams):
             else:
                 shared_by = self._runs_per_draw.get(key, 1)
                 first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
-                value = max(least, found.draw(Streams(self._seed, first).once(_stream_name(key, found))))
+                value = max(least, found.draw(Streams(self._seed, first).stream(_stream_name(key, found))))
         self.drawn[key] = value
         return value
 
@@ -99,7 +89,7 @@ class Draws(Streams):
 
     def phase(self, timer: str, period_s: float) -> float:
         """Draw the phase of a periodic timer: nodes start at arbitrary times, others in each run."""
-        return self.once(f"phase/{timer}").random() * period_s
+        return self.stream(f"phase/{timer}").random() * period_s
 
 
 def _stream_name(key: str, distribution: Drawn) -> str:

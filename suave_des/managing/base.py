@@ -138,7 +138,7 @@ class System:
         Nodes start at arbitrary times; a timer that the scenario's revision has in step with others ticks with them.
         """
         in_step = timer in self.scenario.revision.timers_in_step
-        return period_s if in_step else self._draws.once(f"manager/{timer}/phase").uniform(0.0, period_s)
+        return period_s if in_step else self.stream(f"{timer}/phase").uniform(0.0, period_s)
 
     def knowledge(self) -> Reasoner:
         """Return the knowledge base with its reasoner, opened on the first call."""

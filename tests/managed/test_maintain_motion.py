@@ -35,20 +35,13 @@ class Motion:
 
 
 @BOTH
-def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s(name: str) -> None:
+def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s_and_published(name: str) -> None:
     motion = Motion(name)
     motion.node.apply(ACTIVE)
     motion.env.run()
     assert motion.restored == [(10.0 + 0.25 * n, n + 1) for n in range(6)]
-
-
-@BOTH
-def test_each_restored_thruster_is_published_as_recovered(name: str) -> None:
-    motion = Motion(name)
-    motion.node.apply(ACTIVE)
-    motion.env.run()
     assert motion.published == [
-        Diagnostic(10.0 + 0.25 * n, Kind.COMPONENT_STATUS, f"c_thruster_{n + 1}", "RECOVERED") for n in range(6)
+        Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", "RECOVERED") for t_s, number in motion.restored
     ]
 
 
@@ -68,16 +61,11 @@ def interrupted(name: str, at_s: float) -> Motion:
     return motion
 
 
-@pytest.mark.parametrize("at_s", [3.0, 10.3])
-def test_recovery_goes_on_when_deactivated_in_2023(at_s: float) -> None:
-    motion = interrupted("2023", at_s)
-    motion.env.run()
-    assert len(motion.restored) == 6
-
-
-@pytest.mark.parametrize(("at_s", "restored"), [(3.0, 0), (10.3, 2)])
-def test_recovery_is_aborted_when_deactivated_in_15(at_s: float, restored: int) -> None:
-    motion = interrupted("1.5", at_s)
+@pytest.mark.parametrize(
+    ("name", "at_s", "restored"), [("2023", 3.0, 6), ("2023", 10.3, 6), ("1.5", 3.0, 0), ("1.5", 10.3, 2)]
+)
+def test_recovery_goes_on_when_deactivated_in_2023_and_is_aborted_in_15(name: str, at_s: float, restored: int) -> None:
+    motion = interrupted(name, at_s)
     motion.env.run()
     assert len(motion.restored) == restored
 

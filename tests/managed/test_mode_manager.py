@@ -57,16 +57,16 @@ def test_anything_else_is_refused(managed: Managed, function: str, mode: str) ->
     assert managed.modes.change_mode(function, mode) is False
 
 
-def test_a_refused_request_has_no_effect(managed: Managed) -> None:
+def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_for_what_was_refused(
+    managed: Managed,
+) -> None:
+    effects: list[tuple[float, str, str]] = []
+    managed.modes.listeners.append(lambda function, mode: effects.append((managed.env.now, function, mode.name)))
     managed.modes.change_mode(SEARCH, "fd_spiral_very_high")
-    managed.env.run()
-    assert managed.search.applied == []
-
-
-def test_effect_comes_after_the_latency(managed: Managed) -> None:
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.env.run()
     assert managed.search.applied == [(0.5, "fd_spiral_low")]
+    assert effects == [(0.5, SEARCH, "fd_spiral_low")]
 
 
 def test_the_mode_already_asked_for_succeeds_without_effect(managed: Managed) -> None:
@@ -77,22 +77,17 @@ def test_the_mode_already_asked_for_succeeds_without_effect(managed: Managed) ->
     assert len(managed.search.applied) == 1
 
 
-def test_effects_keep_the_order_of_requests() -> None:
+def test_effects_keep_the_order_of_requests_of_each_function() -> None:
     latencies = itertools.cycle([3.0, 1.0])
     managed = Managed(lambda: next(latencies))
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.modes.change_mode(SEARCH, "fd_spiral_high")
     managed.env.run()
     assert managed.search.applied == [(3.0, "fd_spiral_low"), (3.0, "fd_spiral_high")]
-
-
-def test_functions_do_not_wait_for_one_another() -> None:
-    latencies = itertools.cycle([3.0, 1.0])
-    managed = Managed(lambda: next(latencies))
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.modes.change_mode(FOLLOW, "fd_follow_pipeline")
     managed.env.run()
-    assert managed.follow.applied == [(1.0, "fd_follow_pipeline")]
+    assert managed.follow.applied == [(4.0, "fd_follow_pipeline")]
 
 
 def test_current_mode_is_the_one_requested_last(managed: Managed) -> None:
@@ -108,18 +103,7 @@ def test_available_modes_are_those_of_the_file(managed: Managed) -> None:
         "fd_spiral_medium",
         "fd_spiral_high",
     }
-
-
-def test_an_unknown_function_has_no_modes(managed: Managed) -> None:
     assert managed.modes.available_modes("f_dock") == ()
-
-
-def test_listeners_are_called_at_effects_not_at_requests(managed: Managed) -> None:
-    effects: list[tuple[float, str, str]] = []
-    managed.modes.listeners.append(lambda function, mode: effects.append((managed.env.now, function, mode.name)))
-    managed.modes.change_mode(SEARCH, "fd_spiral_low")
-    managed.env.run()
-    assert effects == [(0.5, SEARCH, "fd_spiral_low")]
 
 
 @pytest.mark.parametrize(
@@ -177,17 +161,14 @@ def calls_of(*modes: Mode) -> list[str]:
 LOW, HIGH, OFF = Mode("low", True, {}), Mode("high", True, {}), Mode("off", False, {})
 
 
-def test_parameters_come_before_the_activation() -> None:
-    assert calls_of(LOW) == ["configure low", "activated"]
-
-
-def test_another_active_mode_only_changes_parameters() -> None:
-    assert calls_of(LOW, HIGH) == ["configure low", "activated", "configure high"]
-
-
-def test_an_inactive_node_is_not_deactivated() -> None:
-    assert calls_of(OFF) == []
-
-
-def test_a_node_can_be_activated_again() -> None:
-    assert calls_of(LOW, OFF, HIGH)[-2:] == ["configure high", "activated"]
+@pytest.mark.parametrize(
+    ("modes", "calls"),
+    [
+        ([LOW], ["configure low", "activated"]),
+        ([LOW, HIGH], ["configure low", "activated", "configure high"]),
+        ([OFF], []),
+        ([LOW, OFF, HIGH], ["configure low", "activated", "deactivated", "configure high", "activated"]),
+    ],
+)
+def test_hooks_that_modes_call(modes: list[Mode], calls: list[str]) -> None:
+    assert calls_of(*modes) == calls
