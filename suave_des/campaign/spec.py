@@ -26,8 +26,8 @@ SEED_LIMIT = 2**63 - 1
 WORKERS_LIMIT = 256
 """More than one for each core gain nothing."""
 _WORKERS = 2
-_FEW_MISSIONS = 300
-"""So many take one process no longer than two, which load the compiler first."""
+_FEW_MISSIONS = 1000
+"""So many take one process no longer than two, which first load the compiler and Java, or compile, each for itself."""
 _ADDRESS = re.compile(r"(?:tcp|tls)://(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:@\[\]]+):(\d{1,5})/?")
 
 Whole = Annotated[int, Field(strict=True)]
