@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import gc
 import os
 import pickle
 import signal
@@ -264,7 +263,6 @@ def work(connection: Connection[Any, Any]) -> None:
     """Receive a campaign, then chunks of its missions, and send back their outcomes, until the other end is closed."""
     from suave_des.campaign.missions import MissionRunner  # everything that missions need, before the campaign arrives
 
-    gc.set_threshold(7000)  # a mission leaves some 1,000 objects in cycles: a look for them in each took 3% of its time
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the campaign is over, or its process has ended
         each = None
         while True:

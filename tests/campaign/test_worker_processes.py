@@ -136,8 +136,8 @@ def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(
 @pytest.mark.parametrize(
     ("processes", "options"),
     [
-        (1, {"runs": 100}),
-        (2, {"runs": 101}),
+        (1, {"runs": 333}),
+        (2, {"runs": 334}),
         (2, {"runs": 1, "managers": ["none", "own:Manager"]}),  # which may end or block its process
         (2, {"runs": 1, "sweep": {"mission.time_limit_s": "300:400:50"}}),
         (3, {"runs": 1, "workers": 4}),
