@@ -34,7 +34,7 @@ class Watched:
         scenario = load_scenario("extended").scenario
         scenario = scenario.model_copy(update={"metrics": FURTHER_METRICS, "requirements": {}, "battery": None})
         vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0), 60.0)
-        self.thrusters = Thrusters(self.env, vehicle, ThrusterFailureRevision(), None, silent)
+        self.thrusters = Thrusters(self.env, vehicle, ThrusterFailureRevision(), silent)
         self.noted = FurtherMetrics(self.env, scenario, self.thrusters, {})
 
     def at(self, t_s: float) -> FurtherMetrics:
