@@ -14,7 +14,7 @@ def test_missions_are_those_with_the_operator_written_in(tmp_path: Path, caplog:
     owl = write_as_owlready2_saves_it(tmp_path / "suave.owl", placeholder="FunctionDesign")
     assert "<tomasys:qa_comparison_operator" not in owl.read_text(encoding="utf-8")
     loaded = load_scenario("seams2023", ontologies=[owl])
-    check_inputs([loaded], ["metacontrol"], given=True)
+    check_inputs([loaded], ["metacontrol"], {})
     assert caplog.text.count("water_visibility has no qa_comparison_operator in the ontologies: < is assumed") == 1
     without, with_operator = Simulator(loaded), Simulator(load_scenario("seams2023"))
     for run in range(1, 4):
