@@ -65,7 +65,7 @@ def failures() -> pandas.DataFrame:
     runs, loaded, rows = read(2025).query("manager == 'none'"), load_scenario("planta_exp1"), []
     for condition, real in runs.groupby("condition"):
         start_y_m, time_s = real[["nominal_y_m", "failure_time_s"]].iloc[0]
-        rows.append({"condition": condition, "failed": "real", "mode": "", **_medians(real)})
+        rows.append({"condition": condition, "failed": "real", "mode": "real", **_medians(real)})
         for failed, thrusters in FAILED.items():
             events = [{"thruster": thruster, "event": "failure", "time_s": time_s} for thruster in thrusters]
             for mode in ("frozen", "dead") if thrusters else ("none",):
