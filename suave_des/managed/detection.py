@@ -8,9 +8,8 @@ import simpy
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.kernel import UNWATCHED
 from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
-from suave_des.world.pipeline import Sought, first_detection
+from suave_des.world.pipeline import first_detection
 
 _MIN_ROWS_AHEAD = 22
 """Minimum look-ahead after a change of control, doubled while there is no other; or as far as guidance has computed."""
@@ -27,7 +26,8 @@ class PipelineDetector:
 
     Attributes:
         visibility: measured water visibility: the times, s, at which the value changes, and the values, m.
-        looked_for: the pipeline's points, see `sought`.
+        points: points as the detection places them, shape (n, 3), m.
+        view_tangent: tangent of half the camera's field of view.
         detected: the event of the first sight; its value is the index of the point seen.
         first_point: index of the point seen, once detected.
         detected_s: mission time of the first sight; inf before.
@@ -36,7 +36,8 @@ class PipelineDetector:
     env: simpy.Environment
     vehicle: Vehicle
     visibility: tuple[Array, Array]
-    looked_for: Sought
+    points: Array
+    view_tangent: float
     log: Log
     first_point: int | None = None
     detected_s: float = math.inf
@@ -48,7 +49,6 @@ class PipelineDetector:
         self.detected: simpy.Event = self.env.event()
         self._alarm = Alarm(self.env, self._ring)
         self.vehicle.control_listeners.append(self._control_changed)
-        self.vehicle.watch = self.visibility, self.looked_for
         self._look_ahead(0)
 
     def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
@@ -63,7 +63,7 @@ class PipelineDetector:
             return
         self.vehicle.look_ahead(last)
         seen_row, self._seen = first_detection(
-            self.vehicle.track, (row, last), STEP_S, self.visibility, self.looked_for
+            self.vehicle.track, (row, last), STEP_S, self.visibility, self.points, self.view_tangent
         )
         if self._seen < 0:
             self._row = last
@@ -77,7 +77,6 @@ class PipelineDetector:
             self._look_ahead(self._row)
             return
         self.vehicle.control_listeners.remove(self._control_changed)
-        self.vehicle.watch = UNWATCHED
         self.first_point = self._seen
         self.detected_s = float(self.env.now)
         self.log("detection", "pipeline_detected", f"point {self.first_point}")

@@ -115,19 +115,18 @@ class SetPointSender:
         self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:
         """Send and queue set-points (see `Vehicle.queue_waypoints`), up to the first whose message will be lost."""
-        lost = len(waypoints)
         if self.loss_probability > 0.0:
             send = send and not self._is_lost()
-            lost = 1 + self._before_loss
+            waypoints = waypoints[: 1 + self._before_loss]
         x_error_m, y_error_m, z_error_m = self.frame_error_m
         sent_as_m = x_error_m, y_error_m, z_m + z_error_m
         return self.vehicle.queue_waypoints(
-            self.env.now, waypoints[: lost + 1], sent_as_m, check, first=first, last=last, send=send, lost=lost
+            self.env.now, waypoints, sent_as_m, check, first=first, last=last, send=send
         )
 
     def queued_were_sent(self, count: int) -> None:
-        """Count set-points that were sent from the queue; only the last of them may have been lost."""
-        self._before_loss = self._draw() if count > self._before_loss else self._before_loss - count
+        """Count set-points that were sent from the queue."""
+        self._before_loss -= count
 
     def _is_lost(self) -> bool:
         is_lost = self.loss_probability > 0.0 and self._before_loss == 0

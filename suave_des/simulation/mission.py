@@ -135,9 +135,8 @@ class Mission:
         self._measurements: Mapping[str, Measurements] = {**signals, **self._battery_only}
 
         # The managed subsystem.
-        self._detector = PipelineDetector(
-            env, self._vehicle, self._visibility.arrays, prepared.looked_for, recorder.log
-        )
+        seen = prepared.detection_points, prepared.view_tangent
+        self._detector = PipelineDetector(env, self._vehicle, self._visibility.arrays, *seen, recorder.log)
         mode_latency_s = draws.each_time("latencies.mode_change_s", described.latencies.mode_change_s)
         self.mode_manager = ModeManager(env, loaded.modes, self._make_nodes(), mode_latency_s, recorder.log)
         self._coordinator = self._make_coordinator()

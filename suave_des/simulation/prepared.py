@@ -25,7 +25,7 @@ from suave_des.scenario.physical import CurrentWaveDescription, VehicleDescripti
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
 from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle, track_rows
-from suave_des.world.pipeline import sample_points, sought
+from suave_des.world.pipeline import sample_points
 
 if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
     from suave_des.knowledge.reasoner import Reasoner
@@ -52,14 +52,13 @@ class PreparedScenario:
         scenario = loaded.scenario
         self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
         self.path = InspectionPath.there_and_back(self.points, scenario.revision.follow.altitude_m)
-        self.view_tangent = scenario.vehicle.camera.tangent
-        raised_m = np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
-        self.looked_for = sought(self.points + raised_m, self.view_tangent)
+        self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         self.custom_functions = custom_functions(loaded)
         calibrated = [name for name in Autopilot._fields if name in Calibration.model_fields]
         self.autopilot = Autopilot(**{name: getattr(scenario.calibration, name) for name in calibrated})
         self.vehicle_model = vehicle_model(scenario.vehicle)
+        self.view_tangent = scenario.vehicle.camera.tangent
         self.numbers: dict[str, float] = {}
         self._spare_tracks: list[Array] = []
         self._manager_inputs: dict[str, tuple[Mapping[str, Path], Mapping[str, Any]]] = {}

@@ -10,7 +10,6 @@ import math
 import numpy as np
 
 from suave_des.compiling import Array, IntArray, compiled
-from suave_des.world.pipeline import Sought, first_detection
 
 # Columns of the track; the world frame has x east, y north, z up.
 POSITION = slice(0, 3)  # p, world frame, m
@@ -55,9 +54,6 @@ LEAST, GREATEST, LAST = 0, 1, 2
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
 
-ROWS_AFTER_SIGHT = 60
-"""How far to look ahead after the pipeline was seen: the search ends at a poll a second later, when modes change."""
-
 UNCHECKED = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 1.0), -1
 """A box, a timer and a tick before row 0, for `advance` without checks."""
 Dynamics = tuple[float, Array, Array, Array, Array, Array]
@@ -70,10 +66,6 @@ Dynamics = tuple[float, Array, Array, Array, Array, Array]
 - wrenches: wrench for thrusts, shape (6, 6 thrusters);
 - thrusters: what each can give and gave last, shape (6 thrusters, 3).
 """
-
-Watch = tuple[tuple[Array, Array], Sought]
-"""Measured visibility, and what is looked for; see `first_detection`."""
-UNWATCHED: Watch = (np.empty(0), np.empty(0)), (np.empty((0, 3)), (math.inf,) * 3 + (-math.inf,) * 3, 0.0)
 
 
 @compiled
@@ -319,13 +311,9 @@ def fly_waypoints(
     half_box: tuple[float, float],
     timer: tuple[float, float, float],
     window: tuple[int, int, int, int],
-    lost: int,
-    watch: Watch,
     arrivals: IntArray,
-) -> tuple[int, bool, int]:
+) -> tuple[int, int]:
     """Fly through way-points: at each tick of a timer that finds one reached, the next becomes the set-point.
-
-    It ends early, at a way-point reached, some time after the pipeline was seen: the task will be over by then.
 
     Args:
         track: as for `advance`.
@@ -337,40 +325,34 @@ def fly_waypoints(
         half_box: half the width and half the height of the box around a way-point in which it counts as reached, m.
         timer: time of tick 0, time between ticks, and time between rows, s.
         window: first tick to check, last one for the first way-point, and fewest and most ticks from one to the next.
-        lost: number of the way-point that does not become the set-point when the one before is reached.
-        watch: what is looked for.
         arrivals: shape (n,); receives the ticks that find way-points reached.
 
     Returns:
-        The number of way-points reached; whether each was reached in time; and the last row that is now filled. Ticks
-        beyond the track do not count.
+        The number of way-points reached, and the last row that is now filled. Ticks beyond the track do not count.
     """
     tick, last, fewest, most = window
     set_point, reached, last_row = dynamics[1], 0, track.shape[0] - 1
-    (visibility, looked_for), seen = watch, -1
     while tick <= last and row_of(tick, timer) <= last_row:
         row, box = row_of(tick, timer), (waypoints[reached, 0], waypoints[reached, 1], waypoints[reached, 2], *half_box)
         if row > computed:
             end = min(row_of(last, timer), last_row)
             tick = advance(track, computed, end, dynamics, box, timer, tick)
             if not 0 <= tick <= last:
-                return reached, False, end
-            since, row = computed + 1, row_of(tick, timer)
-            if seen < 0:
-                seen, _ = first_detection(track, (since, row), timer[2], visibility, looked_for)
+                computed = end
+                break
+            row = computed = row_of(tick, timer)
         elif not is_in_box(track, row, box):
             tick += 1
             continue
         arrivals[reached] = tick
         reached += 1
-        if reached == waypoints.shape[0] or 0 <= seen < row - ROWS_AFTER_SIGHT:
-            return reached, True, max(row, computed)
+        if reached == waypoints.shape[0]:
+            break
+        set_point[0] = waypoints[reached, 0] + sent_as[0]
+        set_point[1] = waypoints[reached, 1] + sent_as[1]
+        set_point[2] = sent_as[2]
+        set_point[NUMBER] += 1.0
         computed = row  # rows beyond it were flown to another set-point
-        if reached != lost:
-            set_point[0] = waypoints[reached, 0] + sent_as[0]
-            set_point[1] = waypoints[reached, 1] + sent_as[1]
-            set_point[2] = sent_as[2]
-            set_point[NUMBER] += 1.0
         last = tick + most
         tick += fewest
-    return reached, False, computed
+    return reached, computed

@@ -90,7 +90,6 @@ class Vehicle:
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
         control_listeners: each is called after a change of control.
-        watch: what is looked for: a little after it is seen, no further way-points are queued.
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
 
@@ -112,7 +111,6 @@ class Vehicle:
     z_limits_m: tuple[float, float] = (-math.inf, math.inf)
     memory: InitVar[Array | None] = None
     control_listeners: list[ControlListener] = field(default_factory=list, init=False)
-    watch: kernel.Watch = field(default=kernel.UNWATCHED, init=False)
     computed_row: int = field(default=0, init=False)
     _queue: _Queue | None = field(default=None, init=False)
 
@@ -151,16 +149,7 @@ class Vehicle:
         self._notify(t_s)
 
     def queue_waypoints(
-        self,
-        t_s: float,
-        waypoints: Array,
-        sent_as_m: Point,
-        check: ArrivalCheck,
-        *,
-        first: int,
-        last: int,
-        send: bool,
-        lost: int,
+        self, t_s: float, waypoints: Array, sent_as_m: Point, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:
         """Look ahead, and queue set-points: at the tick that finds a way-point reached, the next one is commanded.
 
@@ -175,7 +164,6 @@ class Vehicle:
             first: first tick to check.
             last: last tick to check for the first way-point; ticks after the mission's end do not count.
             send: whether to command the first way-point's set-point now; otherwise it is already commanded.
-            lost: number of the way-point, from 0, whose set-point is not commanded, as its message is lost.
 
         Returns:
             The ticks at which way-points will be found reached if control does not change; and the tick at which the
@@ -187,29 +175,19 @@ class Vehicle:
             self._replace_set_point(waypoints, 0, sent_as_m, new=1)
         elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.ticks):
             waypoints = waypoints[:1]
-        before, ticks = self._set_point.copy(), np.empty(len(waypoints), dtype=np.int64)
+        count, before = len(waypoints), self._set_point.copy()
         box, timer = (check.half_width_m, check.half_height_m), (check.start_s, check.period_s, STEP_S)
-        window = first, last, check.first_check_ticks, check.resend_ticks
-        reached, in_time, self.computed_row = kernel.fly_waypoints(
-            self.track,
-            self.computed_row,
-            self._dynamics,
-            waypoints,
-            sent_as_m,
-            box,
-            timer,
-            window,
-            lost,
-            self.watch,
-            ticks,
+        window, ticks = (first, last, check.first_check_ticks, check.resend_ticks), np.empty(count, dtype=np.int64)
+        reached, self.computed_row = kernel.fly_waypoints(
+            self.track, self.computed_row, self._dynamics, waypoints, sent_as_m, box, timer, window, ticks
         )
         arrivals: list[int] = ticks[:reached].tolist()
-        queued = arrivals[: min(reached - in_time, lost - 1)]
-        if queued:
-            self._queue = _Queue(check, queued, before, waypoints, sent_as_m)
-        if queued or send:
+        is_queued = reached > 0 and count > 1
+        if is_queued:
+            self._queue = _Queue(check, arrivals[: count - 1], before, waypoints, sent_as_m)
+        if is_queued or send:
             self._notify(t_s, check)
-        if in_time:
+        if reached == count:
             return arrivals, arrivals[-1]
         return arrivals, arrivals[-1] + check.resend_ticks if arrivals else last
 

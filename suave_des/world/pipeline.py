@@ -40,21 +40,14 @@ def first_point_in_view(
     return -1
 
 
-Sought = tuple[Array, tuple[float, float, float, float, float, float], float]
-"""What is looked for: points as the detection places them, shape (n, 3), m; the least and the greatest x, y and z of
-them; and the tangent of half the camera's field of view.
-"""
-
-
-def sought(points: Array, view_tangent: float) -> Sought:
-    """Put together what is looked for."""
-    (low_x, low_y, low_z), (high_x, high_y, high_z) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return points, (low_x, low_y, low_z, high_x, high_y, high_z), view_tangent
-
-
 @compiled
 def first_detection(
-    track: Array, rows: tuple[int, int], row_s: float, visibility: tuple[Array, Array], looked_for: Sought
+    track: Array,
+    rows: tuple[int, int],
+    row_s: float,
+    visibility: tuple[Array, Array],
+    points: Array,
+    view_tangent: float,
 ) -> tuple[int, int]:
     """Find the first row from which a point is seen, and the point's index; (-1, -1) if none.
 
@@ -63,9 +56,11 @@ def first_detection(
         rows: the first and the last row that count.
         row_s: time between rows.
         visibility: measured water visibility: the times, s, ascending, of the values, m; none before the first one.
-        looked_for: see `sought`.
+        points: points as the detection places them, shape (n, 3), m.
+        view_tangent: tangent of half the camera's field of view.
     """
-    points, (low_x, low_y, low_z, high_x, high_y, high_z), view_tangent = looked_for
+    low_x, low_y, low_z = points[:, 0].min(), points[:, 1].min(), points[:, 2].min()
+    high_x, high_y, high_z = points[:, 0].max(), points[:, 1].max(), points[:, 2].max()
     times_s, visibility_m = visibility
     measured = 0
     for row in range(rows[0], rows[1] + 1):

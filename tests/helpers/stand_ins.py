@@ -55,7 +55,6 @@ class PlacedVehicle:
         first: int,
         last: int,
         send: bool,
-        lost: int,
     ) -> tuple[list[int], int]:
         """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
         if send:

@@ -12,7 +12,7 @@ from suave_des.managed.detection import PipelineDetector
 from suave_des.scenario.physical import Pipeline
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
-from suave_des.world.pipeline import first_point_in_view, sample_points, sought
+from suave_des.world.pipeline import first_point_in_view, sample_points
 from tests.helpers.stand_ins import silent
 from tests.helpers.vehicles import BLUEROV2, VIEW_TANGENT
 
@@ -33,7 +33,8 @@ class Sight:
             self.env,
             self.vehicle,
             (np.array([0.0]), np.array([visibility_m])),
-            sought(POINTS, VIEW_TANGENT),
+            POINTS,
+            VIEW_TANGENT,
             lambda source, event, detail: self.logged.append((self.env.now, event)),
         )
         for t_s, place in commands:
@@ -87,7 +88,7 @@ def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once() -> None:
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
     always_3_m = np.array([0.0]), np.array([3.0])
-    detector = PipelineDetector(env, vehicle, always_3_m, sought(POINTS, VIEW_TANGENT), silent)
+    detector = PipelineDetector(env, vehicle, always_3_m, POINTS, VIEW_TANGENT, silent)
     env.run(until=1.0)
     assert detector.detected_s == 0.0
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from suave_des.scenario.physical import Pipeline
-from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points, sought
+from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points
 
 POINTS = sample_points(Pipeline().vertices_m)
 HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
-LOOKED_FOR = sought(POINTS, HALF_WIDTH_AT_1_M)
 
 
 def above(index: int, height_m: float, dx_m: float = 0.0, dy_m: float = 0.0) -> tuple[float, float, float]:
@@ -89,23 +88,23 @@ def test_first_detection_is_the_first_row_with_a_point_in_view() -> None:
         for row, position in enumerate(track)
         if (point := first_point_in_view(*position, 3.0, POINTS, HALF_WIDTH_AT_1_M)) >= 0
     )
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, LOOKED_FOR) == expected
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == expected
 
 
 def test_first_detection_looks_only_at_the_rows_asked_for() -> None:
     track = line_of_positions(0.5)
     visibility = np.array([0.0]), np.array([3.0])
-    row, _ = first_detection(track, (0, len(track) - 1), 1.0, visibility, LOOKED_FOR)
-    assert first_detection(track, (0, row - 1), 1.0, visibility, LOOKED_FOR) == (-1, -1)
+    row, _ = first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M)
+    assert first_detection(track, (0, row - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
 
 
 def test_first_detection_waits_for_the_visibility() -> None:
     track = line_of_positions(0.0)
     visibility = np.array([3.0, 250.0]), np.array([1.0, 2.5])
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, LOOKED_FOR)[0] == 250
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M)[0] == 250
 
 
 def test_far_beside_the_pipeline_nothing_is_detected() -> None:
     track = line_of_positions(2.0)
     visibility = np.array([0.0]), np.array([9.0])
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, LOOKED_FOR) == (-1, -1)
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
