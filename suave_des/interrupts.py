@@ -56,14 +56,16 @@ def handled(numbers: Iterable[int], handler: _Handler) -> Iterator[None]:
 def _repeated_if_lost() -> Iterator[None]:
     """Send a signal again when the exception that it raised was lost.
 
-    Exceptions are ignored in a __del__, and in Python code that compiled code has called, as numba's does.
+    Exceptions are ignored in a __del__, and in Python code that compiled code has called, as numba's does. Of a process
+    that was stopped nothing is reported: objects that the signal left half made fail in their __del__ while it ends.
     """
     timers: list[threading.Timer] = []
     report = sys.unraisablehook
 
     def again(lost: Any) -> None:
         if not isinstance(lost.exc_value, Stopped):
-            report(lost)
+            if not _received:
+                report(lost)
             return
         timers.append(threading.Timer(_REPEAT_S, os.kill, (os.getpid(), _received[0])))
         timers[-1].daemon = True
@@ -73,7 +75,7 @@ def _repeated_if_lost() -> Iterator[None]:
     try:
         yield
     finally:
-        sys.unraisablehook = report
+        sys.unraisablehook = (lambda lost: None) if _received else report
         for timer in timers:
             timer.cancel()
             timer.join()

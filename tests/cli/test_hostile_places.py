@@ -151,6 +151,26 @@ class TestStopped:
         done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=60)
         assert (done.returncode, done.stderr) == (status, "suave-des: interrupted\n")
 
+    def test_what_the_signal_left_half_made_says_nothing(self) -> None:
+        program = (
+            "import os, signal\n"
+            "from suave_des.interrupts import Stopped, signals_raised\n"
+            "class HalfMade:\n"
+            "    def __del__(self):\n"
+            "        raise AttributeError('not there yet')\n"
+            "first, second = HalfMade(), HalfMade()\n"
+            "try:\n"
+            "    with signals_raised():\n"
+            "        try:\n"
+            "            os.kill(os.getpid(), signal.SIGINT)\n"
+            "        finally:\n"
+            "            del first\n"
+            "except Stopped:\n"
+            "    del second\n"
+        )
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+        assert (done.returncode, done.stderr) == (0, "")
+
     @pytest.mark.slow
     def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path: Path) -> None:
         for place in range(60):
