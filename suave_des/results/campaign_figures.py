@@ -288,8 +288,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         of_metric[-1].set_xlabel(_folded(key_words(across)))
         for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
             axis.set_ticks(range(len(values)), [_folded(style.text(_value_text(each)), 14) for each in values])
-    for axes in panels[:, 0]:
-        axes.set_ylabel(_folded(key_words(up)))
+    figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
     counts = frame.groupby([names, up, across])["run"].nunique().tolist()
     others = [name for name in missions.swept if name not in parameters]
     write_below(figure, _averaged(counts, others))
