@@ -32,7 +32,7 @@ def open_base(loaded: LoadedScenario) -> Ontology:
     Raises:
         KnowledgeError: the ontologies or rules cannot be read.
     """
-    from suave_des.knowledge.checks.model import check_revision
+    from suave_des.knowledge.checks import check_revision
 
     scenario = loaded.scenario
     try:

@@ -24,8 +24,7 @@ from suave_des.kb.space import (
     interchangeable_components,
     numbers_in,
 )
-from suave_des.knowledge.checks import Subject, findings_in, static_findings
-from suave_des.knowledge.checks.model import check_revision, rules_of_2023
+from suave_des.knowledge.checks import Subject, check_revision, findings_in, rules_of_2023, static_findings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, place_of
 from suave_des.knowledge.pellet import ReasonerTimeoutError, TimeLimit

@@ -21,7 +21,7 @@ from suave_des.kb.matching import with_bindings
 from suave_des.kb.situations import Situation
 from suave_des.kb.states import ManagingSettings, read_rules
 from suave_des.kb.tracing import Tracer, pellet_for
-from suave_des.knowledge.checks.rules import findings_on_rule
+from suave_des.knowledge.checks import findings_on_rule
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet

@@ -30,7 +30,7 @@ from suave_des.kb.matching import (
 from suave_des.kb.situations import Probes, Situation
 from suave_des.kb.states import FactReader
 from suave_des.kb.tracing import Tracer
-from suave_des.knowledge.checks.model import unmeasured_rules
+from suave_des.knowledge.checks import unmeasured_rules
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit

@@ -1,0 +1,758 @@
+"""Checks of a knowledge base that need no reasoner.
+
+A check is a function that yields findings. It is in CHECKS, at the end. Which rules cannot fire is an upper bound of
+what can hold in any state. `kb check` adds the shapes of the model (SHACL), and what Pellet says.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from functools import cached_property
+from itertools import chain, pairwise
+from pathlib import Path
+from typing import Final
+
+from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
+from suave_des.errors import KnowledgeError, nearest, similar, with_article
+from suave_des.findings import Finding, Level, relative_path
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.ontology import OPERATORS, Model, Ontology, assumption, wrong_values
+from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
+from suave_des.knowledge.pellet import TIME_LIMIT_S
+from suave_des.knowledge.rdf import (
+    C_STATUS,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    LANGUAGE_NAMESPACES,
+    NUMERIC,
+    O_STATUS,
+    OWL,
+    PERFORMANCE,
+    QA_OPERATOR,
+    RDF_TYPE,
+    RDFS,
+    TOMASYS,
+    XSD,
+    Lit,
+    canonical,
+    local_name,
+    memberships,
+    namespace,
+    number_in,
+    reached,
+)
+from suave_des.knowledge.rules import (
+    COMPARISON_OF,
+    COMPARISONS,
+    EXPRESSION,
+    Atom,
+    Named,
+    Place,
+    Rule,
+    RuleError,
+    Term,
+    Variable,
+    literal_text,
+    mirrored,
+    write_atom,
+)
+from suave_des.knowledge.rules.checks import Vocabulary, about_rule, fatal_problems
+from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile
+from suave_des.resources import shipped_folder
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What to check.
+
+    Attributes:
+        ontologies: files; without any, the shipped suave.owl.
+        rules: files of rules as text.
+        disabled_rules: names of rules to disable.
+        values: replaces the hasValue of named QAvalue individuals.
+        modes: names of the modes by function; None skips the checks against them.
+        needed: functions that the mission cannot do without.
+        operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
+        revision: the scenario's, for messages.
+        reported: the statuses that the simulation reports, by component; None: that is not checked.
+        measured: the quality attributes that the scenario measures; None: that is not checked.
+        reaction_thresholds_m: visibilities by which the mean reaction time is judged; None: that is not checked.
+        time_limit_s: for Pellet.
+    """
+
+    ontologies: Sequence[Path] = ()
+    rules: Sequence[Path] = ()
+    disabled_rules: Collection[str] = ()
+    values: Mapping[str, Decimal] = field(default_factory=dict)
+    modes: Mapping[str, Collection[str]] | None = None
+    needed: Collection[str] = ()
+    operators: Mapping[str, str] = field(default_factory=dict)
+    revision: str = ""
+    reported: Mapping[str, Collection[str]] | None = None
+    measured: Collection[str] | None = None
+    reaction_thresholds_m: Collection[float] | None = None
+    time_limit_s: float = TIME_LIMIT_S
+
+    @property
+    def given(self) -> list[Path]:
+        """The ontologies, or the shipped one."""
+        return list(self.ontologies) or [shipped_folder("ontology") / "suave.owl"]
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What checks look at.
+
+    Attributes:
+        subject: what is to be checked.
+        base: the ontologies and rules, with the operators that the revision assumes.
+    """
+
+    subject: Subject
+    base: Ontology
+
+    @cached_property
+    def content(self) -> Content:
+        """All that the files state, that which only holds in states, too."""
+        return replace(self.base.content, triples=tuple(dict.fromkeys((*self.base.content.triples, *self.base.stated))))
+
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """The enabled rules."""
+        return self.content.enabled_rules
+
+    @cached_property
+    def dead(self) -> list[tuple[Rule, Atom]]:
+        """The rules that fire in no state, each with an atom of its body that can never hold."""
+        return dead_rules(self.content, self.base.model)
+
+    @cached_property
+    def for_other_models(self) -> list[Rule]:
+        """The rules of TOMASys and mros, which have rules for any model, that need what this model does not have."""
+        kinds = self.base.vocabulary.kinds
+        return [
+            rule
+            for rule, _ in self.dead
+            if self.is_of_metamodel(rule)
+            and all(each.kind == "builtin" or kinds.get(each.predicate) for each in rule.atoms)
+        ]
+
+    def is_of_metamodel(self, rule: Rule) -> bool:
+        """Whether a rule is one of TOMASys or mros."""
+        source = self.base.source_of(rule)
+        return source is not None and is_metamodel(source)
+
+    def is_own(self, rule: Rule) -> bool:
+        """Whether a rule is in a file that the user gave, and not one of TOMASys."""
+        given = {path.resolve() for path in (*self.subject.given, *self.subject.rules)}
+        return rule.file.resolve() in given and not self.is_of_metamodel(rule)
+
+    def about(self, level: Level, name: str, message: str, remedy: str | None = None) -> Finding:
+        """Make a finding about the thing of a name."""
+        file, line = place_of(name, self.base.sources)
+        return Finding(level, message, str(file), line, remedy=remedy)
+
+    def suspicious(self, rule: Rule, place: Place | None, message: str, remedy: str | None = None) -> Finding:
+        """Make a finding about a rule; of one in an imported ontology it is a note."""
+        level = Level.WARN if self.is_own(rule) else Level.INFO
+        return about_rule(rule, message, place, remedy, level, self.base.place_of(rule))
+
+
+def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[Finding]:
+    """Find what needs no reasoner, which takes some 10 ms, in files that may have errors.
+
+    Args:
+        subject: what to check.
+        sources: its ontologies and their imports.
+
+    Raises:
+        InputError: a file of rules cannot be read at all; the scenario names a value or a rule that is not there.
+    """
+    findings = list[Finding]()
+
+    def usable(file: RulesFile, vocabulary: Vocabulary) -> Sequence[Rule]:
+        found = list(file.looked_up(vocabulary))
+        findings.extend(map(Finding.of, file.parsed.errors))
+        findings.extend(replace(Finding.of(rule), rule=name) for name, rule in found if isinstance(rule, RuleError))
+        if not found and not file.parsed.errors:
+            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(file.path)))
+        return [rule for _, rule in found if isinstance(rule, Rule)]
+
+    files = [RulesFile.read(path) for path in subject.rules]
+    try:
+        base = Ontology.merged(sources, files, usable, subject.values, subject.disabled_rules, subject.operators)
+    except KnowledgeError as error:
+        if error.file is None:  # about a name that the scenario gives, and no file
+            raise
+        return [*findings, Finding.of(error)]
+    return [*findings, *findings_in(base, subject)]
+
+
+def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
+    """Find what needs no reasoner in a knowledge base that has been opened.
+
+    Args:
+        base: the ontologies and rules, with the operators that the revision assumes.
+        subject: what it was opened from, and what missions have to do with it.
+    """
+    material = Material(subject, base)
+    return [finding for check in CHECKS for finding in check(material)]
+
+
+def findings_on_rule(
+    name: str, base: Ontology, reported: Mapping[str, Collection[str]], measured: Collection[str]
+) -> Iterator[Finding]:
+    """Find what is wrong with the rules of a name in a knowledge base.
+
+    Args:
+        name: of the rules.
+        base: the knowledge base that has them.
+        reported: the statuses that the simulation reports, by component.
+        measured: the quality attributes that the scenario measures.
+    """
+    files = [rule.file for rule in base.rules if rule.name == name]
+    found = findings_in(base, Subject(rules=files, reported=reported, measured=measured))
+    return (each for each in found if each.rule == name)
+
+
+# The model, and what missions have to do with it.
+
+_ABOUT_CLASSES: Final = frozenset(
+    (RDFS + "subClassOf", RDFS + "domain", RDFS + "range", OWL + "equivalentClass", OWL + "disjointWith")
+)
+_PROPERTIES: Final = ("object property", "data property", "annotation property")
+
+
+def values(material: Material) -> Iterator[Finding]:
+    """Find the values that no state can be compared with, or that contradict one another."""
+    for subject, problem, remedy in wrong_values(material.base.stated):
+        yield material.about(Level.ERROR, local_name(subject), f"{local_name(subject)}: {problem}", remedy)
+
+
+def undefined_names(material: Material) -> Iterator[Finding]:
+    """Find the classes, properties and individuals that are used and defined nowhere: most are misspelt.
+
+    Only those of the ontologies' own namespaces: names of other vocabularies may be defined elsewhere.
+    """
+    model, kinds, triples = material.base.model, material.base.vocabulary.kinds, material.content.triples
+    of_states = {each.iri for each in model.individuals()}
+    described = {subject for subject, _, _ in triples} | of_states
+    namespaces = {namespace(iri) for iri in described}
+    assumed = {(model.attributes[name], QA_OPERATOR) for name in material.base.assumed}
+    for subject, predicate, value in triples:
+        used: tuple[str, str, Collection[str]] | None = None  # words, what is used, what it should be
+        is_term = isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
+        if predicate == RDF_TYPE or predicate in _ABOUT_CLASSES:
+            wanted = ("class", "datatype") if predicate == RDFS + "range" else ("class",)
+            if is_term and kinds.get(str(value), frozenset()).isdisjoint(wanted):
+                used = "class" if predicate == RDF_TYPE else local_name(predicate), str(value), ("class",)
+        elif not predicate.startswith(LANGUAGE_NAMESPACES) and (subject, predicate) not in assumed:
+            if predicate not in described:
+                used = "property", predicate, _PROPERTIES
+            elif is_term and value not in described and "object property" in kinds.get(predicate, ()):
+                used = local_name(predicate), str(value), ("individual",)
+        if used is not None and namespace(used[1]) in namespaces:
+            words, name, meant = used
+            known = [iri for iri in described - of_states - {subject} if kinds.get(iri, frozenset()) & {*meant}]
+            same = sorted(iri for iri in known if local_name(iri) == local_name(name))
+            remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
+            problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
+            yield material.about(Level.ERROR, local_name(subject), problem, remedy or "declare it, or correct the name")
+
+
+def functions_without_design(material: Material) -> Iterator[Finding]:
+    """Find the functions that have no design, or that the mission needs and that are not there."""
+    needed = {*material.subject.needed}
+    for level, names in ((Level.ERROR, needed), (Level.WARN, material.base.model.functions.keys() - needed)):
+        for name, problem, remedy in material.base.unsolved(names):
+            yield material.about(level, name, problem, remedy)
+
+
+def designs_and_modes(material: Material) -> Iterator[Finding]:
+    """Find the function designs that no mode has the name of, and the modes that metacontrol never chooses."""
+    otherwise = "add a mode of this name to the System Modes file, or remove the design"
+    for function in sorted(material.base.model.functions if material.subject.modes is not None else ()):
+        designs = {*material.base.designs(function)}
+        modes = {*(material.subject.modes or {}).get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
+        for design in sorted(designs - modes):
+            problem = f"function design {design} has no mode of the same name for {function}"
+            yield material.about(Level.ERROR, design, problem, nearest(design, modes - designs) or otherwise)
+        if spare := ", ".join(sorted(modes - designs)):
+            problem = f"modes of {function} without function design, which metacontrol never chooses: {spare}"
+            yield material.about(Level.INFO, function, problem)
+
+
+def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
+    """Find quality attributes that missions measure and ontologies lack, or compare with nothing."""
+    model, measured = material.base.model, material.subject.measured
+    for name in sorted({*(measured or ())} - model.attributes.keys()):
+        problem = f"missions measure {name}, but no ontology has a quality attribute type of this name"
+        remedy = nearest(name, model.attributes) or "declare a QualityAttributeType of this name"
+        yield material.about(Level.WARN, name, problem, remedy)
+    for name in () if rules_of_2023(material.content) else without_operator(material.content, model, measured or ()):
+        designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
+        problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
+        yield material.about(Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <")
+    valued = {subject for subject, predicate, _ in material.content.triples if predicate == HAS_VALUE}
+    for name, each in model.measurements.items():
+        if measured is not None and each.iri in valued and name not in measured:
+            problem = f"hasValue of {local_name(each.iri)} is not used: {name} has the value that missions measure"
+            yield material.about(Level.WARN, local_name(each.iri), problem, "measure it in the scenario")
+
+
+def without_operator(content: Content, model: Model, measured: Collection[str]) -> list[str]:
+    """Return the quality attributes that missions measure and designs expect, and that cannot be compared."""
+    compared = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
+    return sorted(name for name in _expected(model).intersection(measured) if model.attributes[name] not in compared)
+
+
+def _expected(model: Model) -> frozenset[str]:
+    """The quality attributes of which designs expect a value, without the performance."""
+    return frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
+
+
+def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
+    """Find the search designs whose expected visibility the metric of reactions does not know."""
+    known = material.subject.reaction_thresholds_m
+    for design in material.base.designs(GENERATE_SEARCH_PATH) if known is not None else ():
+        expected_m = material.base.expected(design).get(WATER_VISIBILITY)
+        if expected_m is not None and float(expected_m) not in (known or ()):
+            problem = f"{design} expects a visibility of {expected_m} m, by which mean_reaction_time_s does not judge"
+            remedy = "set reaction_metric.visibility_thresholds_m and expected_altitudes_m"
+            yield material.about(Level.WARN, design, problem, remedy)
+
+
+def unknown_to_missions(material: Material) -> Iterator[Finding]:
+    """Note the components that nothing reports, the attributes that nothing measures, and what is assumed."""
+    content, subject, model = material.content, material.subject, material.base.model
+    asserted = {each for each, predicate, _ in content.triples if predicate == C_STATUS}
+    if subject.reported is not None and C_STATUS not in content.head_properties():
+        for name, iri in sorted(model.components.items()):
+            if name not in subject.reported and iri not in asserted:
+                problem = (
+                    f"nothing in the simulation reports the status of component {name}, so missions never have one"
+                )
+                yield material.about(Level.INFO, name, problem, f"reported are {', '.join(subject.reported)}")
+    for name in sorted(_expected(model).difference(subject.measured) if subject.measured is not None else ()):
+        problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+        yield material.about(Level.INFO, name, problem)
+    for name, sign in material.base.assumed.items():
+        yield material.about(Level.INFO, name, assumption(name, sign))
+
+
+def rules_of_2023(content: Content) -> list[tuple[Rule, Atom]]:
+    """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of 2023 do."""
+    return [
+        (rule, atom)
+        for rule in content.enabled_rules
+        for atom in rule.head
+        if atom.predicate == O_STATUS and isinstance(atom.arguments[-1], Lit) and atom.arguments[-1].text == "UPDATABLE"
+    ]
+
+
+def check_revision(base: Ontology, measured: Collection[str], revision: str) -> None:
+    """Check that ontologies of the exemplar's revision 2023 are used with that revision.
+
+    With a later one no design is ever ruled out, as its code assumes no operator, so that objectives stay in error;
+    the first thruster that recovers then contradicts that.
+
+    Args:
+        base: the ontologies with the operators that the revision assumes, and rules.
+        measured: the quality attributes that the scenario measures.
+        revision: the scenario's, for the message.
+
+    Raises:
+        KnowledgeError: with the file and line of the rule.
+    """
+    missing = without_operator(base.content, base.model, measured)
+    for rule, atom in rules_of_2023(base.content) if missing else ():
+        raise KnowledgeError(
+            f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
+            f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator",
+            file=rule.file,
+            place=base.place_of(rule),
+            remedy=f'write revision: "2023" in the scenario, or use ontologies of revision {revision}',
+        )
+
+
+def another_revision(material: Material) -> Iterator[Finding]:
+    """Find ontologies of revision 2023 in a scenario of another one."""
+    try:
+        check_revision(material.base, material.subject.measured or (), material.subject.revision)
+    except KnowledgeError as error:
+        yield Finding.of(error)
+
+
+# Rules that Pellet would ignore, or that never fire.
+
+
+def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
+    """Find what Pellet would drop or ignore without a word."""
+    for rule in material.rules:
+        for each in fatal_problems(rule, material.base.vocabulary) if rule not in material.for_other_models else ():
+            place = Place(each.line or 1, each.column) if each.column else None
+            yield about_rule(rule, each.message, place, each.remedy, Level.ERROR, material.base.place_of(rule))
+
+
+def shared_names(material: Material) -> Iterator[Finding]:
+    """Find rules of one name, other than those of TOMASys and mros, and those that replace another one."""
+    rules = material.content.rules
+    names, own = (
+        Counter(rule.name for rule in rules),
+        {each.name for each in rules if not material.is_of_metamodel(each)},
+    )
+    for rule in rules:
+        if names[rule.name] > 1 and rule.name in own and not rule.name.endswith(WITHOUT_NAME):
+            yield material.suspicious(rule, None, f"{names[rule.name]} rules have this name", "rename one")
+    for old, new in material.content.replaced:
+        if (old.text, old.enabled) != (new.text, new.enabled):
+            problem = f"replaces the rule of this name in {relative_path(old.file)}"
+            yield about_rule(new, problem, None, "give it a different name, unless this is intended", Level.WARN)
+
+
+def for_other_models(material: Material) -> Iterator[Finding]:
+    """Note the rules of TOMASys and mros that need what this model does not have, a file in one line."""
+    by_file: dict[Path, list[str]] = defaultdict(list)
+    for rule in material.for_other_models:
+        by_file[rule.file].append(rule.name)
+    for file, names in by_file.items():
+        message = f"rules for other models, which never fire in this one: {', '.join(names)}"
+        yield Finding(Level.INFO, message, str(file))
+
+
+def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
+    """Find the enabled rules that fire in no state, each with an atom of its body that can never hold.
+
+    An atom cannot hold if no ontology asserts its class or property, no state adds it and no rule that can fire
+    concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not every
+    dead rule is returned.
+    """
+    leads = tuple(RDFS + name for name in ("subClassOf", "subPropertyOf", "domain", "range"))
+    both_ways = tuple(OWL + name for name in ("equivalentClass", "equivalentProperty", "inverseOf"))
+    related = [(one, name, str(other)) for one, name, other in content.triples]
+    steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
+    steps += [(other, one) for one, name, other in related if name in (*both_ways, RDFS + "subPropertyOf")]
+    in_states = ("Objective", "FunctionGrounding", "typeF", "typeFD", "solvesO", "o_always_improve")
+    held = {OWL + "Thing", EXPRESSION, C_STATUS, O_STATUS, *(TOMASYS + name for name in in_states)}
+    held |= {*(name for _, name in memberships(content.triples)), *(name for _, name, _ in content.triples)}
+    held |= {TOMASYS + "QAvalue", IS_QA_TYPE, HAS_VALUE} if model.attributes else set()
+    held |= {HAS_QA_VALUE} if any(model.estimated.values()) else set()
+    structure = "".join(content.structure)
+    waiting, possible = list(content.enabled_rules), reached(held, steps)
+
+    def allows(atom: Atom) -> bool:
+        is_named = atom.kind in ("class", "object", "data") and atom.arguments
+        # Class expressions and property chains are not followed.
+        return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
+
+    while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
+        held.update(atom.predicate for rule in firing for atom in rule.head)
+        possible = reached(held, steps)
+        waiting = [rule for rule in waiting if rule not in firing]
+    return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
+
+
+def unmeasured_rules(
+    content: Content, model: Model, measured: Collection[str] | None = None
+) -> list[tuple[Rule, Atom, str, str | None]]:
+    """Find the enabled rules that need a value of a quality attribute of which nothing has one.
+
+    A grounding has the measured values (hasQAvalue) of those attributes that its function design has an estimate of.
+    Other values are in the ontologies, or measured.
+
+    Args:
+        content: the ontologies and rules.
+        model: what is in them.
+        measured: quality attributes that missions measure; None: any.
+
+    Returns:
+        each rule with the atom that names the attribute, what is wrong, and what would be right.
+    """
+    if IS_QA_TYPE in content.head_properties():
+        return []
+    elsewhere = HAS_QA_VALUE in content.head_properties() or any(p == HAS_QA_VALUE for _, p, _ in content.triples)
+    estimated = frozenset().union(*model.estimated.values())
+    valued = {local_name(str(value)) for _, predicate, value in content.triples if predicate == IS_QA_TYPE}
+    found: list[tuple[Rule, Atom, str, str | None]] = []
+    for rule in content.enabled_rules:
+        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == HAS_QA_VALUE}
+        for atom in rule.body:
+            if atom.predicate != IS_QA_TYPE or len(atom.arguments) != 2 or not isinstance(atom.arguments[1], Named):
+                continue
+            name = local_name(atom.arguments[1].iri)
+            is_measured = measured is None or name in measured
+            if atom.arguments[0] not in held:
+                if not is_measured and name not in valued:
+                    found.append(
+                        (rule, atom, f"missions do not measure {name}, and no ontology has a value of it", None)
+                    )
+            elif name in model.attributes and not elsewhere:
+                if name not in estimated:
+                    problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
+                    found.append((rule, atom, problem, f"add a hasQAestimation of type {name} to a design"))
+                elif not is_measured:
+                    problem = f"missions do not measure {name}, so no grounding has a value of it"
+                    found.append((rule, atom, problem, None))
+    return found
+
+
+def never_fires(material: Material) -> Iterator[Finding]:
+    """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
+    told = list(material.for_other_models)
+    dead = [(rule, atom, f"{write_atom(atom)} holds in no state", None) for rule, atom in material.dead]
+    unmeasured = unmeasured_rules(material.content, material.base.model, material.subject.measured)
+    for rule, atom, problem, remedy in (*dead, *unmeasured):
+        if rule not in told:
+            told.append(rule)
+            yield material.suspicious(rule, atom.place(), f"can never fire: {problem}", remedy)
+
+
+#: Axioms by which individuals are different: declared so, or members of disjoint classes or properties.
+_MAKE_DIFFERENT: Final = re.compile(OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)")
+
+
+def equal_individuals(material: Material) -> Iterator[Finding]:
+    """Find rules that ask for different individuals (differentFrom), where nothing makes any different.
+
+    Values of functional properties can, so such a rule is suspicious, not dead.
+    """
+    terms = (*(predicate for _, predicate, _ in material.content.triples), *material.content.structure)
+    heads = (atom.kind for rule in material.rules for atom in rule.head)
+    if any(map(_MAKE_DIFFERENT.search, terms)) or "different" in heads:
+        return
+    remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
+    for rule in material.rules:
+        for atom in rule.body:
+            if atom.kind == "different":
+                needs = "needs individuals that are declared different; different names are not enough"
+                yield material.suspicious(rule, atom.place(), f"{write_atom(atom)} {needs}", remedy)
+
+
+# Rules that cannot mean what their author wanted.
+
+#: Classes of which nothing is a member of two, unless an ontology or a rule says so.
+_KINDS: Final = frozenset(
+    TOMASYS + name
+    for name in (
+        *("Component", "Function", "FunctionDesign", "FunctionGrounding"),
+        *("Objective", "QAvalue", "QualityAttributeType"),
+    )
+)
+
+
+def things_of_two_kinds(material: Material) -> Iterator[Finding]:
+    """Find variables and individuals that a rule would have to be of two kinds of TOMASys at once.
+
+    A reasoner contradicts no other use than the one that a property is declared for (rdfs:domain, rdfs:range): it
+    concludes that the thing is of both kinds, and a rule that needs both never fires. Where an ontology or a rule makes
+    something a thing of two kinds, none excludes another.
+    """
+    triples = material.content.triples
+    kinds: dict[str, set[str]] = defaultdict(set)
+    for thing, name in (*memberships(triples), *((s, o) for s, p, o in triples if p == RDFS + "subClassOf")):
+        kinds[thing] |= {str(name)} & _KINDS
+    if any(len(each) > 1 for each in kinds.values()) or not _KINDS.isdisjoint(material.content.head_classes()):
+        return
+    ends = {RDFS + "domain": 0, RDFS + "range": 1}
+    wanted = {(s, ends[p]): str(o) for s, p, o in triples if p in ends and o in _KINDS}
+    wanted |= {(kind, 0): kind for kind in _KINDS}
+    for rule in material.rules:
+        known: dict[Term, tuple[str, str]] = {}
+        for atom in sorted(rule.atoms, key=lambda each: each.kind != "class"):
+            for number, term in enumerate(atom.arguments):
+                kind, name = wanted.get((atom.predicate, number)), local_name(atom.predicate)
+                if kind is None or isinstance(term, Lit):
+                    continue
+                if isinstance(term, Named) and kinds.get(term.iri):
+                    known.setdefault(term, (min(kinds[term.iri]), ""))
+                before, by = known.setdefault(term, (kind, "" if atom.kind == "class" else f" in {name}"))
+                if kind != before:
+                    thing = f"?{term.name}" if isinstance(term, Variable) else local_name(term.iri)
+                    first = with_article(local_name(before)) + by
+                    problem = f"{thing} is {first}, but {with_article(local_name(kind))} in {name}"
+                    yield material.suspicious(rule, atom.place(), problem)
+
+
+def misspelt_variables(material: Material) -> Iterator[Finding]:
+    """Find variables that occur once, and whose name is nearly that of another."""
+    for rule in material.rules:
+        places: dict[str, list[Place | None]] = defaultdict(list)
+        values: dict[str, set[bool]] = defaultdict(set)
+        for atom in rule.atoms:
+            for number, term in enumerate(atom.arguments):
+                if isinstance(term, Variable):
+                    values[term.name].add(atom.takes_value(number))
+                    places[term.name].append(atom.place(number))
+        names = list(places)
+        for name in (each for each in names if len(places[each]) == 1):
+            near = [other for other in names if values[other] & values[name] and are_near(name, other)]
+            before = names[: names.index(name)]
+            meant = [other for other in near if len(places[other]) > 1] or [other for other in near if other in before]
+            if meant:
+                problem = f"?{name} occurs only here, and is another variable than ?{meant[0]}"
+                yield material.suspicious(rule, places[name][0], problem, f"did you mean ?{meant[0]}?")
+
+
+def are_near(one: str, other: str) -> bool:
+    """Whether one name is probably a misspelling of the other: in its capitals, or in letters inside it.
+
+    Names that differ in a digit, in their first letter or in their last one are often meant: ?speed1 and ?speed2,
+    ?xpos and ?ypos, ?design and ?design_b.
+    """
+    if one.casefold() == other.casefold():
+        return one != other
+    has_same_ends = one[0] == other[0] and (one[-1] == other[-1] or sorted(one) == sorted(other))
+    is_word = (one + other).isalpha() and (one + other).islower() and min(len(one), len(other)) > 2
+    return has_same_ends and is_word and similar(one, [other], cutoff=0.8) is not None
+
+
+def two_values(material: Material) -> Iterator[Finding]:
+    """Find what a rule asks, or concludes, to have two values of a property that has one."""
+    kind = (RDF_TYPE, OWL + "FunctionalProperty")
+    functional = {subject for subject, name, value in material.content.triples if (name, value) == kind}
+    for rule in material.rules:
+        values: dict[tuple[str, Term], Term] = {}
+        for atom in rule.body:
+            if atom.predicate in functional and len(atom.arguments) == 2:
+                subject, value = atom.arguments
+                before = values.setdefault((atom.predicate, subject), value)
+                if not isinstance(before, Variable) and not isinstance(value, Variable) and not _same(before, value):
+                    name = local_name(atom.predicate)
+                    problem = f"{write_atom(atom)}: nothing has two values of {name}, so the rule never fires"
+                    yield material.suspicious(rule, atom.place(), problem, "write a rule for each value")
+        equated = {term for atom in rule.body if COMPARISONS.get(atom.predicate) == "=" for term in atom.arguments}
+        for atom in rule.head:
+            asked = values.get((atom.predicate, atom.arguments[0])) if len(atom.arguments) == 2 else None
+            if asked is None or asked in equated or atom.kind != "data" or _same(asked, atom.arguments[1]):
+                continue
+            problem = f"{write_atom(atom)} contradicts {local_name(atom.predicate)} in the body, which holds as well"
+            yield material.suspicious(rule, atom.place(), problem, "rules add facts, and change none")
+
+
+def _same(one: Term, other: Term) -> bool:
+    return one == other or (isinstance(one, Lit) and isinstance(other, Lit) and canonical(one) == canonical(other))
+
+
+_FD_REALISABILITY: Final = TOMASYS + "fd_realisability"
+
+
+def no_effect(material: Material) -> Iterator[Finding]:
+    """Find rules that conclude that a design is realisable, which no decision asks."""
+    if any(atom.predicate == _FD_REALISABILITY for rule in material.rules for atom in rule.body):
+        return
+    for rule in material.rules:
+        for atom in rule.head:
+            term = atom.arguments[-1] if atom.predicate == _FD_REALISABILITY else None
+            if isinstance(term, Lit) and term.text in ("true", "1"):
+                problem = "fd_realisability true has no effect: a design counts as realisable unless it is false"
+                remedy = "write the opposite condition, and conclude false"
+                yield material.suspicious(rule, atom.place(), problem, remedy)
+
+
+_COMPARE: Final[Mapping[str, Callable[[float, float], bool]]] = {
+    "=": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+def comparisons_that_decide_nothing(material: Material) -> Iterator[Finding]:
+    """Find comparisons that no value satisfies, alone or together, and those with a text that none is."""
+    vocabulary = material.base.vocabulary
+    for rule in material.rules:
+        holders = dict(rule.read_values())
+        asked: dict[str, list[tuple[str, float, str]]] = defaultdict(list)  # sign, number, how it is written
+        for atom, name, sign, value in _comparisons(rule):
+            holder = holders.get(name, "")
+            texts = vocabulary.enumerations.get(holder)
+            if texts is not None and sign in ("=", "!=") and value.text not in texts:
+                holds, where = "never" if sign == "=" else "always", local_name(holder)
+                problem = f"{literal_text(value)} is not among the values of {where}: the comparison {holds} holds"
+                remedy = nearest(value.text, texts) or f"one of {', '.join(sorted(texts))}"
+                yield material.suspicious(rule, atom.place(), problem, remedy)
+            ranges = vocabulary.ranges.get(holder, frozenset())
+            if sign != "!=" and ranges and ranges <= NUMERIC and value.datatype not in NUMERIC:
+                compares = f"{local_name(COMPARISON_OF[sign])} compares ?{name}, a number"
+                problem = f"{compares}, with the text {literal_text(value)}: it never holds"
+                yield material.suspicious(rule, atom.place(), problem, f"write {value.text} without quotes")
+            elif (number := number_in(value)) is not None:
+                asked[name].append((sign, float(number), f"{sign} {value.text}"))
+                if not _is_possible(asked[name]):
+                    all_of_them = " and ".join(words for *_, words in asked.pop(name))
+                    problem = f"no value of ?{name} is {all_of_them}: the rule never fires"
+                    yield material.suspicious(rule, atom.place(), problem, "reverse one of the comparisons")
+
+
+def _comparisons(rule: Rule) -> Iterator[tuple[Atom, str, str, Lit]]:
+    """(comparison, variable, sign, literal) of each comparison with a literal, as if the variable were on the left."""
+    for atom in rule.body:
+        sign = COMPARISONS.get(atom.predicate)
+        if sign is not None and len(atom.arguments) == 2:
+            one, other = atom.arguments
+            if isinstance(one, Variable) and isinstance(other, Lit):
+                yield atom, one.name, sign, other
+            elif isinstance(one, Lit) and isinstance(other, Variable):
+                yield atom, other.name, mirrored(sign), one
+
+
+def _is_possible(asked: Iterable[tuple[str, float, str]]) -> bool:
+    """Whether a number satisfies all comparisons: one of theirs, one between two of them, or one beyond them."""
+    numbers = sorted({number for _, number, _ in asked})
+    tried = [numbers[0] - 1.0, *numbers, numbers[-1] + 1.0, *((low + high) / 2.0 for low, high in pairwise(numbers))]
+    return any(all(_COMPARE[sign](each, number) for sign, number, _ in asked) for each in tried)
+
+
+def misspelt_statuses(material: Material) -> Iterator[Finding]:
+    """Find the user's rules that ask for a component's status that is nearly one that the simulation reports.
+
+    Statuses that an ontology asserts, or a rule concludes, are known as well.
+    """
+    reported = {*chain.from_iterable((material.subject.reported or {}).values())}
+    by_capitals = {each.upper(): each for each in sorted(reported)}
+    asserted = [value for _, predicate, value in material.content.triples if predicate == C_STATUS]
+    heads = [atom.arguments[-1] for rule in material.rules for atom in rule.head if atom.predicate == C_STATUS]
+    known = {*reported, *(value.text for value in (*asserted, *heads) if isinstance(value, Lit))}
+    for rule in filter(material.is_own, material.rules):
+        asked = [(atom, atom.arguments[-1]) for atom in rule.body if atom.predicate == C_STATUS]
+        statuses = {status for _, status in asked if isinstance(status, Variable)}
+        for atom in rule.body:  # and in a comparison
+            if atom.predicate in (COMPARISON_OF["="], COMPARISON_OF["!="]) and not statuses.isdisjoint(atom.arguments):
+                asked += [(atom, term) for term in atom.arguments]
+        for atom, status in asked:
+            if isinstance(status, Lit) and status.datatype == XSD + "string" and status.text not in known:
+                meant = similar(status.text.upper(), by_capitals)
+                if meant is not None:
+                    problem = f'nothing in the simulation reports c_status "{status.text}"'
+                    yield material.suspicious(rule, atom.place(1), problem, f'did you mean "{by_capitals[meant]}"?')
+
+
+CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
+    values,
+    undefined_names,
+    functions_without_design,
+    designs_and_modes,
+    attributes_that_do_not_fit,
+    thresholds_without_reaction,
+    unknown_to_missions,
+    another_revision,
+    mistakes_that_pellet_ignores,
+    shared_names,
+    for_other_models,
+    never_fires,
+    equal_individuals,
+    things_of_two_kinds,
+    misspelt_variables,
+    two_values,
+    no_effect,
+    comparisons_that_decide_nothing,
+    misspelt_statuses,
+)
