@@ -111,17 +111,6 @@ class KnowledgeBase:
         """
         return KnowledgeBase.of(base, self.settings, "pellet", self.limit)
 
-    def without(self, rules: Iterable[str]) -> KnowledgeBase:
-        """Return the same without some rules."""
-        names = frozenset(rules)
-        if names not in self._without:
-            self._without[names] = self.changed(self.base.with_rules(r for r in self.base.rules if r.name not in names))
-        return self._without[names]
-
-    @cached_property
-    def _without(self) -> dict[frozenset[str], KnowledgeBase]:
-        return {}
-
     @cached_property
     def _reasoner(self) -> Reasoner:
         return Reasoner(self.base, self.reasoner, self.limit)

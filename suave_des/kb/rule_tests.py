@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from pathlib import Path
@@ -73,8 +73,6 @@ class _Test(BaseModel):
     follows_not: _Texts = []
     decides: dict[str, str] = {}
     contradiction: bool = False
-    without: _Texts = []
-    changes: dict[str, str] = {}
 
 
 class _File(BaseModel):
@@ -99,8 +97,6 @@ class RuleTest:
         follows_not: facts that must not.
         decides: (function, what happens to its grounding: a design, "stays" or "none left").
         contradicts: whether the situation must contradict itself.
-        without: names of rules of which it says what they change.
-        changes: (function, what happens without these rules, what happens with them).
         problem: why it cannot be asked of the knowledge base.
     """
 
@@ -112,8 +108,6 @@ class RuleTest:
     follows_not: tuple[Fact, ...] = ()
     decides: tuple[tuple[str, str], ...] = ()
     contradicts: bool = False
-    without: tuple[str, ...] = ()
-    changes: tuple[tuple[str, str, str], ...] = ()
     problem: str = ""
 
 
@@ -135,12 +129,9 @@ class TestFile:
         document = read_yaml(path)
         content = validated(document, _File)
         for number, test in enumerate(content.tests):
-            if not (test.follows or test.follows_not or test.decides or test.contradiction or test.changes):
-                remedy = "give one of follows, follows_not, decides, contradiction, changes"
+            if not (test.follows or test.follows_not or test.decides or test.contradiction):
+                remedy = "give one of follows, follows_not, decides, contradiction"
                 raise document.error("this test expects nothing", ("tests", number), remedy)
-            if bool(test.without) != bool(test.changes):
-                remedy = "without: RULE, and changes: {FUNCTION: BEFORE -> AFTER}"
-                raise document.error("`without` and `changes` must be given together", ("tests", number), remedy)
         return cls(document, content)
 
     @property
@@ -187,24 +178,12 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
     base, reader = knowledge.base, FactReader(knowledge.base)
     reader.declare(test.given.facts)
     triples = tuple(map(reader.triple, test.given.facts))
-    enabled = sorted({rule.name for rule in base.content.enabled_rules})
-    for name in test.without:
-        if name not in enabled:
-            raise InputError(f"there is no enabled rule {shown(name)}", remedy=did_you_mean(name, enabled))
-    changes = []
-    for function, words in test.changes.items():
-        before, arrow, after = words.partition("->")
-        if not arrow:
-            raise InputError(f"{shown(words)} is not a change", remedy="{FUNCTION: BEFORE -> AFTER}")
-        changes.append((function, _choice(base, function, before), _choice(base, function, after)))
     return {
         "situations": tuple(Situation(each, triples, words) for each, words in _states(test.given, knowledge, folder)),
         "follows": {reader.fact(text): reader.triple(text) for text in test.follows},
         "follows_not": tuple(map(reader.fact, test.follows_not)),
         "decides": tuple((name, _choice(base, name, words)) for name, words in test.decides.items()),
         "contradicts": test.contradiction,
-        "without": tuple(test.without),
-        "changes": tuple(changes),
     }
 
 
@@ -271,9 +250,6 @@ class TestResult:
         return not self.failures
 
 
-Without = Callable[[Iterable[str]], Decide]
-
-
 def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
     """Run a test on a knowledge base, and explain what fails in the first situation in which something does.
 
@@ -283,7 +259,7 @@ def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
     began = time.perf_counter()
     found = [Failure(test.problem)] if test.problem else []
     for situation in () if found else test.situations:
-        unmet = list(_unmet(test, situation, knowledge.outcome, lambda names: knowledge.without(names).outcome))
+        unmet = list(_unmet(test, situation, knowledge.outcome))
         if unmet:
             found = [
                 Failure(what, situation, tuple(_because(knowledge, test, situation, about))) for what, about in unmet
@@ -292,24 +268,15 @@ def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
     return TestResult(test, tuple(found), time.perf_counter() - began)
 
 
-def passes(test: RuleTest, outcome: Decide, without: Without) -> bool:
-    """Whether all that a test expects is so; nothing is explained.
-
-    Args:
-        test: the test.
-        outcome: concludes what follows and is decided in a situation.
-        without: makes the same without some rules.
-    """
-    return not any(True for situation in test.situations for _ in _unmet(test, situation, outcome, without))
+def passes(test: RuleTest, outcome: Decide) -> bool:
+    """Whether all that a test expects is so; nothing is explained."""
+    return not any(True for situation in test.situations for _ in _unmet(test, situation, outcome))
 
 
-def _unmet(
-    test: RuleTest, situation: Situation, outcome_of: Decide, without: Without
-) -> Iterator[tuple[str, Fact | str | None]]:
+def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide) -> Iterator[tuple[str, Fact | str | None]]:
     """Each expectation that does not hold in a situation, in words, and the fact or function that it is about."""
     try:
         outcome = outcome_of(situation)
-        before = without(test.without)(situation) if test.changes and outcome.reasoning is not None else outcome
     except ReasonerTimeoutError:
         raise  # Pellet is still at work: no further state can be decided
     except KnowledgeError as error:
@@ -323,15 +290,11 @@ def _unmet(
         yield "the situation does not contradict itself", None
     yield from ((f"{fact} does not follow", fact) for fact in test.follows if fact not in outcome.known)
     yield from ((f"{fact} follows", fact) for fact in test.follows_not if fact in outcome.known)
-    wishes = [(outcome, function, wanted, "") for function, wanted in test.decides]
-    names = ", ".join(test.without)
-    for function, one, other in test.changes:
-        wishes += [(before, function, one, f", without {names}"), (outcome, function, other, f", with {names}")]
-    for each, function, wanted, words in wishes:
-        chosen, present = each.choice(function), situation.state.grounded(function)
+    for function, wanted in test.decides:
+        chosen, present = outcome.choice(function), situation.state.grounded(function)
         if chosen != wanted and not (chosen == STAYS and wanted == present):
             happens = f"{present} stays" if chosen == STAYS and present else chosen
-            yield f"{function}{words}: {happens}, not {wanted}", function
+            yield f"{function}: {happens}, not {wanted}", function
 
 
 def _because(knowledge: KnowledgeBase, test: RuleTest, situation: Situation, about: Fact | str | None) -> Iterator[str]:

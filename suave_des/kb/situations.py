@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from rdflib import BNode
 
@@ -91,6 +91,22 @@ def difference(one: Outcome, other: Outcome) -> str:
     for missing in sorted(map(str, one.inferred - other.inferred)):
         return f"{missing} does not follow"
     return next((f"{more} follows" for more in sorted(map(str, other.inferred - one.inferred))), "")
+
+
+class Difference(NamedTuple):
+    """A situation in which two knowledge bases conclude or decide differently."""
+
+    situation: Situation
+    one: Outcome
+    other: Outcome
+
+
+def compare(one: Decide, other: Decide, situations: Iterable[Situation]) -> Iterator[Difference]:
+    """Find the situations in which two knowledge bases conclude or decide differently, in their order."""
+    for situation in situations:
+        before, after = one(situation), other(situation)
+        if before is not after and difference(before, after):
+            yield Difference(situation, before, after)
 
 
 class Probes:

@@ -98,20 +98,6 @@ def test_a_decision_may_be_a_design_or_that_the_present_one_stays(suite, run):
     assert [run(test).passed for test in tests] == [True, True, False]
 
 
-def test_what_a_rule_changes_is_tested_with_and_without_it(suite, run):
-    tests = suite("""
-        - name: right
-          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
-          without: QAWaterVisibility
-          changes: {f_generate_search_path: stays -> fd_spiral_low}
-        - name: wrong
-          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
-          without: compError
-          changes: {f_generate_search_path: stays -> fd_spiral_low}
-        """)
-    assert [run(test).passed for test in tests] == [True, False]
-
-
 def test_facts_may_introduce_individuals_and_contradict_the_state(suite, run):
     tests = suite("""
         - name: a binding
@@ -181,7 +167,6 @@ def test_a_test_whose_state_cannot_be_decided_fails_and_the_others_run(edited, c
     [
         ("- name: x\n  folows: []", "line 3, tests[0].folows: unknown key 'folows' (did you mean 'follows'?"),
         ("- name: x", "line 2, tests[0]: this test expects nothing"),
-        ("- name: x\n  without: S1a\n  decides: {f_generate_search_path: stays}", "must be given together"),
         ("- name: x\n  contradiction: maybe", "line 3, tests[0].contradiction: "),
     ],
 )
@@ -206,7 +191,6 @@ def test_a_file_that_is_not_as_it_must_be_is_refused_with_line_key_and_remedy(su
         ('follows_not: ["fd_realisability(fd_spiral_low, False)"]', "whose range is boolean"),
         ("decides: {f_generate_search_path: fd_spiral_hihg}", "did you mean 'fd_spiral_high'?"),
         ("decides: {f_search: stays}", "there is no function 'f_search'"),
-        ("without: nothing\n  changes: {f_generate_search_path: stays -> stays}", "no enabled rule 'nothing'"),
         ('given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true', "'1 << 2' is not a region"),
         (
             'given: {measurements: {water_visibility: "2 <= . < 1"}}\n  contradiction: true',

@@ -27,7 +27,6 @@ from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
 from suave_des.kb.situations import Situation, difference
 from suave_des.kb.space import PolicySpace, States, interchangeable_components
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import QA_OPERATOR
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, individual
 
@@ -83,27 +82,6 @@ def test_a_mutant_may_depend_on_an_attribute_on_which_the_rule_does_not(tmp_path
     assert found.result == SURVIVED and found.state is not None
     measured = dict(found.state.measurements)
     assert measured["water_current"] < Decimal("0.1") <= measured.get("water_visibility", Decimal(1))
-
-
-def test_a_mutant_that_only_the_planner_notices_is_killed_by_a_test_of_the_decision(
-    tmp_path: Path, small: KnowledgeBase
-) -> None:
-    tests = read_tests(
-        tmp_path,
-        small,
-        f"tests:\n- name: medium\n  given: {{objectives: {{{SEARCH}: UNGROUNDED}},"
-        f" measurements: {{water_visibility: 2.5}}}}\n  decides: {{{SEARCH}: fd_spiral_medium}}\n",
-    )
-    assert run_test(small, tests[0]).passed
-    (turned,) = (
-        each
-        for each in mutants_of(small.base)
-        if each.name == "water_visibility" and isinstance(each.old, tuple) and each.old[1] == QA_OPERATOR
-    )
-    (found,), _ = mutate(small, tests, [turned], max_failed=0)
-    assert (found.result, found.reason) == (KILLED, "medium")
-    for others in ([], read_tests(tmp_path, small, NOTHING_WRONG)):
-        assert mutate(small, others, [turned], max_failed=0)[0][0].result == SURVIVED
 
 
 def test_where_an_axiom_leaves_a_choice_rules_matter_that_never_fire(tmp_path: Path, edited) -> None:
@@ -216,15 +194,6 @@ def test_stays_is_not_any_design_and_a_fact_that_follows_is_not_absent(
     }
 
 
-def test_a_change_that_alone_makes_a_rule_fire_is_looked_for_in_every_state(tmp_path: Path) -> None:
-    """The body is one atom, which the changed fact says: no other atom is left to ask about."""
-    rule = "own: requiredBy(c_thruster_1, fd_all_thrusters) -> fd_realisability(fd_spiral_high, false)"
-    knowledge = KnowledgeBase.load(rules=file(tmp_path, rule), values=FEWER_NUMBERS)
-    (moved,) = (each for each in mutants_of(knowledge.base) if each.name == "c_thruster_1")
-    (found,), _ = mutate(knowledge, [], [moved], max_failed=0)
-    assert found.result == SURVIVED
-
-
 def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path: Path) -> None:
     rules = file(tmp_path, 'clash: fg_status(?g, "IN_ERROR_NFR") -> fg_status(?g, "IN_ERROR_FR")')
     knowledge = KnowledgeBase.load(rules=rules, values=FEWER_NUMBERS)
@@ -257,13 +226,12 @@ def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_p
 
 def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge: KnowledgeBase) -> None:
     found = mutants_of(knowledge.base)
-    assert {mutant.operator for mutant in found} == set(OPERATORS)
-    assert len(OPERATORS) >= 8
+    assert {mutant.operator for mutant in found} == set(OPERATORS) - {"threshold moved"}  # they have no numbers
     assert len(sample(found, 10)) == 10
     assert [str(each) for each in mutants_of(Ontology.load())] == [str(each) for each in found]
 
 
-@pytest.mark.parametrize("operator", list(OPERATORS))
+@pytest.mark.parametrize("operator", [each for each in OPERATORS if each != "threshold moved"])
 def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge: KnowledgeBase, operator: str) -> None:
     mutant = next(each for each in mutants_of(knowledge.base) if each.operator == operator)
     state = knowledge.state(
@@ -280,10 +248,8 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
         "lessThan(?measured, ?expected) becomes lessThanOrEqual(?measured, ?expected)": SURVIVED,
         "FunctionGrounding(?fg) is left out": EQUIVALENT,
         "the rule is removed": KILLED,
-        "hasValue 3.25 becomes 3.575": SURVIVED,
     }
-    names = ("QAWaterVisibility", "qa_water_visibility_high")
-    mutants = [each for each in mutants_of(small.base) if each.name in names and each.text in chosen]
+    mutants = [each for each in mutants_of(small.base) if each.name == "QAWaterVisibility" and each.text in chosen]
     results, _ = mutate(small, read_tests(tmp_path, small, LOW_AND_HIGH), mutants, max_failed=0)
     assert {each.mutant.text: each.result for each in results} == chosen
     for found in (each for each in results if each.state is not None):

@@ -66,7 +66,7 @@ class MutationOptions:
     mutate: Annotated[
         bool,
         typer.Option(
-            "--mutate", help="Mutation testing: seed small faults in rules and data; report those that no test detects."
+            "--mutate", help="Mutation testing: seed small faults in rules; report those that no test detects."
         ),
     ] = False
     mutants: Annotated[
@@ -74,7 +74,7 @@ class MutationOptions:
     ] = None
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only mutants of this rule or individual; repeat it for several."),
+        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeat it for several."),
     ] = None
     max_failed: MaxFailed = 1
 
