@@ -6,7 +6,6 @@ import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -22,10 +21,9 @@ from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.store import read_manifest
 from suave_des.results.assisted import compare_assisted
 from suave_des.results.compare import compare
-from suave_des.results.comparison import capital
+from suave_des.results.comparison import Written, capital
 from suave_des.results.missions import Missions, grouped, read_missions
 from suave_des.results.style import looks
-from suave_des.tables import Table
 
 LIMIT_BYTES: Final = 5_000_000
 PATHS: Final = 12
@@ -116,30 +114,32 @@ def _results(missions: Missions) -> dict[str, Any]:
     return {
         "conclusion": found.conclusion,
         "notes": found.notes,
-        "sections": [_section(capital(title), tables, conclusions) for title, tables, conclusions in found.sections()],
-        "needed": _plain_table(found.runs_needed()) if found.differences else None,
-        "largest": (capital(found.largest.title), _plain_table(found.largest), found.replay),
+        "sections": _sections(found),
         "remarks": found.remarks(),
         "drawn": chart_columns(missions),
     }
 
 
-def _assisted(real: Sequence[Path], same: Path, population: Path) -> Iterator[dict[str, Any]]:
-    """Yield a section for each metric of real missions that simulated ones assist."""
+def _sections(found: Written) -> list[dict[str, Any]]:
+    return [
+        {
+            "title": capital(title),
+            "tables": [(each.title, each.headings, each.rows) for each in tables],
+            "conclusions": list(sentences),
+            "below": below,
+        }
+        for title, tables, sentences, below in found.sections()
+    ]
+
+
+def _assisted(real: Sequence[Path], same: Path, population: Path) -> list[dict[str, Any]]:
+    """Return a section for each metric of real missions that simulated ones assist."""
     found = compare_assisted(real, same, population)
-    for metric, table in zip(found.metrics, found.tables(), strict=True):
-        own = found.estimates[found.estimates["metric"] == metric.name]
-        remarks = found.remarks() if metric == found.metrics[-1] else []  # of all metrics, said once
-        title = f"{table.title}, real missions assisted by simulated ones"
-        yield _section(title, [replace(table, title="")], [*own["conclusion"], *remarks])
-
-
-def _section(title: str, tables: Sequence[Table], conclusions: Sequence[str]) -> dict[str, Any]:
-    return {"title": title, "tables": [(each.title, _plain_table(each)) for each in tables], "conclusions": conclusions}
-
-
-def _plain_table(table: Table) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
-    return table.headings, table.rows
+    sections = _sections(found)
+    for section in sections:
+        section["title"] += ", real missions assisted by simulated ones"
+    sections[-1]["conclusions"] += found.remarks()
+    return sections
 
 
 def chart_columns(missions: Missions) -> dict[str, Any]:

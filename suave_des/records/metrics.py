@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from operator import attrgetter
 
+from suave_des.estimates import Estimate
 from suave_des.files import rounded
 from suave_des.metrics.result import MissionMetrics, MissionResult
 
@@ -86,6 +87,11 @@ class Metric:
         if value is None or value != value:
             return ""
         return f"{self.scale * value:.{self.decimals}f}{'%' if self.name == FOUND else ''}"
+
+    def interval(self, found: Estimate) -> str:
+        """Write an interval for a table; empty if there is none."""
+        text = found.text(f".{self.interval_decimals}f", self.scale)
+        return f"{text}%" if text and self.name == FOUND else text
 
     def amount(self, value: float) -> str:
         """Write a difference's size for a sentence, with its unit."""

@@ -7,7 +7,6 @@ with conditions as clusters. It holds for a wrong simulation, too, whose error i
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,16 +18,15 @@ import numpy as np
 import pandas
 
 from suave_des.errors import InputError, did_you_mean, number_of
-from suave_des.estimates import STUDENT, Estimate, interval_names, t_quantile
+from suave_des.estimates import STUDENT, Estimate, t_quantile
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.resources import find
 from suave_des.results import missions, statistics
-from suave_des.results.comparison import Difference, capital, folded
-from suave_des.results.conclusions import difference_claim
+from suave_des.results.comparison import Row, Section, Written, capital, difference_claim, estimate_in, rows_of
 from suave_des.results.missions import Missions
 from suave_des.results.real import CONDITION, matched
 from suave_des.results.statistics import Sample
-from suave_des.tables import Table, markdown_text
+from suave_des.tables import Table
 
 Source = pandas.DataFrame | str | Path | Sequence[Path]
 """Missions: a data frame with the columns of runs.csv, or folders and files as of compare_folders."""
@@ -81,12 +79,11 @@ def assisted_mean(
 
 
 @dataclass(frozen=True)
-class AssistedComparison:
+class AssistedComparison(Written):
     """What real missions show, alone and assisted by simulated ones; or a plan of real missions.
 
         found = compare_assisted("real.csv", "same", "population")
-        print(found.conclusions[0])
-        found.estimates[["group", "other", "assisted", "narrower"]]
+        found.estimates[["group", "other", "assisted", "narrower", "conclusion"]]
 
     Attributes:
         estimates: a row for each metric and manager, or pair of managers: group, other (whose mean is subtracted, or
@@ -100,6 +97,7 @@ class AssistedComparison:
         notes: what a reader should know about the data.
         metrics: that are compared.
         conditions: means, variances and numbers of real and simulated missions by metric, manager and condition.
+        conclusion: of all; empty, as each estimate has its own.
     """
 
     estimates: pandas.DataFrame
@@ -107,23 +105,33 @@ class AssistedComparison:
     notes: tuple[str, ...]
     metrics: tuple[Metric, ...] = field(repr=False)
     conditions: pandas.DataFrame = field(repr=False, default_factory=pandas.DataFrame)
+    conclusion: str = field(repr=False, default="")
 
-    @property
-    def conclusions(self) -> list[str]:
-        """A sentence for each estimate."""
-        return list(self.estimates.get("conclusion", ()))
+    def frames(self) -> dict[str, pandas.DataFrame]:
+        """Return the estimates and the plan."""
+        return {"estimates": self.estimates, "plan": self.plan}
 
-    def tables(self) -> Iterator[Table]:
+    def sections(self) -> Iterator[Section]:
         """Yield a table for each metric, and one of the plan."""
-        headings = ("mean", "n", "alone", "95% interval", "assisted", "95% interval", "weight", "equals")
+        headings: tuple[str, ...] = (
+            "mean",
+            "n",
+            "alone",
+            "95% interval",
+            "assisted",
+            "95% interval",
+            "weight",
+            "equals",
+        )
         for metric in self.metrics if len(self.estimates) else ():
-            own = self.estimates[self.estimates["metric"] == metric.name]
-            yield Table(headings, [_cells(row, metric) for row in own.to_dict("records")], capital(metric.heading))
+            own = rows_of(self.estimates[self.estimates["metric"] == metric.name])
+            table = Table(headings, [_cells(row, metric) for row in own])
+            yield Section(capital(metric.heading), [table], [row["conclusion"] for row in own])
         if len(self.plan):
-            headings_of_plan = ("manager", "half-width", "runs in each", "conditions", "real runs", "not assisted")
+            of_plan = ("manager", "half-width", "runs in each", "conditions", "real runs", "not assisted")
             by_name = {metric.name: metric for metric in self.metrics}
-            rows = [_plan_cells(row, by_name[row["metric"]]) for row in self.plan.to_dict("records")]
-            yield Table(headings_of_plan, rows, "Real missions needed", "ll")
+            rows = [_plan_cells(row, by_name[row["metric"]]) for row in rows_of(self.plan)]
+            yield Section("Real missions needed", [Table(of_plan, rows, align="ll")])
 
     def remarks(self) -> list[str]:
         """Describe the numbers, and what to know about the data."""
@@ -133,58 +141,21 @@ class AssistedComparison:
         )
         return [*(how if len(self.estimates) else ()), *(f"Note: {note}." for note in self.notes)]
 
-    def text(self, width: int = 95) -> str:
-        """Write tables, conclusions and notes for a terminal of that width."""
-        parts = [f"{table.title}\n{table.text(width)}" for table in self.tables()]
-        parts.append("\n".join(folded(f"- {each}", width) for each in self.conclusions))
-        return "\n\n".join(filter(None, [*parts, "\n".join(folded(line, width) for line in self.remarks())])) + "\n"
 
-    def __str__(self) -> str:
-        """Return all of it as text."""
-        return self.text()
-
-    def markdown(self) -> str:
-        """Write the same for a page."""
-        parts = [f"### {table.title}\n\n{table.markdown()}" for table in self.tables()]
-        parts.append("\n".join(f"- {markdown_text(each)}" for each in self.conclusions))
-        return "\n\n".join(filter(None, [*parts, *map(markdown_text, self.remarks())])) + "\n"
-
-    def latex(self) -> str:
-        """Write the tables for LaTeX with booktabs."""
-        tables = list(self.tables())
-        labels = [f"tab:{metric.name}" for metric in self.metrics if len(self.estimates)] + ["tab:plan"]
-        notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
-        parts = [each.latex(label=label, note=note) for each, label, note in zip(tables, labels, notes, strict=False)]
-        return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
-
-    def csv(self) -> str:
-        """Write the estimates as CSV; without any, the plan."""
-        frame = self.estimates if len(self.estimates) else self.plan
-        return frame.to_csv(index=False, lineterminator="\n")
-
-    def json(self) -> str:
-        """Write all of it; numbers with all their digits, null where there is none."""
-        rows = {name: json.loads(getattr(self, name).to_json(orient="records")) for name in ("estimates", "plan")}
-        return json.dumps({"notes": self.notes, **rows}, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+def _cells(row: Row, metric: Metric) -> tuple[str, ...]:
+    both = [estimate_in(row, name) for name in ("alone", "assisted")]
+    cells = [text for found in both for text in (metric.number(found.value), metric.interval(found))]
+    equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] is not None else ""
+    return _name(row), f"{row['runs']} in {row['conditions']}", *cells, f"{row['weight']:.2f}", equal
 
 
-def _estimate_in(row: Mapping[Any, Any], name: str) -> Estimate:
-    value, low, high = (math.nan if row[each] is None else row[each] for each in (name, *interval_names(name)))
-    return Estimate(value, low, high)
+def _name(row: Row) -> str:
+    return f"{row['group']} - {row['other']}" if row["other"] else str(row["group"])
 
 
-def _cells(row: Mapping[Any, Any], metric: Metric) -> tuple[str, ...]:
-    cells = []
-    for found in (_estimate_in(row, "alone"), _estimate_in(row, "assisted")):
-        cells += [metric.number(found.value), found.text(f".{metric.interval_decimals}f", metric.scale)]
-    name = f"{row['group']} - {row['other']}" if row["other"] else row["group"]
-    equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] == row["equal_runs"] else ""
-    return name, f"{row['runs']} in {row['conditions']}", *cells, f"{row['weight']:.2f}", equal
-
-
-def _plan_cells(row: Mapping[Any, Any], metric: Metric) -> tuple[str, ...]:
+def _plan_cells(row: Row, metric: Metric) -> tuple[str, ...]:
     counts = (row[name] for name in ("runs_each", "conditions", "runs", "runs_alone"))
-    cells = ("not reached" if math.isnan(count) else f"{count:,.0f}" for count in counts)
+    cells = ("not reached" if count is None else f"{count:,.0f}" for count in counts)
     return row["manager"], f"{metric.title} ±{metric.scale * row['half_width']:g}", *cells
 
 
@@ -233,19 +204,19 @@ def compare_assisted(
         each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=horizon_s)})
         for each in (*matched(frames[0], theirs.frame, theirs.swept), _with_draws(many))
     )
-    notes += [*missions.caveats(groups, chosen), *_unlike(theirs, many.frame)]
     rows, parts = [], []
     for metric in chosen:
-        tables = _tables({"real": in_real, "same": in_same, "draw": drawn}, metric.name)
-        of_conditions = {name: table.stack() for name, table in tables.items() if not name.startswith("draw")}
-        parts.append(pandas.DataFrame(of_conditions).dropna(subset=["real", "same"]).assign(metric=metric.name))
-        shared = _shared(in_same, metric.name)
+        sides = [_means(frame, CONDITION, metric.name, name) for frame, name in ((in_real, "real"), (in_same, "same"))]
+        conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
+        draws, shared = _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
+        parts.append(conditions.assign(metric=metric.name))
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
-            rows.append(_estimate(both, metric, tables, shared))
-    conditions, estimates = pandas.concat(parts).reset_index(), pandas.DataFrame(rows)
-    plan = pandas.DataFrame(_plan(drawn, wanted, deviations(conditions), names) if wanted else ())
-    all_notes = (*ours.notes, *theirs.notes, *many.notes, *notes)
-    return AssistedComparison(estimates, plan, all_notes, chosen, conditions)
+            rows.append(_estimate(both, metric, conditions, draws, shared))
+    of_all = pandas.concat(parts).reset_index()
+    plan = pandas.DataFrame(_plan(drawn, wanted, deviations(of_all), names) if wanted else ())
+    notes = [*ours.notes, *theirs.notes, *many.notes, *notes]
+    notes += [*missions.caveats(groups, chosen), *_unlike(theirs, many.frame)]
+    return AssistedComparison(pandas.DataFrame(rows), plan, tuple(notes), chosen, of_all)
 
 
 def _check(frames: Mapping[str, pandas.DataFrame], names: Sequence[str], metrics: Sequence[Metric]) -> float:
@@ -261,9 +232,9 @@ def _check(frames: Mapping[str, pandas.DataFrame], names: Sequence[str], metrics
                 remedy = did_you_mean(name, dict.fromkeys(frame["manager"]), "there are")
                 raise InputError(f"there is no mission of {name}", place=place, remedy=remedy)
         for metric in metrics:
-            values = frame[metric.name].to_numpy(float) if metric.name in frame else np.array([math.nan])
-            may_lack = metric.name not in PAPER_METRICS
-            if np.isinf(values).any() or np.isnan(values).all() or not (may_lack or np.isfinite(values).all()):
+            values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
+            may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
+            if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
                 problem = f"{metric.name} has a value that is no number, or no value at all"
                 raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
         # Real missions may not say how long they lasted, and simulated ones may all have found the pipeline.
@@ -305,13 +276,10 @@ def _unlike(same: Missions, population: pandas.DataFrame) -> Iterator[str]:
 # Estimates
 
 
-def _tables(frames: Mapping[str, pandas.DataFrame], metric: str) -> dict[str, pandas.DataFrame]:
-    """Return mean (side), variance (side_var) and number (side_n) of missions: conditions or draws by managers."""
-    found: dict[str, pandas.DataFrame] = {}
-    for side, frame in frames.items():
-        by = frame.groupby(["draw" if side == "draw" else CONDITION, "manager"], observed=True)[metric]
-        found |= {side: by.mean().unstack(), f"{side}_var": by.var().unstack(), f"{side}_n": by.count().unstack()}
-    return found
+def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.DataFrame:
+    """Return mean (name), variance (name_var) and number (name_n) of missions, by condition or draw and by manager."""
+    found = frame.groupby([by, "manager"], observed=True)[metric].agg(["mean", "var", "count"])
+    return found.set_axis([name, f"{name}_var", f"{name}_n"], axis=1)
 
 
 def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
@@ -324,20 +292,20 @@ def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
 
 
 def _estimate(
-    both: list[str], metric: Metric, tables: Mapping[str, pandas.DataFrame], shared: pandas.DataFrame
+    both: list[str], metric: Metric, conditions: pandas.DataFrame, drawn: pandas.DataFrame, shared: pandas.DataFrame
 ) -> dict[str, Any]:
     """Estimate the mean of one manager, or the difference of two, over the conditions that both have.
 
     Raises:
         InputError: there are too few conditions, simulated missions in one of them, or draws.
     """
-    known = tables["real"].reindex(columns=both).notna() & tables["same"].reindex(columns=both).notna()
-    common = known.index[known.all(axis=1)]
-    own = {name: tables[name].reindex(columns=both).reindex(common) for name in tables if not name.startswith("draw")}
-    draws, of_runs = (each.reindex(columns=both).dropna() for each in (tables["draw"], shared))
+    by_manager: Any = conditions.unstack()
+    own = by_manager.reindex(columns=pandas.MultiIndex.from_product([conditions.columns, both]))
+    own = own[own[["real", "same"]].notna().all(axis=1)]
+    draws, of_runs = (each.reindex(columns=both).dropna() for each in (drawn["draw"].unstack(), shared))
     for number, least, of, remedy in (
-        (len(common), LEAST_CONDITIONS, "condition", "how they differ gives the interval"),
-        (int(own["same_n"].min().min()) if len(common) else 2, 2, "simulated mission", "in each condition, better 20"),
+        (len(own), LEAST_CONDITIONS, "condition", "how they differ gives the interval"),
+        (int(own["same_n"].min().min()) if len(own) else 2, 2, "simulated mission", "in each condition, better 20"),
         (len(draws), LEAST_TO_WEIGH, "draw", "in the population, better some hundred"),
     ):
         if number < least:
@@ -345,41 +313,39 @@ def _estimate(
             remedy = f"at least {least} are needed: {remedy}"
             raise InputError(f"{problem} {number_of(number, of)}", remedy=remedy)
     signs = np.array([1.0, -1.0][: len(both)])
-    real, same, drawn = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
-    sizes = own["real_n"], own["same_n"], float(tables["draw_n"].mean().mean())
+    real, same, many = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
+    sizes = own["real_n"], own["same_n"], float(drawn["draw_n"].unstack().mean().mean())
     chance = [float((own["same_var"] / size).mean().sum()) for size in sizes]
     in_common = float((of_runs.to_numpy() @ signs).var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
     alone = statistics.mean_interval(real)
-    assisted, weight = assisted_mean(real, same, drawn, chance, in_common)
+    assisted, weight = assisted_mean(real, same, many, chance, in_common)
     if metric.name == FOUND:
         alone, assisted = (each.cut(1.0 - len(both), 1.0) for each in (alone, assisted))
     half, runs = (assisted.high - assisted.low) / 2.0, int(own["real_n"][both[0]].sum())
     narrower = (alone.high - alone.low) / 2.0 / half
     needed = statistics.runs_for(float(real.std(ddof=1)), half) if half > 0.0 else None
-    row = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name, "runs": runs, "conditions": len(common)}
+    row = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name, "runs": runs, "conditions": len(own)}
     row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight, "narrower": narrower}
-    row["equal_runs"] = math.nan if needed is None else round(needed * runs / len(common))
+    row["equal_runs"] = None if needed is None else round(needed * runs / len(own))
     row["helps"] = weight >= _NOTICEABLE and narrower >= 1.0 + _NOTICEABLE
     return row | {"conclusion": _conclusion(row, metric)}
 
 
-def _conclusion(row: Mapping[str, Any], metric: Metric) -> str:
+def _conclusion(row: Row, metric: Metric) -> str:
     """Write what an estimate shows, and whether the simulation helped."""
-    found, group, other = _estimate_in(row, "assisted"), row["group"], row["other"]
-    missions_in = f"from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
-    is_shown = bool(other) and found.has_interval and not found.contains(0.0)
-    if is_shown:
-        claim = difference_claim(Difference(group, other, metric.name, True, "", 0, 0, found), metric)
+    found, interval = estimate_in(row, "assisted"), metric.interval
+    if row["other"] and found.has_interval and not found.contains(0.0):
+        claim = difference_claim(row["group"], row["other"], found.value, metric)
         found = found if found.value > 0.0 else -found
     else:
-        is_share = metric.name == FOUND and not other
-        amount = metric.number(found.value) if is_share else metric.amount(found.value)
-        claim = f"{metric.title} of {group}{other and f' - {other}'}: {amount}"
-    claim += f" (95% interval {found.text(f'.{metric.interval_decimals}f', metric.scale) or 'not known'})"
+        is_share = metric.name == FOUND and not row["other"]
+        claim = f"{metric.title} of {_name(row)}: {(metric.number if is_share else metric.amount)(found.value)}"
+    claim += f" (95% interval {interval(found) or 'not known'})"
+    claim += f" from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
     if not row["helps"]:
-        return f"{claim} {missions_in}; the simulation does not help."
-    equal = f", as that of {row['equal_runs']:,} real missions alone" if row["equal_runs"] == row["equal_runs"] else ""
-    return f"{claim} {missions_in}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
+        return f"{claim}; the simulation does not help."
+    equal = f", as that of {row['equal_runs']:,} real missions alone" if row["equal_runs"] is not None else ""
+    return f"{claim}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
 
 
 # Plans
@@ -442,17 +408,14 @@ def _plan(
     drawn: pandas.DataFrame, wanted: Mapping[str, float], seen: pandas.DataFrame, managers: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
     for row in seen[seen["metric"].isin(list(wanted)) & seen["manager"].isin(managers)].to_dict("records"):
-        tables = _tables({"draw": drawn[drawn["manager"] == row["manager"]]}, row["metric"])
-        means, half_width, chance = tables["draw"].iloc[:, 0], wanted[row["metric"]], row["chance_std"] ** 2
-        between = max(0.0, float(means.var()) - chance / float(tables["draw_n"].mean().iloc[0]))
+        draws = _means(drawn[drawn["manager"] == row["manager"]], "draw", row["metric"], "draw")
+        spread, half_width, chance = float(draws["draw"].var()), wanted[row["metric"]], row["chance_std"] ** 2
+        between = max(0.0, spread - chance / float(draws["draw_n"].mean()))
+        fixed = math.sqrt(spread / len(draws))
         for each in _RUNS_EACH:
-            spread, fixed = (
-                math.hypot(row["deviation_std"], math.sqrt(chance / each)),
-                math.sqrt(float(means.var()) / len(means)),
-            )
-            assisted = statistics.runs_for(spread, half_width, fixed, LEAST_CONDITIONS) or math.nan
-            spread = math.sqrt(between + chance / each)
-            alone = statistics.runs_for(spread, half_width, least=LEAST_CONDITIONS) or math.nan
-            counts = {"conditions": assisted, "runs": each * assisted, "runs_alone": each * alone}
+            within = math.hypot(row["deviation_std"], math.sqrt(chance / each))
+            assisted = statistics.runs_for(within, half_width, fixed, LEAST_CONDITIONS) or math.nan
+            apart = math.sqrt(between + chance / each)
+            alone = statistics.runs_for(apart, half_width, least=LEAST_CONDITIONS) or math.nan
             names = {"manager": row["manager"], "metric": row["metric"], "half_width": half_width, "runs_each": each}
-            yield names | counts
+            yield names | {"conditions": assisted, "runs": each * assisted, "runs_alone": each * alone}

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
@@ -18,11 +17,10 @@ import pandas
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.estimates import share_of
+from suave_des.estimates import Estimate, interval_names, known, share_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.results import statistics
-from suave_des.results.comparison import Comparison, Difference, Summary
-from suave_des.results.conclusions import conclusion, overall_conclusion
+from suave_des.results.comparison import Comparison, Row, conclusion, overall_conclusion
 from suave_des.results.missions import (
     SHARING,
     Group,
@@ -32,7 +30,6 @@ from suave_des.results.missions import (
     counted,
     first_and_last,
     grouped,
-    listed,
     missions_of,
     mostly_lost,
     read_half_widths,
@@ -47,8 +44,21 @@ if TYPE_CHECKING:
 
     from suave_des.results.assisted import AssistedComparison, Source
 
-_WORSE = 0.9
-"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
+
+def _ends(name: str) -> tuple[str, ...]:
+    return name, *interval_names(name)
+
+
+_SUMMARY = (
+    *("group", "metric", "n", "missing", *_ends("mean"), "mean_interval", "std", "median", "q1", "q3", "horizon_s"),
+    *(*_ends("restricted_mean_s"), "restricted_mean_s_interval", *_ends("censored_median_s")),
+)
+_DIFFERENCE = (
+    *("group", "other", "metric", "paired", "why", "n", "n_other", *_ends("difference"), "difference_interval"),
+    *("test", "p", "p_holm", "p_less", "p_greater", "effect_name", *_ends("effect"), "variance_ratio", "half_width"),
+    *("runs_needed_paired", "runs_needed_unpaired", "conclusion"),
+)
+"""Columns of the frames, in order."""
 
 
 class Choices(TypedDict, total=False):
@@ -170,21 +180,30 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
     half_widths = read_half_widths(choices.get("half_widths", ()), metrics)
     pairs = _pairs(groups, choices.get("against"))
     unpaired, horizon_s = choices.get("unpaired", False), time_limit_s(groups)
-    summaries = tuple(_summarise(group, metric, horizon_s) for metric in metrics for group in groups)
+    summaries = [_summary(group, metric, horizon_s) for metric in metrics for group in groups]
     found = [
         _difference(*pair, metric, half_widths.get(metric.name), unpaired=unpaired)
         for metric in metrics
         for pair in pairs
     ]
-    adjusted = iter(statistics.holm([each.p for each in found if each.test]))
-    found = [replace(each, p_holm=next(adjusted)) if each.test else each for each in found]
+    tested = [row for row in found if row["test"]]
+    for row, p in zip(tested, statistics.holm([row["p"] for row in tested]), strict=True):
+        row["p_holm"] = p
     by_name = {metric.name: metric for metric in metrics}
-    differences = [replace(each, conclusion=conclusion(each, by_name[each.metric])) for each in found]
-    means = {each.group: each.mean.value for each in summaries if each.metric == metrics[0].name and each.n}
-    sentence = " ".join(_conclusions(groups, metrics[0], differences, means))
-    notes = [*missions.notes, *notes, *caveats(groups, metrics), *_worse_paired(differences)]
-    largest = _largest(() if unpaired else pairs, metrics[0], missions.folders)
-    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups), *largest)
+    for row in found:
+        row["conclusion"] = conclusion(row, by_name[row["metric"]])
+    means = {row["group"]: row["mean"] for row in summaries if row["metric"] == metrics[0].name and row["n"]}
+    differences = pandas.DataFrame(found, columns=_DIFFERENCE)
+    counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
+    return Comparison(
+        " ".join(_conclusions(groups, metrics[0], found, means)),
+        pandas.DataFrame(summaries, columns=_SUMMARY).astype({"horizon_s": "Int64"}),
+        differences.astype(counts),
+        (*missions.notes, *notes, *caveats(groups, metrics)),
+        metrics,
+        counted(groups),
+        *_largest(() if unpaired else pairs, metrics[0], missions.folders),
+    )
 
 
 def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]) -> tuple[Table, str]:
@@ -199,21 +218,19 @@ def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapp
             ends = first_and_last(apart)
             cells = (text for value, run in ends for text in (metric.number(value), str(run)))
             rows.append((f"{first.name} - {second.name}", *cells))
-            parts = [group.frame.iloc[0] for group in (first, second)]
-            managers, sources = (
-                list(dict.fromkeys(str(part[name]) for part in parts)) for name in ("manager", "source")
-            )
+            firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
+            managers, sources = (firsts[name].astype(str).unique() for name in ("manager", "source"))
             if not first.point and 1 in (len(managers), len(sources)) and folders.keys() >= set(sources):
                 size, run = max((abs(value), run) for value, run in ends)
+                places = (str(folders[source]) for source in sources)
                 chosen = "--run", str(run), "--managers", ",".join(managers)
-                places = [str(folders[source]) for source in sources]
                 found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
     title = f"runs that differ most: {metric.heading}"
     return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(found, default=(0.0, ""))[1]
 
 
 def _conclusions(
-    groups: Sequence[Group], metric: Metric, differences: Sequence[Difference], means: Mapping[str, float]
+    groups: Sequence[Group], metric: Metric, differences: Sequence[Row], means: Mapping[str, float]
 ) -> Iterator[str]:
     """Yield the conclusion; of several points of a sweep at which managers are compared, one for each that differs."""
     points = dict.fromkeys(group.point for group in groups)
@@ -229,17 +246,6 @@ def _conclusions(
         at.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
     for text, where in at.items():
         yield f"{'; '.join(where)}: {text}" if where[0] else text
-
-
-def _worse_paired(differences: Sequence[Difference]) -> Iterator[str]:
-    """Yield a note on pairs whose differences vary more than those of independent runs would."""
-    worse = [
-        f"{each.group} - {each.other} in {each.metric}, {1.0 / each.variance_ratio:.1f} times"
-        for each in differences
-        if each.variance_ratio < _WORSE
-    ]
-    if worse:
-        yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:
@@ -263,30 +269,34 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
-def _summarise(group: Group, metric: Metric, horizon_s: float) -> Summary:
+def _with_method(name: str, found: Estimate) -> dict[str, Any]:
+    return found.columns(name) | {f"{name}_interval": found.method if found.has_interval else None}
+
+
+def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
     """Estimate one metric of one group; the restricted mean of search times reaches to horizon_s."""
     sample = group.known_values(metric.name)
-    found = Summary(group.name, metric.name, len(sample), len(group.frame) - len(sample))
+    row = dict.fromkeys(_SUMMARY) | {"group": group.name, "metric": metric.name}
+    row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample):
-        return found
-    if metric.name == FOUND and group.is_of_missions:
-        mean = share_of(int(sample.sum()), len(sample))
-    else:
-        mean = statistics.mean_interval(sample)
-    if metric.name == FOUND:
-        mean = mean.cut(0.0, 1.0)
-    q1, median, q3 = map(float, np.percentile(sample, (25.0, 50.0, 75.0)))
-    std = float(sample.std(ddof=1)) if len(sample) > 1 else math.nan
-    found = replace(found, mean=mean, std=std, median=median, q1=q1, q3=q3)
+        return row
+    is_share = metric.name == FOUND and group.is_of_missions
+    mean = share_of(int(sample.sum()), len(sample)) if is_share else statistics.mean_interval(sample)
+    row |= _with_method("mean", mean.cut(0.0, 1.0) if metric.name == FOUND else mean)
+    row |= zip(("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True)
+    row["std"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
     if metric.name == SEARCH_TIME and group.is_of_missions:
         was_found = group.values(FOUND)[~np.isnan(group.values(metric.name))]
         if not np.isnan(was_found).any():
             restricted, half = statistics.search_times(sample, was_found > 0.0, horizon_s)
-            found = replace(found, horizon_s=horizon_s, restricted_mean_s=restricted, censored_median_s=half)
-    return found
+            row |= {"horizon_s": horizon_s, **half.columns("censored_median_s")}
+            row |= _with_method("restricted_mean_s", restricted)
+    return row
 
 
-def _difference(first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool) -> Difference:
+def _difference(
+    first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool
+) -> dict[str, Any]:
     """Estimate the difference of two groups in one metric, and test it.
 
     Args:
@@ -297,44 +307,37 @@ def _difference(first: Group, second: Group, metric: Metric, half_width: float |
         unpaired: whether runs are taken as independent though they share their random numbers.
     """
     is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
-    found = Difference(first.name, second.name, metric.name, is_paired, why, len(x), len(y))
+    row = dict.fromkeys(_DIFFERENCE) | {"group": first.name, "other": second.name, "metric": metric.name}
+    row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y)}
     if not len(x) or not len(y):
-        return found
+        return row
     is_share = metric.name == FOUND and first.is_of_missions and second.is_of_missions
     if is_paired and is_share:
         difference = statistics.paired_share_difference(x > 0.0, y > 0.0)
         test = statistics.paired_shares_test(x > 0.0, y > 0.0)
     elif is_paired:
-        difference = statistics.mean_interval(x - y)
-        test = statistics.signed_rank_test(x, y)
+        difference, test = statistics.mean_interval(x - y), statistics.signed_rank_test(x, y)
     elif is_share:
         counts = (int(x.sum()), len(x)), (int(y.sum()), len(y))
         difference, test = statistics.share_difference(*counts), statistics.shares_test(*counts)
     else:
-        difference = statistics.difference_interval(x, y)
-        test = statistics.rank_sum_test(x, y)
-    if metric.name == FOUND:
-        difference = difference.cut(-1.0, 1.0)
-    found = replace(found, difference=difference, test=test.name, p=test.p, p_less=test.p_less)
-    found = replace(found, p_greater=test.p_greater, effect_name=test.effect.method, effect=test.effect)
-    usual = metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
-    return _with_runs_needed(found, x, y, half_width or usual)
+        difference, test = statistics.difference_interval(x, y), statistics.rank_sum_test(x, y)
+    row |= _with_method("difference", difference.cut(-1.0, 1.0) if metric.name == FOUND else difference)
+    row |= {"test": test.name, "p": test.p, "p_less": known(test.p_less), "p_greater": known(test.p_greater)}
+    row |= {"effect_name": test.effect.method, **test.effect.columns("effect")}
+    half_width = half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
+    return row | _runs_needed(x, y, half_width, is_paired=is_paired)
 
 
-def _with_runs_needed(found: Difference, x: Sample, y: Sample, half_width: float) -> Difference:
-    """Add the gain from pairing, and the number of runs that an interval needs."""
-    if min(len(x), len(y)) < 2 or half_width <= 0.0:
-        return found
-    apart = float(x.var(ddof=1) + y.var(ddof=1))
-    if apart == 0.0:  # equal values say nothing about the spread of others
-        return found
-    unpaired = statistics.runs_for(math.sqrt(apart), half_width)
-    found = replace(found, half_width=half_width, runs_needed_unpaired=unpaired)
-    together = float((x - y).var(ddof=1)) if found.paired else 0.0
-    if together > 0.0:
-        paired = statistics.runs_for(math.sqrt(together), half_width)
-        found = replace(found, runs_needed_paired=paired, variance_ratio=apart / together)
-    return found
+def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) -> dict[str, Any]:
+    """Return the number of runs that an interval needs, and the gain from pairing; equal values do not tell them."""
+    if min(len(x), len(y)) < 2 or half_width <= 0.0 or not (apart := float(x.var(ddof=1) + y.var(ddof=1))):
+        return {}
+    row = {"half_width": half_width, "runs_needed_unpaired": statistics.runs_for(math.sqrt(apart), half_width)}
+    if together := float((x - y).var(ddof=1)) if is_paired else 0.0:
+        row["runs_needed_paired"] = statistics.runs_for(math.sqrt(together), half_width)
+        row["variance_ratio"] = apart / together
+    return row
 
 
 def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tuple[bool, str, Sample, Sample]:

@@ -1,232 +1,91 @@
-"""A comparison, and how it is written: as text, Markdown, LaTeX in the paper's layout, CSV and JSON."""
+"""A comparison in words and tables: what is concluded, and how it is written, in LaTeX in the paper's layout."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas
 
 from suave_des.errors import number_of
-from suave_des.estimates import Estimate, known
+from suave_des.estimates import Estimate, interval_names
 from suave_des.records.metrics import FOUND, PAPER_METRICS, Metric
 from suave_des.results.missions import listed
-from suave_des.results.statistics import A12, RANK_BISERIAL, SIGNIFICANCE
+from suave_des.results.statistics import A12, FISHER, MANN_WHITNEY, MCNEMAR, RANK_BISERIAL, SIGNIFICANCE, WILCOXON
 from suave_des.tables import Table, markdown_text
 
-_NAN, _UNKNOWN, _NO_TABLE = math.nan, Estimate(), Table((), ())
+Row = Mapping[str, Any]
+"""A row of a frame by column, None where there is nothing."""
+_NO_TABLE = Table((), ())
 _EFFECT = "effect"
 """Heading of the widest column, the last one, which goes where the table would be too wide."""
 _EFFECTS = {
     RANK_BISERIAL: "Effect: rank-biserial correlation, 1 if the first has the greater value in all pairs.",
     A12: "Effect: A12, the probability that a mission of the first has the greater value.",
 }
+_SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
+_MOST_SENTENCES = 3
+"""Of a metric of which neither more nor less is better, in the conclusion from all differences."""
+ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
+"""Methods that write a comparison, by the ending of a file's name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """Estimates of one metric of one group of missions; nan where there are too few.
-
-    Attributes:
-        group: name of the manager, with its source or its value of a sweep where that is needed.
-        metric: column of runs.csv.
-        n: independent values: missions, or runs where several points of a sweep are averaged.
-        missing: missions without a value, such as those without a reaction.
-        mean: of `pipeline_found` the share.
-        std: sample standard deviation (n - 1).
-        median: the middle value.
-        q1: first quartile; likewise q3.
-        horizon_s: of the search time: the time to which the restricted mean reaches.
-        restricted_mean_s: mean of the time until found or horizon_s, missions without it being censored.
-        censored_median_s: time by which half of the missions have found the pipeline; infinite if less than half do.
-    """
-
-    group: str
-    metric: str
-    n: int
-    missing: int
-    mean: Estimate = _UNKNOWN
-    std: float = _NAN
-    median: float = _NAN
-    q1: float = _NAN
-    q3: float = _NAN
-    horizon_s: float = _NAN
-    restricted_mean_s: Estimate = _UNKNOWN
-    censored_median_s: Estimate = _UNKNOWN
-
-    def row(self) -> dict[str, Any]:
-        """Return all of it by the columns of a file."""
-        return _row(self, methods=("mean", "restricted_mean_s"))
+def rows_of(frame: pandas.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a frame as plain data."""
+    found: list[dict[str, Any]] = frame.astype(object).where(frame.notna(), None).to_dict("records")  # type: ignore[assignment]
+    return found
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """Two groups of missions compared in one metric; nan or None for what there is not.
-
-    Attributes:
-        group: name of the one; likewise other.
-        metric: column of runs.csv.
-        paired: whether they are compared run by run.
-        why: they are, or are not.
-        n: values of the one, or pairs; likewise n_other.
-        difference: of the means, group - other.
-        test: its name; empty without a value in one of them.
-        p: two-sided.
-        p_holm: adjusted for all tests of this comparison.
-        p_less: one-sided: that the one is not less than the other; likewise p_greater.
-        effect_name: what the size of the effect is.
-        effect: its size.
-        variance_ratio: by how much pairing divides the variance of the difference.
-        half_width: of the interval for which the number of runs is given.
-        runs_needed_paired: runs of each manager for that, if they are paired; likewise runs_needed_unpaired. None: over
-            ten million, or not known.
-        conclusion: in one sentence.
-    """
-
-    group: str
-    other: str
-    metric: str
-    paired: bool
-    why: str
-    n: int
-    n_other: int
-    difference: Estimate = _UNKNOWN
-    test: str = ""
-    p: float = _NAN
-    p_holm: float = _NAN
-    p_less: float = _NAN
-    p_greater: float = _NAN
-    effect_name: str = ""
-    effect: Estimate = _UNKNOWN
-    variance_ratio: float = _NAN
-    half_width: float = _NAN
-    runs_needed_paired: int | None = None
-    runs_needed_unpaired: int | None = None
-    conclusion: str = ""
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether the test rejects at 5%, together with all others."""
-        return self.p_holm < SIGNIFICANCE
-
-    @property
-    def is_equal(self) -> bool:
-        """Whether the two have the same value in each pair."""
-        return self.paired and self.n > 1 and self.difference.value == 0.0 and not self.difference.has_interval
-
-    def row(self) -> dict[str, Any]:
-        """Return all of it by the columns of a file."""
-        return _row(self, methods=("difference",)) | ({} if self.test else {"test": None, "effect_name": None})
+def estimate_in(row: Row, name: str) -> Estimate:
+    """Return an estimate from the three columns that have it, as of Estimate.columns."""
+    value, low, high = (math.nan if row[each] is None else row[each] for each in (name, *interval_names(name)))
+    return Estimate(value, low, high)
 
 
-def _row(found: Summary | Difference, methods: tuple[str, ...]) -> dict[str, Any]:
-    """Return the fields by column: of an estimate its value, interval and, if that is wanted, how this was found."""
-    row: dict[str, Any] = {}
-    for each in fields(found):
-        value = getattr(found, each.name)
-        if isinstance(value, Estimate):
-            row |= value.columns(each.name)
-            if each.name in methods:
-                row[f"{each.name}_interval"] = value.method if value.has_interval else None
-        else:
-            row[each.name] = known(value) if isinstance(value, float) else value
-    return row
+class Section(NamedTuple):
+    """A part of what is written: tables under a title, what is said below them, and what follows from them."""
+
+    title: str
+    tables: Sequence[Table]
+    sentences: Sequence[str] = ()
+    below: str = ""
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """The result of a comparison.
-
-        comparison = compare_folders([Path("before"), Path("after")])
-        print(comparison.conclusion)
-        comparison.difference_frame()
-
-    Attributes:
-        conclusion: in one sentence.
-        summaries: by metric, then group.
-        differences: by metric, then pair.
-        notes: what a reader should know about the data.
-        metrics: the compared metrics.
-        counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
-        largest: of each pair the least and the greatest difference in the first metric, each with its run.
-        replay: the command that replays both missions of the largest of these; empty: not known.
-    """
+class Written(ABC):
+    """Results that are written as text, Markdown, LaTeX, CSV and JSON."""
 
     conclusion: str
-    summaries: tuple[Summary, ...]
-    differences: tuple[Difference, ...]
     notes: tuple[str, ...]
-    metrics: tuple[Metric, ...] = field(repr=False)
-    counted: str = field(default="mission", repr=False)
-    largest: Table = field(default=_NO_TABLE, repr=False)
-    replay: str = field(default="", repr=False)
 
-    def summary_frame(self) -> pandas.DataFrame:
-        """Return a row for each group and metric, with the columns of Summary.row()."""
-        return pandas.DataFrame([each.row() for each in self.summaries])
+    @abstractmethod
+    def sections(self) -> Iterator[Section]:
+        """Yield the tables of each metric, and others."""
 
-    def difference_frame(self) -> pandas.DataFrame:
-        """Return a row for each pair and metric, with the columns of Difference.row()."""
-        return pandas.DataFrame([each.row() for each in self.differences])
-
-    def sections(self) -> Iterator[tuple[str, list[Table], list[str]]]:
-        """Yield of each metric its title with unit, its tables, and what follows from each difference."""
-        for metric in self.metrics:
-            summaries = [each for each in self.summaries if each.metric == metric.name]
-            differences = [each for each in self.differences if each.metric == metric.name]
-            tables = _summary_table(metric, summaries), _search_table(summaries), _difference_table(metric, differences)
-            yield metric.heading, [each for each in tables if each.rows], [each.conclusion for each in differences]
-
-    def runs_needed(self) -> Table:
-        """Return the number of runs that an interval needs, for each pair and metric."""
-        metrics = {metric.name: metric for metric in self.metrics}
-        rows = [_runs_row(each, metrics[each.metric]) for each in self.differences if not math.isnan(each.half_width)]
-        return Table(("difference", "for ±", "paired", "not paired", "variance ratio"), rows)
-
+    @abstractmethod
     def remarks(self) -> list[str]:
-        """Describe how missions were compared and why, and what to know about the data."""
-        return [*self.methods(), *(f"Note: {note}." for note in self.notes)]
+        """Describe how the results were found, and what to know about the data."""
 
-    def methods(self) -> list[str]:
-        """Describe which differences are paired and why, and how they are tested and estimated."""
-        tested = [each for each in self.differences if each.test]
-        whys: dict[str, dict[str, None]] = {}
-        for each in tested:
-            whys.setdefault(each.why, {})[f"{each.group} - {each.other}"] = None
-        lines = [
-            f"{capital(why)}{'' if len(whys) == 1 else f' ({listed(list(pairs), 4)})'}." for why, pairs in whys.items()
-        ]
-        if tested:
-            over_all = f", Holm's correction over all {len(tested)}" if len(tested) > 1 else ""
-            lines.append(f"Tests: {', '.join(dict.fromkeys(each.test for each in tested))}; two-sided{over_all}.")
-        lines += [_EFFECTS[name] for name in dict.fromkeys(each.effect_name for each in tested) if name]
-        means = (*(each.mean for each in self.summaries), *(each.difference for each in tested))
-        if methods := dict.fromkeys(each.method for each in means if each.has_interval):
-            lines.append(f"95% intervals: {', '.join(methods)}.")
-        return lines
+    @abstractmethod
+    def frames(self) -> dict[str, pandas.DataFrame]:
+        """Return the statistics by what JSON calls them."""
 
     def text(self, width: int = 95) -> str:
-        """Write the conclusions, the tables, and the methods, for a terminal of that width."""
+        """Write the conclusions, the tables, and the remarks, for a terminal of that width."""
         parts = [folded(self.conclusion, width)]
-        for title, tables, conclusions in self.sections():
+        for title, tables, sentences, below in self.sections():
             for place, table in enumerate(tables):
                 heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
                 fits = table.headings[-1] != _EFFECT or table.width() <= width
                 shown = table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
-                parts.append(heading + shown.text(width))
-            if conclusions:
-                parts.append("\n".join(folded(f"- {each}", width) for each in conclusions))
-        if (needed := self.runs_needed()).rows:
-            parts.append(f"runs of each manager that an interval of the difference needs\n{needed.text(width)}")
-        if self.largest.rows:
-            replay = f"\nTo see both missions: {self.replay}" if self.replay else ""
-            parts.append(f"{self.largest.title}\n{self.largest.text(width)}{replay}")
+                parts.append(heading + shown.text(width) + (f"\n{below}" if below else ""))
+            parts.append("\n".join(folded(f"- {each}", width) for each in sentences))
         parts.append("\n".join(folded(line, width) for line in self.remarks()))
-        return "\n\n".join(parts) + "\n"
+        return "\n\n".join(filter(None, parts)) + "\n"
 
     def __str__(self) -> str:
         """Return all of it as text, as `suave-des compare` prints it."""
@@ -235,79 +94,155 @@ class Comparison:
     def markdown(self) -> str:
         """Write the tables and the conclusions, for a page."""
         parts = [markdown_text(self.conclusion)]
-        for title, tables, conclusions in self.sections():
-            parts.append(f"### {capital(title)}")
+        for title, tables, sentences, below in self.sections():
+            parts.append(f"### {capital(title)}" if title else "")
             for table in tables:
-                parts += [f"{capital(table.title)}:"] if table.title else []
-                parts.append(table.markdown())
-            if conclusions:
-                parts.append("\n".join(f"- {markdown_text(each)}" for each in conclusions))
-        if self.differences:
-            parts += ["### Runs needed", self.runs_needed().markdown()]
-        if self.largest.rows:
-            parts += [f"### {capital(self.largest.title)}", self.largest.markdown()]
-            parts += [f"To see both missions: `{self.replay}`"] if self.replay else []
-        return "\n\n".join([*parts, *map(markdown_text, self.remarks())]) + "\n"
+                parts += [f"{capital(table.title)}:" if table.title else "", table.markdown(), markdown_text(below)]
+            parts.append("\n".join(f"- {markdown_text(each)}" for each in sentences))
+        return "\n\n".join(filter(None, [*parts, *map(markdown_text, self.remarks())])) + "\n"
 
     def _repr_markdown_(self) -> str:
         return self.markdown()
+
+    def latex(self) -> str:
+        """Write the tables for LaTeX with booktabs."""
+        tables = [Table(each.headings, each.rows, title) for title, own, *_ in self.sections() for each in own]
+        notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
+        parts = [table.latex(note=note) for table, note in zip(tables, notes, strict=True)]
+        return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
+
+    def csv(self) -> str:
+        """Write all statistics as one table."""
+        frames = [each.astype(object) for each in self.frames().values() if len(each)]
+        frame = pandas.concat(frames or [pandas.DataFrame()])
+        if "other" in frame:
+            frame.insert(1, "other", frame.pop("other"))
+        return frame.to_csv(index=False, lineterminator="\n")
+
+    def json(self) -> str:
+        """Write all of it; numbers with all their digits, null where there is none."""
+        return json.dumps(self._content(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def _content(self) -> dict[str, Any]:
+        about = {"conclusion": self.conclusion, "notes": self.notes}
+        return about | {name: rows_of(frame) for name, frame in self.frames().items()}
+
+
+@dataclass(frozen=True)
+class Comparison(Written):
+    """The result of a comparison.
+
+        comparison = compare_folders([Path("before"), Path("after")])
+        print(comparison.conclusion)
+        comparison.differences[["group", "other", "difference", "p_holm"]]
+
+    In the frames, columns that end in `_ci95_low` and `_ci95_high` are the ends of the 95% interval of the one before,
+    whose method is in the column that ends in `_interval`; nan where there are too few values.
+
+    Attributes:
+        conclusion: in one sentence.
+        summaries: a row for each metric and group: group (name of the manager, with its source or its value of a sweep
+            where that is needed), metric, n (independent values: missions, or runs where several points of a sweep are
+            averaged), missing (missions without a value), mean (of `pipeline_found` the share), std, median, q1 and q3;
+            of the search time horizon_s (the time to which the restricted mean reaches), restricted_mean_s (of the time
+            until found or horizon_s, missions without it being censored) and censored_median_s (time by which half of
+            the missions have found the pipeline; nan if less than half do).
+        differences: a row for each metric and pair: group, other, metric, paired (whether they are compared run by
+            run), why, n (values of the one, or pairs), n_other, difference (of the means, group - other), test, p
+            (two-sided), p_holm (adjusted for all tests of this comparison), p_less (one-sided: that the one is not less
+            than the other), p_greater, effect_name, effect, variance_ratio (by how much pairing divides the variance of
+            the difference), half_width (of the interval for which the number of runs is given), runs_needed_paired
+            (runs of each manager for that, if they are paired), runs_needed_unpaired (none: over ten million, or not
+            known), and conclusion.
+        notes: what a reader should know about the data.
+        metrics: the compared metrics.
+        counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
+        largest: of each pair the least and the greatest difference in the first metric, each with its run.
+        replay: the command that replays both missions of the largest of these; empty: not known.
+    """
+
+    conclusion: str
+    summaries: pandas.DataFrame
+    differences: pandas.DataFrame
+    notes: tuple[str, ...]
+    metrics: tuple[Metric, ...] = field(repr=False)
+    counted: str = field(default="mission", repr=False)
+    largest: Table = field(default=_NO_TABLE, repr=False)
+    replay: str = field(default="", repr=False)
+
+    def frames(self) -> dict[str, pandas.DataFrame]:
+        """Return both frames."""
+        return {"summaries": self.summaries, "differences": self.differences}
+
+    def sections(self) -> Iterator[Section]:
+        """Yield the tables of each metric, the numbers of runs that intervals need, and the runs that differ most."""
+        needed = []
+        for metric in self.metrics:
+            own = [rows_of(frame[frame["metric"] == metric.name]) for frame in self.frames().values()]
+            tables = _summary_table(metric, own[0]), _search_table(own[0]), _difference_table(metric, own[1])
+            sentences = [each["conclusion"] for each in own[1]]
+            needed += [_runs_row(each, metric) for each in own[1] if each["half_width"] is not None]
+            yield Section(metric.heading, [each for each in tables if each.rows], sentences)
+        if needed:
+            headings = ("difference", "for ±", "paired", "not paired", "variance ratio")
+            yield Section("runs of each manager that an interval of the difference needs", [Table(headings, needed)])
+        if self.largest.rows:
+            below = f"To see both missions: {self.replay}" if self.replay else ""
+            yield Section(self.largest.title, [Table(self.largest.headings, self.largest.rows)], below=below)
+
+    def remarks(self) -> list[str]:
+        """Describe how missions were compared and why, and what to know about the data."""
+        return [*self._methods(), *(f"Note: {note}." for note in self.notes)]
+
+    def _methods(self) -> Iterator[str]:
+        """Describe which differences are paired and why, and how they are tested and estimated."""
+        tested = self.differences[self.differences["test"].notna()]
+        whys = tested.groupby("why", sort=False)
+        for why, own in whys:
+            pairs = list(dict.fromkeys(own["group"] + " - " + own["other"]))
+            yield f"{capital(str(why))}{'' if len(whys) == 1 else f' ({listed(pairs, 4)})'}."
+        if len(tested):
+            over_all = f", Holm's correction over all {len(tested)}" if len(tested) > 1 else ""
+            yield f"Tests: {', '.join(tested['test'].unique())}; two-sided{over_all}."
+        yield from (_EFFECTS[name] for name in tested["effect_name"].unique() if name)
+        methods = pandas.concat([self.summaries["mean_interval"], tested["difference_interval"]]).dropna().unique()
+        if len(methods):
+            yield f"95% intervals: {', '.join(methods)}."
 
     def latex(self) -> str:
         """Write two tables for LaTeX with booktabs: means and standard deviations as in the paper, and differences."""
         metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or list(self.metrics)
         by_group: dict[str, list[str]] = {}
         for metric in metrics:
-            for each in self.summaries:
-                if each.metric == metric.name:
-                    cells = metric.number(each.mean.value), metric.number(each.std)
-                    by_group.setdefault(each.group, [each.group]).extend(cells)
+            for each in rows_of(self.summaries[self.summaries["metric"] == metric.name]):
+                cells = metric.number(each["mean"]), metric.number(each["std"])
+                by_group.setdefault(each["group"], [each["group"]]).extend(cells)
         shown = [row for row in by_group.values() if any(row[1:])]
         means = Table(("Manager", *("Mean", "Std") * len(metrics)), shown, "Means and standard deviations.")
         lines = [r"% needs \usepackage{booktabs}", *(f"% Note: {note}." for note in self.notes)]
-        lines.append(
-            means.latex([capital(metric.heading) for metric in metrics], label="tab:means", note=self._sizes())
-        )
-        if self.differences:
+        over = [capital(metric.heading) for metric in metrics]
+        lines.append(means.latex(over, label="tab:means", note=self._sizes()))
+        if len(self.differences):
             rows: list[tuple[str, ...]] = []
             for metric in self.metrics:
-                tested = [each for each in self.differences if each.metric == metric.name and each.test]
-                rows += [(capital(metric.heading),)] if tested else []
-                cells_of = (_difference_row(each, metric) for each in tested)
+                own = self.differences[(self.differences["metric"] == metric.name) & self.differences["test"].notna()]
+                rows += [(capital(metric.heading),)] if len(own) else []
+                cells_of = (_difference_row(each, metric) for each in rows_of(own))
                 rows += [(name, mean, interval, effect, p) for name, _, mean, interval, _, p, effect in cells_of]
             headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
             table = Table(headings, rows, "Differences between managers.")
-            text = table.latex(label="tab:differences", note=" ".join(self.methods()))
+            text = table.latex(label="tab:differences", note=" ".join(self._methods()))
             lines.append(text.replace("p (Holm)", "$p$ (Holm)"))
         return "\n".join(lines) + "\n"
 
     def _sizes(self) -> str:
-        sizes = {each.group: each.n for each in self.summaries if each.metric == self.metrics[0].name}
-        if len(set(sizes.values())) == 1:
-            return f"{number_of(next(iter(sizes.values())), self.counted)} for each manager."
+        sizes = self.summaries.drop_duplicates("group").set_index("group")["n"]
+        if sizes.nunique() == 1:
+            return f"{number_of(int(sizes.iloc[0]), self.counted)} for each manager."
         return "; ".join(f"{name}: {number_of(n, self.counted)}" for name, n in sizes.items()) + "."
 
-    def csv(self) -> str:
-        """Write all statistics as one table: a row for each group and metric, then one for each pair and metric."""
-        rows = [*(each.row() for each in self.summaries), *(each.row() for each in self.differences)]
-        frame = pandas.DataFrame(rows, dtype=object)
-        if "other" in frame:
-            frame.insert(1, "other", frame.pop("other"))
-        return frame.to_csv(index=False, lineterminator="\n")
-
-    def json(self) -> str:
-        """Write all of the comparison; numbers with all their digits, null where there is none."""
-        content = {
-            "conclusion": self.conclusion,
-            "notes": list(self.notes),
-            "summaries": [each.row() for each in self.summaries],
-            "differences": [each.row() for each in self.differences],
-            "largest_differences": {"rows": self.largest.rows, "replay": self.replay},
-        }
-        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
-"""Methods that write a comparison, by the ending of a file's name."""
+    def _content(self) -> dict[str, Any]:
+        return {**super()._content(), "largest_differences": {"rows": self.largest.rows, "replay": self.replay}}
 
 
 def folded(text: str, width: int) -> str:
@@ -315,80 +250,218 @@ def folded(text: str, width: int) -> str:
     return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
 
 
-def _summary_table(metric: Metric, summaries: Sequence[Summary]) -> Table:
+def capital(text: str) -> str:
+    """Begin a text with a capital, and leave the rest as it is."""
+    return text[:1].upper() + text[1:]
+
+
+# Tables
+
+
+def _summary_table(metric: Metric, summaries: Sequence[Row]) -> Table:
     """Return the estimates of each group; a share has neither spread nor quartiles."""
     headings = ("manager", "n", "mean", "95% interval", "std", "median", "quartiles")
     width = 4 if metric.name == FOUND else len(headings)
     rows = []
     for each in summaries:
-        quartiles = _interval(Estimate(each.median, each.q1, each.q3), metric)
-        spread = (metric.number(each.std), metric.number(each.median), quartiles)
-        row = (each.group, f"{each.n:,}", metric.number(each.mean.value), _interval(each.mean, metric), *spread)
-        rows.append(row[:width])
+        quartiles = "" if each["q1"] is None else metric.interval(Estimate(each["median"], each["q1"], each["q3"]))
+        mean = metric.number(each["mean"]), metric.interval(estimate_in(each, "mean"))
+        spread = metric.number(each["std"]), metric.number(each["median"]), quartiles
+        rows.append((each["group"], f"{each['n']:,}", *mean, *spread)[:width])
     return Table(headings[:width], rows)
 
 
-def _search_table(summaries: Sequence[Summary]) -> Table:
+def _search_table(summaries: Sequence[Row]) -> Table:
     """Return search times in which missions that never found the pipeline are censored; no rows for other metrics."""
-    known = [each for each in summaries if not math.isnan(each.horizon_s)]
-    horizon_s = min((each.horizon_s for each in known), default=0.0)
+    known = [each for each in summaries if each["horizon_s"] is not None]
+    horizon_s = min((each["horizon_s"] for each in known), default=0.0)
     headings = ("manager", f"mean to {horizon_s:.0f} s", "95% interval", "half found by", "95% interval")
     rows = []
     for each in known:
-        if abs(each.restricted_mean_s.value - each.mean.value) < 0.005 and math.isfinite(each.censored_median_s.value):
+        mean = estimate_in(each, "restricted_mean_s")
+        half_s, low_s, high_s = (each[name] for name in ("censored_median_s", *interval_names("censored_median_s")))
+        if abs(mean.value - each["mean"]) < 0.005 and half_s is not None:
             continue  # as in the table above
-        mean, half = each.restricted_mean_s, each.censored_median_s
-        ends = "not reached" if math.isinf(half.low) else f"{half.low:.0f} to {_seconds(half.high)}"
-        rows.append((each.group, f"{mean.value:.2f}", mean.text(".1f"), _seconds(half.value), ends))
+        ends = "not reached" if low_s is None else f"{low_s:.0f} to {_seconds(high_s)}"
+        rows.append((each["group"], f"{mean.value:.2f}", mean.text(".1f"), _seconds(half_s), ends))
     return Table(headings, rows, "missions that never found it as censored (Kaplan-Meier)")
 
 
-def _seconds(value: float) -> str:
-    return f"{value:.0f}" if math.isfinite(value) else "not reached"
+def _seconds(value: float | None) -> str:
+    return "not reached" if value is None else f"{value:.0f}"
 
 
-def _difference_table(metric: Metric, differences: Sequence[Difference]) -> Table:
+def _difference_table(metric: Metric, differences: Sequence[Row]) -> Table:
     """Return the difference of each pair; for shares, without an effect size."""
     headings = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", _EFFECT)
     width = 6 if metric.name == FOUND else len(headings)
     return Table(headings[:width], [_difference_row(each, metric)[:width] for each in differences])
 
 
-def _difference_row(each: Difference, metric: Metric) -> tuple[str, ...]:
-    name = f"{each.group} - {each.other}"
-    n = f"{each.n:,}" if each.n == each.n_other else f"{each.n:,}, {each.n_other:,}"
-    if not each.test:
-        return name, n, "", "", "", "", ""
-    mean, interval = metric.number(each.difference.value), _interval(each.difference, metric)
-    effect = "" if math.isnan(each.effect.value) else f"{each.effect.value:.2f}"
-    if each.effect.has_interval:
-        effect += f" ({each.effect.text('.2f')})"
-    return name, n, mean, interval, _p(each.p), _p(each.p_holm), effect
+def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
+    sizes = dict.fromkeys((each["n"], each["n_other"]))
+    names = f"{each['group']} - {each['other']}", ", ".join(f"{n:,}" for n in sizes)
+    if not each["test"]:
+        return *names, "", "", "", "", ""
+    mean, size = estimate_in(each, "difference"), estimate_in(each, "effect")
+    effect = "" if each["effect"] is None else f"{size.value:.2f}"
+    effect += f" ({size.text('.2f')})" if size.has_interval else ""
+    return *names, metric.number(mean.value), metric.interval(mean), _p(each["p"]), _p(each["p_holm"]), effect
 
 
-def _runs_row(each: Difference, metric: Metric) -> tuple[str, ...]:
-    ratio = "" if math.isnan(each.variance_ratio) else f"{each.variance_ratio:.1f}"
-    paired = f"{each.runs_needed_paired:,}" if each.runs_needed_paired else ""
-    unpaired = f"{each.runs_needed_unpaired:,}" if each.runs_needed_unpaired else "over 10,000,000"
-    half_width = f"{100 * each.half_width:g}%" if metric.name == FOUND else f"{each.half_width:.4g} {metric.unit}"
-    return f"{each.group} - {each.other}", half_width.strip(), paired, unpaired, ratio
-
-
-def _interval(found: Estimate, metric: Metric) -> str:
-    """Write an interval; empty if there is none."""
-    text = found.text(f".{metric.interval_decimals}f", metric.scale)
-    return f"{text}%" if text and metric.name == FOUND else text
+def _runs_row(each: Row, metric: Metric) -> tuple[str, ...]:
+    ratio = "" if each["variance_ratio"] is None else f"{each['variance_ratio']:.1f}"
+    paired = f"{each['runs_needed_paired']:,}" if each["runs_needed_paired"] else ""
+    unpaired = f"{each['runs_needed_unpaired']:,}" if each["runs_needed_unpaired"] else "over 10,000,000"
+    half = f"{100 * each['half_width']:g}%" if metric.name == FOUND else f"{each['half_width']:.4g} {metric.unit}"
+    return f"{each['group']} - {each['other']}", half.strip(), paired, unpaired, ratio
 
 
 def _p(p: float) -> str:
     """Write a p-value with two significant digits."""
-    if math.isnan(p):
-        return ""
     if p < 1e-300:  # next to the least that a float can hold
         return "<1e-300"
     return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
 
 
-def capital(text: str) -> str:
-    """Begin a text with a capital, and leave the rest as it is."""
-    return text[:1].upper() + text[1:]
+# Conclusions
+
+
+def conclusion(found: Row, metric: Metric) -> str:
+    """Write the conclusion from one difference.
+
+    The test is one of ranks, the difference one of means: what only one of them shows is not said of the other.
+    """
+    group, other = found["group"], found["other"]
+    if not found["test"]:
+        return f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
+    apart, ranks = estimate_in(found, "difference"), _direction_of_ranks(found)
+    if found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval:
+        return f"{group} and {other} have the same {metric.title} in all {number_of(found['n'], 'pair')}."
+    test, interval = f"{_basis(found)}, {p_text(found['p_holm'])}", _interval(found, metric)
+    mean = f"{group} - {other}: {metric.amount(apart.value)}, {interval}"
+    if found["p_holm"] >= SIGNIFICANCE:
+        return f"No difference in {metric.title} is shown between {group} and {other} ({mean}; {test})."
+    if not _is_claimed(found):
+        claim = _rank_claim(found, metric, ranks)
+        return f"By ranks, {claim} ({test}), but no difference of the means is shown ({mean})."
+    claim = difference_claim(group, other, apart.value, metric)
+    if ranks * apart.value < 0.0:
+        greater = group if ranks > 0 else other
+        return (
+            f"{claim} on average, yet {greater} has the greater value in most comparisons of single runs"
+            f" ({interval}; {test}): the distributions differ in shape, so look at them."
+        )
+    return f"{claim} ({interval}; {test})."
+
+
+def _rank_claim(found: Row, metric: Metric, ranks: float) -> str:
+    """Write which manager mostly has more or less in single runs, the better one first."""
+    less, greater = (found["other"], found["group"])[:: 1 if ranks > 0.0 else -1]
+    if not metric.better:
+        return f"{greater} mostly exceeds {less} in {metric.title}"
+    first, phrase, second = (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
+    return f"{first} {phrase.format('mostly')} {second}"
+
+
+def _is_claimed(found: Row) -> bool:
+    """Whether a difference of the means may be claimed."""
+    is_open = estimate_in(found, "difference").contains(0.0) and _direction_of_ranks(found)
+    return bool(found["p_holm"] < SIGNIFICANCE and not is_open)
+
+
+def difference_claim(first: str, second: str, value: float, metric: Metric) -> str:
+    """Write which of two managers has more or less, the better one first; the value is first - second."""
+    if value * (metric.better or 1) < 0.0:
+        first, second, value = second, first, -value
+    phrase = metric.more if value > 0.0 else metric.less
+    if not phrase:
+        phrase = f"has {{}} {'more' if value > 0.0 else 'less'} {metric.title} than"
+    return f"{first} {phrase.format(metric.amount(abs(value)))} {second}"
+
+
+def overall_conclusion(
+    metric: Metric, differences: Sequence[Row], means: Mapping[str, float], groups: Sequence[str]
+) -> str:
+    """Write the conclusion for the first metric: which manager is best, by how much, and whether it is significant.
+
+    Args:
+        metric: the first one.
+        differences: of all metrics and groups, with their conclusions.
+        means: of this metric, by group, where they are known.
+        groups: names of those that it is about.
+    """
+    tested = [each for each in differences if each["test"]]
+    own = [each for each in tested if each["metric"] == metric.name and {each["group"], each["other"]} <= set(groups)]
+    if len(groups) < 2:
+        return f"There is only {groups[0]}, so there is nothing to compare it with."
+    if not own or len(means) < 2:
+        return f"No two of them have a {metric.title} that could be compared."
+    if not metric.better:
+        return " ".join(each["conclusion"] for each in own[:_MOST_SENTENCES])
+    best = max(means, key=lambda name: metric.better * means[name])
+    against = [each for each in own if best in (each["group"], each["other"])]
+    claimed = [each for each in against if _is_claimed(each) and _favours(each, best, metric)]
+    alike = [_other(each, best) for each in against if each["p_holm"] >= SIGNIFICANCE]
+    sentences = []
+    if claimed:
+        sentences.append(_claims(best, metric, claimed, alike, len(tested)))
+    elif alike:
+        has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
+        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean,"
+        sentences.append(f"{is_shown} and {_and(alike)}.")
+    others = [each["conclusion"] for each in against if each["p_holm"] < SIGNIFICANCE and each not in claimed]
+    return " ".join([*sentences, *others])
+
+
+def _favours(found: Row, name: str, metric: Metric) -> bool:
+    """Whether a group is the better one in the runs that are compared, which need not be all that have a mean."""
+    return bool((1.0 if found["group"] == name else -1.0) * metric.better * found["difference"] > 0.0)
+
+
+def _claims(best: str, metric: Metric, claimed: Sequence[Row], alike: Sequence[str], tests: int) -> str:
+    """Write by how much the best is better than those from which it differs, and from which it does not."""
+    _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
+    parts = [
+        f"{metric.amount(abs(each['difference']))}{words} {_other(each, best)}"
+        f" ({_interval(each, metric)}; {_basis(each)})"
+        for each in claimed
+    ]
+    largest = p_text(max(each["p_holm"] for each in claimed))
+    if len(claimed) > 1:
+        largest = f"all {largest}" if "<" in largest else f"largest {largest}"
+    over = f" after Holm's correction over {tests} tests" if tests > 1 else ""
+    rest = f"; no difference is shown to {_and(alike)}" if alike else ""
+    return f"{best} {metric.most}: {_and(parts)}; {largest}{over}{rest}."
+
+
+def _other(found: Row, name: str) -> str:
+    return str(found["other"] if found["group"] == name else found["group"])
+
+
+def _and(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _interval(found: Row, metric: Metric) -> str:
+    """Write the interval of a difference's size, in the direction in which the sentence speaks."""
+    apart = estimate_in(found, "difference")
+    shown = -apart if apart.value < 0.0 and _is_claimed(found) else apart
+    text = shown.text(f".{metric.decimals}f", metric.scale)
+    return f"95% interval {text}" if text else "no interval"
+
+
+def _basis(found: Row) -> str:
+    return f"{number_of(found['n'], 'pair') if found['paired'] else 'not paired'}, {_SHORT[found['test']]}"
+
+
+def p_text(p: float) -> str:
+    """Write a p-value for a sentence."""
+    if p < 0.001:
+        return "p < 0.001"
+    return f"p = {p:.3f}" if p < 0.1 else f"p = {p:.2f}"
+
+
+def _direction_of_ranks(found: Row) -> float:
+    """Return the sign of the effect: above 0 if the first has the greater values, 0 if there is none."""
+    return (found["effect"] or 0.0) - (0.5 if found["test"] == MANN_WHITNEY and found["effect"] is not None else 0.0)

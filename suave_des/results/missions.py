@@ -280,13 +280,13 @@ def counted(groups: Sequence[Group]) -> str:
     return "draw" if any(runs_sharing_draw(group.frame) > 1 for group in groups) else "run"
 
 
-def time_limit_s(groups: Sequence[Group]) -> float:
+def time_limit_s(groups: Sequence[Group]) -> int:
     """Return the whole seconds that missions of every group had; where all found the pipeline, the longest search."""
     lost = [group.frame.loc[group.frame[FOUND] == 0.0, SEARCH_TIME] for group in groups]
     limits_s = [float(times.max()) for times in lost if times.notna().any()]
     ends_s = [float(times_s.max()) for group in groups if len(times_s := group.known_values(SEARCH_TIME))]
     limit_s = min(limits_s) if limits_s else max(ends_s, default=0.0)
-    return math.floor(limit_s) or limit_s
+    return math.floor(limit_s) or math.ceil(limit_s)
 
 
 def grouped(

@@ -120,7 +120,7 @@ def test_a_comparison_corrects_what_the_conditions_do() -> None:
     assert row["narrower"] > 3.0 and row["equal_runs"] > 60
     difference = by_name.loc[("search_time_s", "a", "b")]
     assert difference["assisted"] == pytest.approx(-10.0, abs=3.0)
-    assert any(text.startswith("a finds the pipeline") and "sooner than b" in text for text in found.conclusions)
+    assert found.estimates["conclusion"].str.contains("^a finds the pipeline.* sooner than b").any()
     assert [note.split(" are ")[0] for note in found.notes] == ["the fewest runs of one of them"]
 
 
@@ -252,9 +252,9 @@ def test_the_report_has_the_assisted_means(campaigns: Path) -> None:
     made = command_here("report", "real.csv", *both, "--out", "page.html", cwd=campaigns)
     assert made.returncode == 0, made.stderr
     page = (campaigns / "page.html").read_text(encoding="utf-8")
-    sentences = compare_assisted(campaigns / "real.csv", campaigns / "same", campaigns / "population").conclusions
+    found = compare_assisted(campaigns / "real.csv", campaigns / "same", campaigns / "population")
     assert page.count("real missions assisted by simulated ones") == 2
-    assert all(sentence in page for sentence in sentences)
+    assert all(sentence in page for sentence in found.estimates["conclusion"])
     half = command_here("report", "real.csv", "--population", "population", "--out", "no.html", cwd=campaigns)
     assert half.returncode == 2 and "without --assisted-by" in half.stderr
     assert not (campaigns / "no.html").exists()

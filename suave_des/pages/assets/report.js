@@ -302,7 +302,7 @@ function drawMapOf(way) {
 
 // Text and tables.
 
-function tableOf([headings, rows]) {
+function tableOf(headings, rows) {
   return element('div', { class: 'scroll' }, element('table', {}, element('thead', {}, element('tr', {},
     ...headings.map((each) => element('th', {}, each)))), element('tbody', {}, ...rows.map((cells) => {
     const number = groups.indexOf(cells[0]);
@@ -317,16 +317,9 @@ function writeText() {
   byId('notes').append(...[...results.notes, ...(ways.note ? [ways.note] : [])].map((each) => element('li', {}, each)));
   byId('tables').append(element('h2', {}, 'Tables'), ...results.sections.map((section, place) => element('details', { class: 'block', ...(place < 2 ? { open: '' } : {}) },
     element('summary', {}, section.title),
-    ...section.tables.flatMap(([title, table]) => [title ? element('h3', {}, title) : null, tableOf(table)]),
+    ...section.tables.flatMap(([title, headings, rows]) => [title ? element('h3', {}, title) : null, tableOf(headings, rows)]),
+    section.below ? element('p', {}, section.below) : null,
     section.conclusions.length ? element('ul', {}, ...section.conclusions.map((each) => element('li', {}, each))) : null)));
-  if (results.needed) {
-    byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'Runs needed for an interval'), tableOf(results.needed)));
-  }
-  const [most, apart, replay] = results.largest;
-  if (apart[1].length) {
-    byId('tables').append(element('details', { class: 'block' }, element('summary', {}, most), tableOf(apart),
-      replay ? element('div', {}, element('p', {}, 'To see both missions:'), element('pre', {}, element('code', {}, replay))) : null));
-  }
   byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'How it was compared'),
     element('ul', {}, ...results.remarks.map((each) => element('li', {}, each)))));
   byId('how').append(element('h2', {}, 'How it was made'), ...made.map((each) => element('details', { class: 'block', open: '' },
