@@ -13,9 +13,8 @@ from typing import Final, NamedTuple
 
 from suave_des.errors import number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.matching import testable_order
-from suave_des.kb.situations import Body, Probes, Situation
-from suave_des.kb.space import States
+from suave_des.kb.matching import Body, Probes, testable_order
+from suave_des.kb.space import Situation, States
 from suave_des.knowledge.rules import COMPARISON_OF, COMPARISONS, Rule, write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.tables import Table

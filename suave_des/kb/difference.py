@@ -15,9 +15,9 @@ from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate
-from suave_des.kb.policy import Policy, no_proof
-from suave_des.kb.situations import Probes, Situation
-from suave_des.kb.space import PolicySpace
+from suave_des.kb.matching import Probes
+from suave_des.kb.policy import Policy
+from suave_des.kb.space import PolicySpace, Situation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
@@ -106,7 +106,7 @@ class PolicyDifference:
         reported: number of states in which they decide alike, but infer different statuses.
         space: what the policies tell apart.
         functions: that have an objective.
-        computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
+        no_proof: why rules may do more than compare; if there are any reasons, the ranges are samples only.
     """
 
     compared: int
@@ -114,7 +114,7 @@ class PolicyDifference:
     reported: int
     space: PolicySpace
     functions: tuple[str, ...]
-    computing: tuple[str, ...]
+    no_proof: tuple[str, ...]
 
     @property
     def states(self) -> int:
@@ -126,8 +126,7 @@ class PolicyDifference:
         yield f"{self.states} of {self.compared} states {'is' if self.states == 1 else 'are'} decided differently"
         if self.reported:
             yield f"{self.reported} more have other statuses, but the same decisions"
-        if self.computing:
-            yield no_proof(self.computing)
+        yield from (f"{reason}: each range was tried with one value only" for reason in self.no_proof)
         groups: dict[str, list[int]] = {}
         for number, case in enumerate(self.cells.to_dict("records")):
             for name in self.functions:
@@ -170,7 +169,7 @@ def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
         reported=int(both["states"][~decided & differs("statuses")].sum()),
         space=one.space,
         functions=functions,
-        computing=tuple(sorted({*one.computing, *other.computing})),
+        no_proof=tuple(dict.fromkeys((*one.no_proof, *other.no_proof))),
     )
 
 

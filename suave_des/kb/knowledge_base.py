@@ -14,8 +14,7 @@ from suave_des.kb.difference import PolicyDifference, compare_policies
 from suave_des.kb.explain import Explanation, explain
 from suave_des.kb.policy import OnCount, Policy, make_policy
 from suave_des.kb.query import QueryResult, answer, graph_of
-from suave_des.kb.situations import Outcome, Situation
-from suave_des.kb.space import PolicySpace
+from suave_des.kb.space import Outcome, PolicySpace, Situation
 from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.kb.tracing import pellet_for
 from suave_des.knowledge.ontology import Ontology

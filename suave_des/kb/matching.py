@@ -15,14 +15,21 @@ from typing import Final
 
 from rdflib import BNode
 
-from suave_des.kb.situations import PROBE
+from suave_des.kb.space import Situation
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.pellet.in_process import entailed
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
+from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.rules.files import with_triples
-from suave_des.knowledge.state import Value
+from suave_des.knowledge.state import ContradictionError, Value
 
+#: Begins the IRIs of what is added to a knowledge base to question it.
+PROBE: Final = "urn:suave-des:probe"
+_HOLDS: Final = f"{PROBE}#holds"
+
+Body = tuple[Atom, ...]
 #: What the variables of a rule stand for: IRIs and literals by name.
 Binding = Mapping[str, str | Lit]
 #: The same as people write it.
@@ -253,3 +260,49 @@ def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
     known = ((f"{PROBE}#it", RDF_TYPE, OWL + "Thing"),)
     found = entailed(Content(known, (), (rule,)).n_triples(), [head])
     return tuple(sorted(value for _, _, value in found if isinstance(value, Lit)))
+
+
+class Probes:
+    """Asks Pellet which conjunctions of atoms hold.
+
+    Each is the body of a separate rule, whose head has an individual and a property that nothing else mentions, so that
+    it changes nothing.
+
+        probes = Probes(base, TimeLimit(), [rule.body for rule in base.rules])
+        probes.holding(Situation(state))  # bodies of the rules that fire
+
+    Args:
+        base: ontologies and rules.
+        limit: of Pellet's time for one situation.
+        bodies: the conjunctions; each must be safe, as the body of a rule is.
+
+    Raises:
+        KnowledgeError: Pellet cannot use them.
+    """
+
+    def __init__(self, base: Ontology, limit: TimeLimit, bodies: Iterable[Body]) -> None:
+        self._base, self._limit, self._bodies = base, limit, tuple(dict.fromkeys(bodies))
+        rules = (
+            Rule(f"probe {number}", "", Path(), True, BNode(), (), body, (_head(number),))
+            for number, body in enumerate(self._bodies)
+        )
+        probed = base.with_rules((*base.rules, *map(with_triples, rules)))
+        self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
+
+    def holding(self, situation: Situation) -> frozenset[Body] | None:
+        """Return the conjunctions that hold; None for a situation that contradicts itself.
+
+        Raises:
+            KnowledgeError: Pellet takes too long.
+        """
+        asserted = (*self._base.assertions(situation.state), *situation.facts)
+        try:
+            found = self._limit.run(lambda: self._pellet.infer(asserted), reasoning_on(situation.state))
+        except ContradictionError:
+            return None
+        numbers = (value.text for _, name, value in found if name == _HOLDS and isinstance(value, Lit))
+        return frozenset(self._bodies[int(number)] for number in numbers)
+
+
+def _head(number: int) -> Atom:
+    return Atom("data", _HOLDS, (Named(f"{PROBE}#it"), Lit(str(number), XSD + "string")))

@@ -21,9 +21,9 @@ from typing import Final, NamedTuple, TypeVar
 
 from suave_des.errors import KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.matching import Body, Probes
 from suave_des.kb.rule_tests import RuleTest, passes
-from suave_des.kb.situations import Body, Decide, Outcome, Probes, Situation, compare, difference
-from suave_des.kb.space import PolicySpace, States
+from suave_des.kb.space import Decide, Outcome, PolicySpace, Situation, States, compare, difference
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import EXACT, OWL, RDF_TYPE, RDFS, XSD, Lit, memberships

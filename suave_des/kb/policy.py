@@ -11,10 +11,20 @@ from typing import Any, Final, NamedTuple
 import pandas
 
 from suave_des.errors import InputError, KnowledgeError, number_of
-from suave_des.kb.situations import INCONSISTENT, Decide, Outcome, Situation
-from suave_des.kb.space import Dependence, PolicySpace, Reports, States, Task, measured_attributes, rules_that_compute
+from suave_des.kb.space import (
+    INCONSISTENT,
+    Decide,
+    Dependence,
+    Outcome,
+    PolicySpace,
+    Reports,
+    Situation,
+    States,
+    measured_attributes,
+)
 from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, KnowledgeState
 from suave_des.tables import Table
 
@@ -36,7 +46,7 @@ class Policy:
             such `state`, its `reports` in words and the functions that are `flipping`.
         functions: that have an objective in a state.
         without_effect: measured attributes that no rule and no design refers to.
-        computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
+        no_proof: why rules may do more than compare; if there are any reasons, the ranges are samples only.
         max_failed: maximum number of components that report a status.
     """
 
@@ -44,7 +54,7 @@ class Policy:
     cases: pandas.DataFrame = field(repr=False)
     functions: tuple[str, ...]
     without_effect: tuple[str, ...]
-    computing: tuple[str, ...]
+    no_proof: tuple[str, ...]
     max_failed: int
 
     @property
@@ -72,8 +82,7 @@ class Policy:
             if len(group) > 1:
                 yield f"interchangeable (only their number matters): {', '.join(group)}"
         yield from (f"without any effect: measured {name}" for name in self.without_effect)
-        if self.computing:
-            yield no_proof(self.computing)
+        yield from (f"{reason}: each range was tried with one value only" for reason in self.no_proof)
         for mark in (INCONSISTENT, NONE_LEFT, FLIP_FLOP):
             cases = self.marked(mark)
             yield f"{mark}: {number_of(int(cases['states'].sum()), 'state')}"
@@ -82,13 +91,6 @@ class Policy:
                     yield f"  {each['state']}" + (f": {each['problem']}" if each["problem"] else "")
                 if len(cases) > _EXAMPLES:
                     yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
-
-
-def no_proof(computing: Sequence[str]) -> str:
-    """Say that with rules that compute ranges are samples only."""
-    several = len(computing) > 1
-    rules = f"rule{'s' if several else ''} {', '.join(computing)} compute{'' if several else 's'} with numbers"
-    return f"{rules}: each range was tried with one value only"
 
 
 def make_policy(
@@ -134,7 +136,7 @@ def make_policy(
     for key, state in different.items():
         decided[key] = decide(Situation(state))
         on_count(len(decided), len(different))
-    functions = tuple(sorted({name for task in states.tasks for name in task.asked}))
+    functions = tuple(sorted({each.function for task in states.tasks for each in task.objectives}))
     columns = [*space.attributes, "components", "states"]
     columns += [f"{name}_now" for name in functions] + ["statuses"] + [f"{name}_then" for name in functions]
     columns += ["marks", "problem", "state", "reports", "flipping"]
@@ -145,7 +147,7 @@ def make_policy(
         ),
         functions,
         tuple(name for name in measured_attributes(base, settings) if name not in space.attributes),
-        rules_that_compute(base),
+        regions_of(base).reasons,
         max_failed,
     )
 
@@ -153,7 +155,7 @@ def make_policy(
 def _keys(states: States, depends: Dependence) -> Iterator[Hashable]:
     """What the decision in each kind of state can depend on."""
     relevant = [
-        sorted(frozenset[str]().union(*map(depends.attributes.__getitem__, task.asked))) for task in states.tasks
+        sorted({attribute for name in _asked(task) for attribute in depends.attributes[name]}) for task in states.tasks
     ]
     for _, values in states.measured:
         places = depends.places(values)
@@ -172,7 +174,7 @@ def _rows(
         here = list(itertools.islice(outcomes, len(states.tasks)))
         components = "; ".join(f"{name}={status}" for name, status in reports.components)
         for task, outcome, flipping in zip(states.tasks, here, _flipping(states.tasks, here), strict=True):
-            state = next(every)
+            state, asked = next(every), _asked(task)
             marks = [INCONSISTENT]
             if outcome.reasoning is None:
                 outcome = decide(Situation(state))
@@ -182,9 +184,9 @@ def _rows(
                 *places,
                 components,
                 reports.combinations,
-                *((state.grounded(name) or NO_GROUNDING) if name in task.asked else "" for name in functions),
+                *((state.grounded(name) or NO_GROUNDING) if name in asked else "" for name in functions),
                 "; ".join(outcome.statuses),
-                *(outcome.choice(name) if name in task.asked else "" for name in functions),
+                *(outcome.choice(name) if name in asked else "" for name in functions),
                 "; ".join(marks),
                 outcome.contradiction,
                 state,
@@ -193,22 +195,26 @@ def _rows(
             )
 
 
-def _flipping(tasks: Sequence[Task], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
+def _asked(task: KnowledgeState) -> tuple[str, ...]:
+    return tuple(each.function for each in task.objectives)
+
+
+def _flipping(tasks: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
     """Functions of each task whose decisions lead through other groundings back to its own, all else being constant."""
     after: dict[Hashable, Hashable] = {}
     groundings: dict[Hashable, dict[str, str]] = {}
     for task, outcome in zip(tasks, outcomes, strict=True):
         chosen = {function: design for function, design in outcome.changes.items() if design != NONE_LEFT}
-        now = task.asked, task.groundings
+        now = _asked(task), task.groundings
         groundings[now] = dict(task.groundings)
-        after[now] = task.asked, tuple(sorted({**dict(task.groundings), **chosen}.items()))
+        after[now] = _asked(task), tuple(sorted({**dict(task.groundings), **chosen}.items()))
     for task in tasks:
-        start = task.asked, task.groundings
+        start = _asked(task), task.groundings
         way: list[Hashable] = [start]
         while (following := after[way[-1]]) in after and following not in way:
             way.append(following)
         designs = [groundings[each] for each in way] if following == start else []
-        yield tuple(name for name in task.asked if len({each.get(name) for each in designs}) > 1)
+        yield tuple(name for name in _asked(task) if len({each.get(name) for each in designs}) > 1)
 
 
 def _in_words(reports: Reports, space: PolicySpace) -> str:

@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
-from functools import cached_property
-from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from pydantic import ValidationError
-
-from suave_des.errors import MISTAKES_LOGGER, InputError, KnowledgeError, number_of
-from suave_des.files import read_json
-from suave_des.findings import Level, ordered
+from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import with_bindings
-from suave_des.kb.situations import Situation
-from suave_des.kb.states import ManagingSettings, read_rules
+from suave_des.kb.space import Situation, differing_decisions
+from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
 from suave_des.kb.tracing import Tracer, pellet_for
-from suave_des.knowledge.checks import findings_on_rule
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.state import NONE_LEFT
+from suave_des.knowledge.state import NONE_LEFT, STAYS
 from suave_des.metrics.result import KnowledgeRecord
-from suave_des.monitor.diagnostics import REPORTED_STATUSES
-from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 
-_MISSION_FILE = "mission.json"
+_UNCHANGED: Final = dict.fromkeys((STAYS, NONE_LEFT), "no change")
 
 
 class ReplayedCycle(NamedTuple):
@@ -51,8 +40,7 @@ class ReplayedCycle(NamedTuple):
     contradiction: str = ""
 
 
-@dataclass(frozen=True)
-class MissionReplay:
+class MissionReplay(NamedTuple):
     """A replay of one mission.
 
     Attributes:
@@ -110,13 +98,6 @@ def _times(cycles: Sequence[ReplayedCycle]) -> str:
     return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(cycles)} states"
 
 
-class _RecordedMission(NamedTuple):
-    folder: Path
-    mission: str
-    scenario: Scenario
-    records: tuple[KnowledgeRecord, ...]
-
-
 def try_rules(
     folder: Path,
     rule: str | None = None,
@@ -142,81 +123,32 @@ def try_rules(
         raise InputError("give a rule, or --disable NAME", remedy="one of the two")
     limit = TimeLimit(limit_s, "--time-limit")
     trial: _Trial | None = None
-    for mission in _recorded_missions(folder):
-        used = mission.scenario
-        if trial is None or trial.scenario != used:
-            is_first = trial is None
-            before = KnowledgeBase.of(read_base(used), ManagingSettings.of(used), used.knowledge.reasoner, limit)
-            trial = _Trial(used, before, rule, disabled)
-            if is_first and rule is not None:
-                trial.warn()
+    for where, mission in recorded_missions(folder):
+        if trial is None or trial.scenario != mission.scenario:
+            trial = _Trial(mission.scenario, rule, disabled, limit)
         cycles = tuple(each for each in map(trial.replay, mission.records) if each is not None)
-        yield MissionReplay(mission.folder, mission.mission, len(mission.records), cycles)
-
-
-def _recorded_missions(folder: Path) -> Iterator[_RecordedMission]:
-    if not folder.is_dir():
-        raise InputError("no such folder", file=folder, remedy="give the folder that suave-des run --out wrote")
-    is_any_found = False
-    for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
-        if (each / KNOWLEDGE_FILE).is_file():
-            is_any_found = True
-            yield _RecordedMission(each, "", _scenario(each / _MISSION_FILE), read_knowledge(each / KNOWLEDGE_FILE))
-        if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
-            is_any_found = True
-            for one in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE):
-                point = f", point {one.point}" if one.point else ""
-                yield _RecordedMission(each, f"{one.manager}, run {one.run}{point}", one.scenario, one.records)
-    if not is_any_found:
-        raise InputError(
-            f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
-            file=folder,
-            remedy="record with run --manager metacontrol --out, or campaign --record-knowledge",
-        )
-
-
-def mission_scenario(folder: Path) -> Scenario:
-    """The scenario of a recorded mission, or of a campaign's first one.
-
-    Raises:
-        InputError: there is none.
-    """
-    return next(_recorded_missions(folder)).scenario
-
-
-def _scenario(path: Path) -> Scenario:
-    try:
-        return Scenario.model_validate(read_json(path)["scenario"])
-    except (ValueError, KeyError, TypeError, ValidationError):
-        raise InputError("is not a mission's record", file=path, remedy="run the mission again") from None
+        point = f", point {mission.point}" if mission.point else ""
+        which = f"{mission.manager}, run {mission.run}{point}" if mission.run else ""
+        yield MissionReplay(where, which, len(mission.records), cycles)
 
 
 class _Trial:
     """The knowledge base of a scenario, without the change and with it."""
 
-    def __init__(self, scenario: Scenario, before: KnowledgeBase, rule: str | None, disabled: str | None) -> None:
-        tried = () if rule is None else read_rules(rule, before.base.vocabulary)
+    def __init__(self, scenario: Scenario, rule: str | None, disabled: str | None, limit: TimeLimit) -> None:
+        self.scenario = scenario
+        base, settings = read_base(scenario), ManagingSettings.of(scenario)
+        self.before = KnowledgeBase.of(base, settings, scenario.knowledge.reasoner, limit)
+        tried = () if rule is None else read_rules(rule, base.vocabulary)
         try:
-            content = with_rules(before.base.content, [tried], () if disabled is None else (disabled,))
+            content = with_rules(base.content, [tried], () if disabled is None else (disabled,))
         except KnowledgeError as error:
             raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
-        self.scenario, self.before, self.after = scenario, before, before.changed(replace(before.base, content=content))
-        both = self.after, self.before
-        self.with_rule, self.without_rule = both if disabled is None else both[::-1]
+        self.after = self.before.changed(replace(base, content=content))
+        self.with_rule = self.after.base if disabled is None else base
         names = {disabled, *(each.name for each in tried)}
-        self.rules = [each for each in self.with_rule.base.content.enabled_rules if each.name in names]
-
-    def warn(self) -> None:
-        """Log the errors and warnings that `kb check` would have about the rules that are tried."""
-        names, after = dict.fromkeys(rule.name for rule in self.rules), self.after
-        found = (findings_on_rule(name, after.base, REPORTED_STATUSES, after.settings.measured) for name in names)
-        for finding in ordered(chain.from_iterable(found)):
-            if finding.level is not Level.INFO:
-                logging.getLogger(MISTAKES_LOGGER).warning("%s", finding)
-
-    @cached_property
-    def _pellet(self) -> InProcessPellet:
-        return pellet_for(self.with_rule.base)
+        self.rules = [each for each in self.with_rule.content.enabled_rules if each.name in names]
+        self.pellet = pellet_for(self.with_rule)
 
     def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
         """Return the effect of the change in a recorded reasoning cycle; None if it has none."""
@@ -225,19 +157,13 @@ class _Trial:
         if after.reasoning is None:
             return ReplayedCycle(record.t_s, (), (), f"contradiction: {after.contradiction}")
         decisions = []
-        for name in sorted({*before.changes, *after.changes}):
-            one, other = (_design(outcome.changes.get(name)) for outcome in (before, after))
+        for name, *choices in differing_decisions(before, after):
+            one, other = (_UNCHANGED.get(each, each) for each in choices)
             if one != other:
                 decisions.append(f"{name}: {other} instead of {one}")
-        without = self.without_rule.outcome(situation).known
         firings = []
-        tracer = Tracer(self.with_rule.base, record.state, self._pellet)
+        tracer = Tracer(self.with_rule, record.state, self.pellet)
         for bindings, facts in (firing for rule in self.rules for firing in tracer.firings(rule)):
-            known = " (known without it)" if without.issuperset(facts) else ""
             bound = with_bindings(tuple(each for each in bindings if not isinstance(each[1], Decimal)))
-            firings.append(f"{', '.join(map(str, facts))}{known}{bound or ' with nothing bound'}")
+            firings.append(f"{', '.join(map(str, facts))}{bound or ' with nothing bound'}")
         return ReplayedCycle(record.t_s, tuple(firings), tuple(decisions)) if firings or decisions else None
-
-
-def _design(choice: str | None) -> str:
-    return "no change" if choice in (None, NONE_LEFT) else str(choice)

@@ -29,15 +29,13 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb.explain import verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.replay import mission_scenario
-from suave_des.kb.situations import Decide, Outcome, Situation
-from suave_des.kb.space import Region, measurements_in, parse_region
+from suave_des.kb.space import Decide, Outcome, Region, Situation, measurements_in, parse_region
 from suave_des.kb.states import (
     FactReader,
     StateBuilder,
     StateContent,
+    recorded_missions,
     recorded_state,
-    recorded_states,
     state_dict,
 )
 from suave_des.kb.why_not import RuleQuestions
@@ -60,7 +58,7 @@ Tested = Mapping[str, Any]
 class _Given(StateContent):
     facts: _Texts = Field(default=[])
     mission: str | None = None
-    run: int | None = None
+    run: int = 0
     at_s: float | None = None
 
 
@@ -202,8 +200,8 @@ def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[t
     """The states of a test, one for each region of measured values, with words for it."""
     builder = StateBuilder(knowledge.base, knowledge.settings)
     if given.mission is not None and given.at_s is not None:
-        builder.add_state(recorded_state(recorded_states(folder / given.mission, given.run), given.at_s))
-    elif given.mission is not None or given.at_s is not None or given.run is not None:
+        builder.add_state(recorded_state(folder / given.mission, given.at_s, given.run))
+    elif given.mission is not None or given.at_s is not None:
         raise InputError("mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7")
     regions: dict[str, Region] = {}
     for kind, name, value, _ in given.parts():
@@ -392,7 +390,8 @@ def mission_states(folder: Path, knowledge: KnowledgeBase) -> Iterator[tuple[str
         InputError: there is no recorded mission.
     """
     regions = regions_of(knowledge.base)
-    kinds = {regions.key(record.state): record for record in reversed(recorded_states(folder))}
+    _, mission = next(recorded_missions(folder))
+    kinds = {regions.key(record.state): record for record in reversed(mission.records)}
     for record in sorted(kinds.values(), key=lambda record: record.t_s):
         yield f"{folder.name} at {record.t_s:.2f} s", record.state
 
@@ -403,8 +402,8 @@ def mission_knowledge(folder: Path) -> Tested:
     Raises:
         InputError: there is no recorded mission.
     """
-    scenario = mission_scenario(folder)
-    knowledge = scenario.knowledge
+    _, mission = next(recorded_missions(folder))
+    scenario, knowledge = mission.scenario, mission.scenario.knowledge
     try:
         find(scenario.name, "scenarios")
         name = scenario.name

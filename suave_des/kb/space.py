@@ -1,10 +1,10 @@
-"""The states that a policy tells apart, and what of a state its decision can depend on.
+"""Situations in which a knowledge base decides: all kinds that a policy tells apart, and what is decided in one.
 
 States are places of measured values, reports of components and groundings. Only the number of components with a status
 counts where ontologies and rules treat components alike. Quality attributes are independent of one another where every
-comparison in a rule is between values of one of them: then a measured value counts by its place among the numbers of
-its own attribute, and not at all for functions whose designs expect no value of it. Where the schema or a rule has more
-to say, every value counts, as it is.
+rule reads values of one of them only: then a measured value counts by its place among the numbers of its own attribute,
+and not at all for functions whose designs expect no value of it. Where the schema or a rule has more to say, every
+value counts, as it is.
 
 A rule that only compares numbers cannot tell two values apart that compare alike with every number in the knowledge
 base. So one value stands for each range between two numbers; equality with a number is a range of its own.
@@ -15,17 +15,19 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
 from math import comb
 from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, shown
 from suave_des.kb.states import LASTING, ManagingSettings
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import OPERATORS, Ontology
 from suave_des.knowledge.rdf import (
     C_STATUS,
+    EXACT,
     HAS_QA_VALUE,
     HAS_VALUE,
     IS_QA_TYPE,
@@ -34,18 +36,109 @@ from suave_des.knowledge.rdf import (
     RDFS,
     TOMASYS,
     Lit,
+    Triple,
     reached,
 )
 from suave_des.knowledge.reasoner import Regions, regions_of
-from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, texts_of
-from suave_des.knowledge.state import KnowledgeState, ObjectiveState, exact
+from suave_des.knowledge.rules import SAME, Atom, Named, Rule, Variable, mirrored, texts_of
+from suave_des.knowledge.state import STAYS, Fact, KnowledgeState, Reasoning, exact
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
+
+INCONSISTENT: Final = "inconsistent"
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A situation in which a knowledge base decides.
+
+    Attributes:
+        state: the knowledge state.
+        facts: additional assertions, as triples.
+        ranges: words for the region that the state stands for; empty for a single state.
+    """
+
+    state: KnowledgeState
+    facts: tuple[Triple, ...] = ()
+    ranges: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What follows and is decided in a situation.
+
+    Attributes:
+        reasoning: what is inferred and planned; None where the situation contradicts itself.
+        contradiction: what contradicts what.
+    """
+
+    reasoning: Reasoning | None
+    contradiction: str = ""
+
+    @property
+    def inferred(self) -> frozenset[Fact]:
+        """What was inferred; nothing where the situation contradicts itself."""
+        return frozenset() if self.reasoning is None else self.reasoning.inference.facts
+
+    @property
+    def known(self) -> frozenset[Fact]:
+        """What was asserted or inferred."""
+        return self.inferred if self.reasoning is None else self.inferred | self.reasoning.inference.asserted
+
+    @property
+    def changes(self) -> dict[str, str]:
+        """New design of each function whose grounding changes, or "none left"."""
+        return {} if self.reasoning is None else self.reasoning.changes
+
+    @cached_property
+    def statuses(self) -> tuple[str, ...]:
+        """What is inferred of objectives and groundings, as text, sorted."""
+        return () if self.reasoning is None else tuple(sorted(self.reasoning.statuses))
+
+    def choice(self, function: str) -> str:
+        """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
+        return INCONSISTENT if self.reasoning is None else self.changes.get(function, STAYS)
+
+
+Decide = Callable[[Situation], Outcome]
+
+
+def differing_decisions(one: Outcome, other: Outcome) -> Iterator[tuple[str, str, str]]:
+    """Function, and what happens to its grounding in one outcome and in another, where that differs."""
+    for name in sorted({*one.changes, *other.changes}):
+        if one.choice(name) != other.choice(name):
+            yield name, one.choice(name), other.choice(name)
+
+
+def difference(one: Outcome, other: Outcome) -> str:
+    """Tell the first difference in what follows and is decided, in words about the second; empty: none."""
+    if (one.reasoning is None) != (other.reasoning is None):
+        return "it contradicts itself" if other.reasoning is None else "it no longer contradicts itself"
+    for name, before, after in differing_decisions(one, other):
+        return f"{name}: {after}, not {before}"
+    for missing in sorted(map(str, one.inferred - other.inferred)):
+        return f"{missing} does not follow"
+    return next((f"{more} follows" for more in sorted(map(str, other.inferred - one.inferred))), "")
+
+
+class Difference(NamedTuple):
+    """A situation in which two knowledge bases conclude or decide differently."""
+
+    situation: Situation
+    one: Outcome
+    other: Outcome
+
+
+def compare(one: Decide, other: Decide, situations: Iterable[Situation]) -> Iterator[Difference]:
+    """Find the situations in which two knowledge bases conclude or decide differently, in their order."""
+    for situation in situations:
+        before, after = one(situation), other(situation)
+        if before is not after and difference(before, after):
+            yield Difference(situation, before, after)
+
 
 #: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would take ten minutes.
 LARGEST: Final = 400_000
-_NUMBER: Final = r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
-_REGION: Final = re.compile(rf"(?:{_NUMBER}\s*(<=?)\s*)?\.(?:\s*(<=?)\s*{_NUMBER})?")
-_ABOVE: Final = re.compile(rf">(=?)\s*{_NUMBER}")
+_SIGN: Final = re.compile("([<>]=?)")
 _MISSING: Final = "not measured"
 
 
@@ -123,20 +216,15 @@ def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
 
 
 class Region(NamedTuple):
-    """Measured values that a test is about: between two ends (None: there is none), or no measurement."""
+    """Measured values that a test is about: all that compare as given with numbers; None: no measurement."""
 
-    low: Decimal | None = None
-    high: Decimal | None = None
-    low_closed: bool = False
-    high_closed: bool = False
-    is_missing: bool = False
+    comparisons: tuple[tuple[str, Decimal], ...] | None
 
     def holds(self, value: Decimal | None) -> bool:
         """Whether a measured value, None for none, is in it."""
-        if value is None or self.is_missing:
-            return value is None and self.is_missing
-        above = self.low is None or value > self.low or (self.low_closed and value == self.low)
-        return above and (self.high is None or value < self.high or (self.high_closed and value == self.high))
+        if value is None or self.comparisons is None:
+            return value is None and self.comparisons is None
+        return all(OPERATORS[sign](value, number) for sign, number in self.comparisons)
 
 
 def parse_region(text: str) -> Region | None:
@@ -151,17 +239,22 @@ def parse_region(text: str) -> Region | None:
     """
     text = text.strip()
     if text == _MISSING:
-        return Region(is_missing=True)
+        return Region(None)
     if not {"<", ">"} & {*text}:
         return None
-    found = _REGION.fullmatch(_ABOVE.sub(r"\2 <\1 .", f". {text}" if text.startswith("<") else text))
-    if found is None:
-        remedy = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
-        raise InputError(f"{shown(text)} is not a region", remedy=remedy)
-    low, high = (exact(number) if number else None for number in (found[1], found[4]))
-    region = Region(low, high, found[2] == "<=", found[3] == "<=")
-    if low is not None and high is not None and (low > high or (low == high and not region.holds(low))):
-        raise InputError(f"no number is in the region {shown(text)}", remedy="write the smaller number first")
+    parts = [part.strip() for part in _SIGN.split(f". {text}" if text[0] in "<>" else text)]
+    sides = list(zip(parts[::2], parts[1::2], parts[2::2], strict=False))
+    remedy = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
+    try:
+        region = Region(
+            tuple((sign, exact(right)) if left == "." else (mirrored(sign), exact(left)) for left, sign, right in sides)
+        )
+    except KnowledgeError:
+        raise InputError(f"{shown(text)} is not a region", remedy=remedy) from None
+    scale = Scale(tuple(sorted({number for _, number in region.comparisons or ()})))
+    is_empty = not any(map(region.holds, map(scale.value, range(1, len(scale)))))
+    if is_empty or any((left == ".") == (right == ".") for left, _, right in sides):
+        raise InputError(f"no number is in the region {shown(text)}", remedy=remedy)
     return region
 
 
@@ -172,7 +265,7 @@ def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[t
         base: the ontologies, whose numbers divide the regions.
         regions: by quality attribute type.
     """
-    ends = {end for region in regions.values() for end in (region.low, region.high) if end is not None}
+    ends = {number for region in regions.values() for _, number in region.comparisons or ()}
     scale = Scale(tuple(sorted({*numbers_in(base), *ends})))
     inside = ([at for at in range(len(scale)) if region.holds(scale.value(at))] for region in regions.values())
     for places in itertools.product(*inside):
@@ -181,9 +274,6 @@ def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[t
             yield dict(zip(regions, values, strict=True)), words
 
 
-#: One side of a comparison: IRIs of quality attributes whose values it can be, and numbers.
-_Side = frozenset[str | Decimal]
-_ANY: Final = ""
 _CARRIED: Final = frozenset({IS_QA_TYPE, HAS_VALUE})
 _OF_VALUES: Final = _CARRIED | {HAS_QA_VALUE, TOMASYS + "hasQAestimation"}
 #: What a schema may say of these properties without relating values of one attribute to those of another.
@@ -195,17 +285,6 @@ _HARMLESS: Final = frozenset(
     }
 )
 _FUNCTIONAL: Final = frozenset((name, RDF_TYPE, OWL + "FunctionalProperty") for name in _CARRIED)
-
-
-def rules_that_compute(base: Ontology) -> tuple[str, ...]:
-    """Names of enabled rules that do more with numbers than compare them: for these, ranges prove nothing."""
-    return tuple(sorted({rule.name for rule in base.content.enabled_rules if _computes(rule)}))
-
-
-def _computes(rule: Rule) -> bool:
-    return any(
-        atom.kind == "range" or (atom.kind == "builtin" and atom.predicate not in COMPARISONS) for atom in rule.body
-    ) or any(atom.kind == "data" and isinstance(atom.arguments[-1], Variable) for atom in rule.head)
 
 
 def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None = None) -> bool:
@@ -289,12 +368,7 @@ def component_statuses(base: Ontology) -> tuple[str, ...]:
 
 
 class Reports(NamedTuple):
-    """What components report; stands for all reports that differ by an exchange of interchangeable components.
-
-    Attributes:
-        components: (component, c_status), the first ones of each group of interchangeable components, by name.
-        combinations: how many combinations it stands for.
-    """
+    """(component, c_status) of the first ones of each group of interchangeable components; for how many they stand."""
 
     components: tuple[tuple[str, str], ...]
     combinations: int
@@ -408,61 +482,26 @@ class Dependence:
 
 
 def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] | None:
-    """The regions of each attribute's values, where rules compare them with numbers of that attribute only."""
+    """The regions of each attribute's values, where every rule reads values of one attribute only, and says which."""
     known = base.model.attributes
     if not known.keys() >= {*attributes} or not regions_of(base).is_sound or not _is_plain(base):
         return None
-    measured = {known[name] for name in attributes}
-    numbers = {iri: set(_values(base, iri)) for iri in measured}
-    for rule in base.content.enabled_rules:
-        for one, other in _compared(rule):
-            concerned = measured & (one | other)
-            if _ANY in one | other:
-                if not any(all(isinstance(each, Decimal) for each in side) for side in (one, other)):
-                    return None
-                concerned = measured
-            elif len(concerned) > 1:
-                return None
-            for attribute in concerned:
-                for each in one | other:
-                    numbers[attribute] |= {each} if isinstance(each, Decimal) else _values(base, each)
-    return {name: Regions(tuple(sorted(numbers[known[name]])), ()) for name in attributes}
-
-
-def _values(base: Ontology, attribute: str) -> set[Decimal]:
-    """The numbers that the ontologies give of a quality attribute."""
     triples = base.content.triples
-    typed = {subject for subject, predicate, value in triples if predicate == IS_QA_TYPE and value == attribute}
-    values = (value for subject, predicate, value in triples if predicate == HAS_VALUE and subject in typed)
-    return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
-
-
-def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
-    """Both sides of each comparison of values in a rule; a variable that is read twice compares what it reads."""
-    types = {
-        atom.arguments[0]: atom.arguments[1].iri
-        for atom in rule.body
-        if atom.predicate == IS_QA_TYPE and isinstance(atom.arguments[1], Named)
-    }
-    read: dict[Term, list[_Side]] = {}
-    for atom in rule.body:
-        if atom.kind == "data":
-            here = types.get(atom.arguments[0], _ANY) if atom.predicate == HAS_VALUE else _ANY
-            read.setdefault(atom.arguments[1], []).append(frozenset({here}))
-    for term, sides in read.items():
-        yield from itertools.combinations([*sides, *_number(term)], 2)
-    for atom in rule.body:
-        if atom.predicate in COMPARISONS:
-            sides = [frozenset[str | Decimal]().union(*read.get(term, ()), *_number(term)) for term in atom.arguments]
-            yield from itertools.combinations(sides, 2)
-
-
-def _number(term: Term) -> list[_Side]:
-    """A literal as a side of a comparison; none where it is no number, as it never equals one."""
-    try:
-        return [frozenset({exact(term.text.strip())})] if isinstance(term, Lit) else []
-    except KnowledgeError:
-        return []
+    numbers: dict[str, set[Decimal]] = {}
+    types = {subject: str(value) for subject, predicate, value in triples if predicate == IS_QA_TYPE}
+    for subject, predicate, value in triples:
+        if predicate == HAS_VALUE and isinstance(value, Lit):
+            numbers.setdefault(types.get(subject, ""), set()).add(exact(value.text.strip()))
+    for rule in base.content.enabled_rules:
+        read = {atom.arguments[0] for atom in rule.body if atom.predicate == HAS_VALUE}
+        typed = {atom.arguments for atom in rule.body if atom.predicate == IS_QA_TYPE and atom.arguments[0] in read}
+        named = {term.iri for _, term in typed if isinstance(term, Named)}
+        if read - {subject for subject, term in typed if isinstance(term, Named)} or len(named) > 1:
+            return None
+        terms = {term for atom in rule.body for term in atom.arguments if isinstance(term, Lit)}
+        for iri in named:
+            numbers.setdefault(iri, set()).update(exact(term.text.strip()) for term in terms if term.datatype in EXACT)
+    return {name: Regions(tuple(sorted(numbers.get(known[name], ()))), ()) for name in attributes}
 
 
 def _is_plain(base: Ontology) -> bool:
@@ -486,14 +525,6 @@ def _is_plain(base: Ontology) -> bool:
     )
 
 
-class Task(NamedTuple):
-    """Functions asked for together, as the mission's tasks do, and one way to ground them."""
-
-    asked: tuple[str, ...]
-    objectives: tuple[ObjectiveState, ...]
-    groundings: tuple[tuple[str, str], ...]
-
-
 @dataclass(frozen=True)
 class States:
     """Every kind of state that a space tells apart: any measured values, with any reports and any task.
@@ -501,12 +532,12 @@ class States:
     Attributes:
         measured: place of each attribute's value, and (attribute, value) of those that are measured.
         reports: what components report.
-        tasks: objectives and groundings.
+        tasks: states with objectives and groundings only.
     """
 
     measured: tuple[tuple[tuple[int, ...], tuple[tuple[str, Decimal], ...]], ...]
     reports: tuple[Reports, ...]
-    tasks: tuple[Task, ...]
+    tasks: tuple[KnowledgeState, ...]
 
     @classmethod
     def of(cls, base: Ontology, settings: ManagingSettings, max_failed: int, space: PolicySpace) -> States:
@@ -543,11 +574,10 @@ class States:
             yield KnowledgeState(task.objectives, task.groundings, reports.components, values)
 
 
-def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> Iterator[Task]:
+def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> Iterator[KnowledgeState]:
     solvable = [name for name in base.functions if base.designs(name) or name in space.functions]
     lasting = [name for name in LASTING if name in solvable]
     for asked in [(*lasting, name) for name in solvable if name not in lasting] or [tuple(lasting)]:
         for designs in itertools.product(*((None, *base.designs(name)) for name in asked)):
             groundings = {name: design for name, design in zip(asked, designs, strict=True) if design is not None}
-            state = settings.state(dict.fromkeys(asked), groundings)
-            yield Task(asked, state.objectives, state.groundings)
+            yield settings.state(dict.fromkeys(asked), groundings)

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
+from rdflib import BNode
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
-from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, nearest, shown
+from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
+from suave_des.files import read_json
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import triggers_adaptation
-from suave_des.knowledge.rdf import RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
+from suave_des.knowledge.rdf import OWL, RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
 from suave_des.knowledge.rules import Atom, Named, Rule, RuleError, Term, Variable, texts_of
-from suave_des.knowledge.rules.checks import Vocabulary
+from suave_des.knowledge.rules.checks import Vocabulary, fatal_problems
 from suave_des.knowledge.rules.files import RulesFile, read_rule
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, ObjectiveState
-from suave_des.metrics.result import KnowledgeRecord
-from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
+from suave_des.records.knowledge import (
+    CAMPAIGN_KNOWLEDGE_FILE,
+    KNOWLEDGE_FILE,
+    RecordedMission,
+    read_knowledge,
+    read_missions,
+)
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.schema import validated
 from suave_des.scenario.yamlfile import read_yaml
@@ -61,20 +68,26 @@ class FactReader:
             InputError: it is not a fact, or a name in it is unknown.
         """
         atom = _parsed(text)
-        if not 1 <= len(atom.arguments) <= 2 or any(isinstance(term, Variable) for term in atom.arguments):
+        if not 1 <= len(atom.arguments) <= 2 or any(atom.variables()):
             remedy = "name the individuals, as in Component(c_thruster_1) or fg_status(fg_spiral_high, IN_ERROR_NFR)"
-            what = "has a variable, and so is not" if "?" in text else "is not"
-            raise InputError(f"{shown(text)} {what} a fact", remedy=remedy)
-        subject = self._individual(atom.arguments[0])
-        if len(atom.arguments) == 1:
-            return subject, RDF_TYPE, self._predicate(atom.predicate, ("class",))[0]
-        value = atom.arguments[1]
-        predicate, kind = self._predicate(atom.predicate, ("object property", "data property"))
-        return (
-            subject,
-            predicate,
-            self._individual(value) if kind == "object property" else self._value(predicate, value),
-        )
+            raise InputError(f"{shown(text)} has a variable or too many arguments for a fact", remedy=remedy)
+        kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
+        iris = (atom.predicate,) if ":" in atom.predicate else self.base.vocabulary.candidates(atom.predicate)
+        declared = ((iri, kind) for iri in iris for kind in kinds if kind in self.base.vocabulary.kinds.get(iri, ()))
+        predicate, kind = next(declared, ("", ""))
+        if not predicate:
+            problem = f"there is no {kinds[0].split()[-1]} {shown(local_name(atom.predicate))}"
+            raise InputError(problem, remedy=self.base.vocabulary.guess(atom.predicate, kinds))
+        subject, value = self._individual(atom.arguments[0]), atom.arguments[-1]
+        if kind == "class":
+            return subject, RDF_TYPE, predicate
+        if kind == "object property":
+            return subject, predicate, self._individual(value)
+        if isinstance(value, Lit):
+            is_decimal = XSD + "decimal" in self.base.vocabulary.ranges.get(predicate, ())
+            whole = value.datatype == XSD + "integer" and is_decimal
+            return subject, predicate, value._replace(datatype=XSD + "decimal") if whole else value
+        return subject, predicate, Lit(value[0], XSD + "string")
 
     def fact(self, text: str) -> Fact:
         """Read one fact, in the form in which inferences have it.
@@ -82,31 +95,14 @@ class FactReader:
         Raises:
             InputError: it is not a fact, a name in it is unknown, or it can never follow, for its value.
         """
-        triple = self.triple(text)
-        _, predicate, value = triple
-        values = self.base.vocabulary.enumerations.get(predicate)
-        if values is not None and isinstance(value, Lit) and value.text not in values:
-            remedy = nearest(value.text, values) or f"one of {', '.join(sorted(values))}"
-            raise InputError(f"{shown(value.text)} is not among the values of {local_name(predicate)}", remedy=remedy)
-        ranges = self.base.vocabulary.ranges.get(predicate)
-        if ranges is not None and isinstance(value, Lit) and value.datatype not in ranges:
-            wanted = " or ".join(sorted(map(local_name, ranges)))
-            problem = f"{shown(value.text)} is not a value of {local_name(predicate)}, whose range is {wanted}"
-            raise InputError(problem, remedy="write true or false" if ranges == {XSD + "boolean"} else None)
-        return fact_of(triple, self.base.names)
-
-    def _predicate(self, name: str, kinds: tuple[str, ...]) -> tuple[str, str]:
-        vocabulary = self.base.vocabulary
-        used = {iri: is_data for rule in self.base.rules for iri, is_data in rule.properties}
-        for iri in (name,) if ":" in name else vocabulary.candidates(name):
-            declared = vocabulary.kinds.get(iri, frozenset())
-            kind = next((each for each in kinds if each in declared), None)
-            if kind is None and iri in used and kinds != ("class",):
-                kind = "data property" if used[iri] else "object property"
-            if kind is not None:
-                return iri, kind
-        what = "class" if kinds == ("class",) else "property"
-        raise InputError(f"there is no {what} {shown(local_name(name))}", remedy=vocabulary.guess(name, kinds))
+        subject, predicate, value = self.triple(text)
+        if isinstance(value, Lit):
+            atom = Atom("data", predicate, (Variable("x"), value))
+            concluded = Atom("class", OWL + "Thing", (Variable("x"),))
+            asked = Rule("", "", Path(), True, BNode(), (), (atom,), (concluded,))
+            for problem in fatal_problems(asked, self.base.vocabulary):
+                raise InputError(problem.message, remedy=problem.remedy)
+        return fact_of((subject, predicate, value), self.base.names)
 
     def _individuals(self, name: str) -> tuple[str, ...]:
         vocabulary = self.base.vocabulary
@@ -115,27 +111,14 @@ class FactReader:
     def _individual(self, term: Term) -> str:
         if not isinstance(term, Named):
             raise InputError(f"{shown(term[0])} is a value, but an individual is needed")
-        name = term.iri
-        if ":" in name:
-            return name
-        found = self._individuals(name)
-        if found:
-            return found[0]
-        if name in self.new:
-            return self.new[name]
+        if ":" in term.iri:
+            return term.iri
+        for found in (*self._individuals(term.iri), self.new.get(term.iri)):
+            if found is not None:
+                return found
         known = [each for each in self.base.vocabulary.by_name if self._individuals(each)]
-        near = nearest(name, (*known, *self.new))
-        remedy = f"{near.removesuffix('?')}? or introduce it" if near else "introduce it"
-        raise InputError(f"there is no individual {shown(name)}", remedy=f"{remedy} under facts, as Class({name})")
-
-    def _value(self, predicate: str, term: Term) -> Lit:
-        if isinstance(term, Named):
-            return Lit(term.iri, XSD + "string")
-        assert isinstance(term, Lit)
-        ranges = self.base.vocabulary.ranges.get(predicate, frozenset())
-        if term.datatype == XSD + "integer" and XSD + "decimal" in ranges:
-            return Lit(term.text, XSD + "decimal")
-        return term
+        remedy = nearest(term.iri, (*known, *self.new)) or f"introduce it under facts, as Class({term.iri})"
+        raise InputError(f"there is no individual {shown(term.iri)}", remedy=remedy)
 
 
 def read_rules(given: str, vocabulary: Vocabulary) -> tuple[Rule, ...]:
@@ -152,16 +135,12 @@ def read_rules(given: str, vocabulary: Vocabulary) -> tuple[Rule, ...]:
 
 def _parsed(text: str) -> Atom:
     try:
-        rule = parse_rule(f"fact: -> {text}")
-    except RuleError as error:
-        if text.count("(") > text.count(")"):
-            remedy = "in a YAML list in brackets a fact needs quotes, because of its comma"
-            raise InputError(f"{shown(text)} is an incomplete fact", remedy=remedy) from None
-        remedy = error.remedy or "write it as an atom of a rule: fg_status(fg_spiral_high, IN_ERROR_NFR)"
-        raise InputError(f"{shown(text)} is not a fact: {error.problem}", remedy=remedy) from None
-    if len(rule.head) != 1:
-        raise InputError(f"{shown(text)} has {len(rule.head)} facts", remedy="write one")
-    return rule.head[0]
+        (atom,) = parse_rule(f"fact: -> {text}").head
+    except (RuleError, ValueError) as error:
+        remedy = "write one atom of a rule: fg_status(fg_spiral_high, IN_ERROR_NFR), in quotes in a YAML list"
+        problem = f": {error.problem}" if isinstance(error, RuleError) else ""
+        raise InputError(f"{shown(text)} is not a fact{problem}", remedy=remedy) from None
+    return atom
 
 
 #: Functions that every task of the mission asks for.
@@ -304,14 +283,13 @@ class StateBuilder:
             except InputError as error:
                 raise document.error(error.problem, key_path, error.remedy) from None
 
-    def add_words(self, words: Iterable[str], option: str = "--at") -> None:
+    def add_words(self, words: Iterable[str]) -> None:
         """Add parts of a state as they are written on the command line.
 
         Args:
             words: each NAME=VALUE (a quality attribute with its measured value, a component with its status, or a
                 function with its design or the status of its objective), the name of a function that has an objective,
                 a YAML file of a state, or FOLDER@TIME for the last state that a mission recorded up to a time in s.
-            option: for messages.
 
         Raises:
             InputError: it is none of these, or names what the knowledge base does not have.
@@ -323,24 +301,19 @@ class StateBuilder:
                 if equals and "/" not in name:
                     self._add_value(name, value)
                 elif at:
-                    self.add_state(recorded_state(recorded_states(Path(folder)), _seconds(time)))
+                    self.add_state(recorded_state(Path(folder), time))
                 elif name in self.base.functions:
                     self.add("objectives", name, None)
-                elif self._kind(name):
-                    raise InputError(f"{shown(name)} has no value", remedy=f"{name}=VALUE")
                 else:
                     self.add_file(Path(word))
             except InputError as error:
                 if error.file is not None:
                     raise
                 remedy = error.remedy or "NAME=VALUE, a YAML file, or FOLDER@SECONDS of a recorded mission"
-                raise InputError(error.problem, place=option, remedy=remedy) from None
-
-    def _kind(self, name: str) -> str | None:
-        return next((each for each in _NOUNS if name in self._known(each)), None)
+                raise InputError(error.problem, place="--at", remedy=remedy) from None
 
     def _add_value(self, name: str, value: str) -> None:
-        kind = self._kind(name)
+        kind = next((each for each in _NOUNS if name in self._known(each)), None)
         if kind is None:
             problem = f"there is no quality attribute, component or function {shown(name)}"
             raise InputError(problem, remedy=did_you_mean(name, [each for one in _NOUNS for each in self._known(one)]))
@@ -359,17 +332,7 @@ class StateBuilder:
                     self.add(kind, name, value)
 
     def state(self) -> KnowledgeState:
-        """Build the state. Without objectives, it has those of the groundings, else those of the search task.
-
-        Raises:
-            KnowledgeError: the ontologies have no function that an objective could ask for.
-        """
-        if not self.base.functions:
-            raise KnowledgeError(
-                "there is no function, so there is nothing to decide",
-                file=", ".join(map(str, self.base.files)),
-                remedy="give an ontology that uses TOMASys as suave.owl does",
-            )
+        """Build the state. Without objectives, it has those of the groundings, else those of the search task."""
         search = [name for name in (*LASTING, GENERATE_SEARCH_PATH) if name in self.base.functions]
         asked = self.objectives or dict.fromkeys(self.groundings or search)
         parts = {"components": self.components, "measurements": self.measurements}
@@ -386,41 +349,59 @@ def state_dict(state: KnowledgeState) -> dict[str, Any]:
     }
 
 
-def _seconds(text: str) -> float:
+def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
+    """Read the missions that recorded their states, with their folders.
+
+    Args:
+        folder: output folder of a mission, whose run is 0 then, or of a campaign, or a folder of such folders.
+
+    Raises:
+        InputError: there is none, or a file cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError("no such folder", file=folder, remedy="give the folder that suave-des run --out wrote")
+    is_any_found = False
+    for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
+        if (each / KNOWLEDGE_FILE).is_file():
+            is_any_found = True
+            scenario = _scenario(each / "mission.json")
+            yield each, RecordedMission("", 0, 0, scenario, read_knowledge(each / KNOWLEDGE_FILE))
+        if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
+            is_any_found = True
+            yield from ((each, mission) for mission in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE))
+    if not is_any_found:
+        raise InputError(
+            f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
+            file=folder,
+            remedy="record with run --manager metacontrol --out, or campaign --record-knowledge",
+        )
+
+
+def _scenario(path: Path) -> Scenario:
     try:
-        return float(text)
+        return Scenario.model_validate(read_json(path)["scenario"])
+    except (ValueError, KeyError, TypeError):
+        raise InputError("is not a mission's record", file=path, remedy="run the mission again") from None
+
+
+def recorded_state(folder: Path, time: str | float, run: int = 0) -> KnowledgeState:
+    """Return the last state that a mission recorded up to a time.
+
+    Args:
+        folder: of the mission, or of its campaign.
+        time: mission time, s.
+        run: of the campaign; 0: the mission has a folder of its own.
+
+    Raises:
+        InputError: there is no such mission, the first state was recorded later, or the time is no number.
+    """
+    records = next((mission.records for _, mission in recorded_missions(folder) if mission.run == run), ())
+    try:
+        before = [record.state for record in records if record.t_s <= float(time)]
     except ValueError:
-        raise InputError(f"{shown(text)} is not a time in seconds", remedy="such as flown@53.7") from None
-
-
-def recorded_states(folder: Path, run: int | None = None) -> tuple[KnowledgeRecord, ...]:
-    """The states of a recorded mission, or of one run of a campaign that recorded its knowledge.
-
-    Raises:
-        InputError: there are none, or the campaign has no such run.
-    """
-    if (folder / KNOWLEDGE_FILE).is_file():
-        return read_knowledge(folder / KNOWLEDGE_FILE)
-    if not (folder / CAMPAIGN_KNOWLEDGE_FILE).is_file():
-        remedy = "give the folder of suave-des run --manager metacontrol --out FOLDER"
-        raise InputError(f"{folder} has no recorded states", remedy=remedy)
-    runs: dict[int, tuple[KnowledgeRecord, ...]] = {}
-    for mission in read_missions(folder / CAMPAIGN_KNOWLEDGE_FILE):
-        runs.setdefault(mission.run, mission.records)
-    if run not in runs:
-        numbers = f"a number from {min(runs)} to {max(runs)}" if runs else "of a campaign with --record-knowledge"
-        raise InputError(f"{folder} has no states of run {shown(run)}", remedy=f"give run: {numbers}")
-    return runs[run]
-
-
-def recorded_state(records: Sequence[KnowledgeRecord], at_s: float) -> KnowledgeState:
-    """Return the last state recorded up to a mission time.
-
-    Raises:
-        InputError: the first state was recorded later.
-    """
-    before = [record.state for record in records if record.t_s <= at_s]
+        raise InputError(f"{shown(time)} is not a time in seconds", remedy="such as flown@53.7") from None
     if not before:
-        first = f"the first one is at {records[0].t_s:.2f} s" if records else "there are none"
-        raise InputError(f"no state was recorded until {at_s:g} s", remedy=first)
+        of = f" of run {run}" if run else ""
+        remedy = "give a later time, or a run of the campaign"
+        raise InputError(f"{folder} has no state{of} until {time} s", remedy=remedy)
     return before[-1]

@@ -19,6 +19,7 @@ from suave_des.kb.matching import (
     Binding,
     Bound,
     Facts,
+    Probes,
     bound,
     matched,
     nearest_match,
@@ -27,7 +28,7 @@ from suave_des.kb.matching import (
     unified,
     with_bindings,
 )
-from suave_des.kb.situations import Probes, Situation
+from suave_des.kb.space import Situation
 from suave_des.kb.states import FactReader
 from suave_des.kb.tracing import Tracer
 from suave_des.knowledge.checks import unmeasured_rules

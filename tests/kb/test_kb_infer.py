@@ -108,11 +108,10 @@ def test_a_rule_switched_off_infers_nothing(command):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--at", "water_visibility"), "--at: 'water_visibility' has no value"),
         (("--at", "c_thruster_7=FALSE"), "--at: there is no quality attribute, component or function 'c_thruster_7'"),
         (("--at", "c_thruster_1=false"), "no rule mentions the c_status 'false' (did you mean 'FALSE'?"),
         (("--at", "f_maintain_motion=ungrounded"), "--at: f_maintain_motion has no function design 'ungrounded'"),
-        (("--at", "nowhere@3"), "--at: nowhere has no recorded states"),
+        (("--at", "nowhere@3"), "nowhere: no such folder"),
         (("--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
         (("--reasoner", "hermit"), "there is no reasoner 'hermit'"),
         (("--at", "nowhere.yaml"), "nowhere.yaml: no such file"),

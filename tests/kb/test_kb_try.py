@@ -69,7 +69,7 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
     assert expected
     assert [cycle.t_s for cycle in trial.cycles if cycle.firings] == pytest.approx(expected, abs=1e-6)
     (firing,) = trial.cycles[0].firings
-    assert "?q = obs_water_visibility" in firing and "known without it" not in firing
+    assert "?q = obs_water_visibility" in firing
     assert trial.states == len(result.knowledge)
 
 
@@ -139,13 +139,6 @@ def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission
     assert text.splitlines()[-1].startswith("2 missions: fires in ")
 
 
-def test_a_rule_whose_conclusions_are_known_without_it_is_told_so(mission, command):
-    known = "same: FunctionGrounding(?fg) -> FunctionGrounding(?fg)"
-    status, text, _ = command("try", known, "--on", mission[0])
-    assert status == 0
-    assert "(known without it)" in text and "different: 0" in text
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -187,15 +180,3 @@ def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):
     (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
     with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
         list(try_rules(tmp_path, NEAR))
-
-
-def test_mistakes_in_the_rule_are_reported(mission, caplog):
-    folder = mission[0]
-    list(try_rules(folder, 'x: c_status(?c, "False") -> fd_realisability(fd_all_thrusters, false)'))
-    message = 'rule x, column 17: nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
-    assert caplog.messages == [f"WARN   the rule: line 1, {message}"]
-
-
-def test_nothing_is_told_of_a_rule_without_mistakes(mission, caplog):
-    list(try_rules(mission[0], NEAR))
-    assert not caplog.messages

@@ -24,8 +24,7 @@ from suave_des.kb.mutation import (
     sample,
 )
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
-from suave_des.kb.situations import Situation, difference
-from suave_des.kb.space import PolicySpace, States, interchangeable_components
+from suave_des.kb.space import PolicySpace, Situation, States, difference, interchangeable_components
 from suave_des.knowledge.ontology import Ontology
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, individual

@@ -13,8 +13,7 @@ from suave_des.errors import InputError
 from suave_des.kb import KnowledgeBase
 from suave_des.kb.policy import Policy, function_table, make_policy
 from suave_des.kb.policy_figure import draw_policy
-from suave_des.kb.situations import Situation
-from suave_des.kb.space import Dependence, PolicySpace, Scale, component_reports, interchangeable_components
+from suave_des.kb.space import Dependence, PolicySpace, Scale, Situation, component_reports, interchangeable_components
 from suave_des.kb.states import ManagingSettings
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
@@ -147,7 +146,7 @@ class TestPolicy:
         file = rules_file(
             tmp_path, f'sum: {VISIBLE} ^ add(?w, ?v, 1) ^ lessThan(?w, 2) -> fg_status(?fg, "IN_ERROR_NFR")\n'
         )
-        assert policy_between(KnowledgeBase.load(rules=[file]), "2").computing == ("sum",)
+        assert policy_between(KnowledgeBase.load(rules=[file]), "2").no_proof == ("rule sum computes with add",)
 
     def test_an_attribute_that_nothing_looks_at_is_left_out(self, knowledge, tmp_path):
         settings = ManagingSettings(measured=("battery_level", "water_visibility"))

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.kb.situations import Probes, Situation
+from suave_des.kb.matching import Probes
+from suave_des.kb.space import Situation
 from suave_des.kb.why_not import RuleQuestions, open_without_unusable
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState
