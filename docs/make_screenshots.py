@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from suave_des.campaign.campaign import run_campaign
-from suave_des.pages.recorded import MissionSelection, missions_run
+from suave_des.pages.recorded import missions_run
 from suave_des.pages.replay import replay_page
 from suave_des.pages.report import report_page
 from suave_des.scenario.loader import load_scenario
@@ -39,8 +39,8 @@ def main() -> None:
         campaign = folder / "seams2023"
         run_campaign("seams2023", ["none", "random", "metacontrol"], runs=100, out=campaign)
         pages = {
-            "replay": replay_page(missions_run(loaded, MissionSelection(("metacontrol",), run=2, seed=1))),
-            "replay-two": replay_page(missions_run(loaded, MissionSelection(("metacontrol", "none"), run=12, seed=1))),
+            "replay": replay_page(missions_run(loaded, ("metacontrol",), run=2, seed=1)),
+            "replay-two": replay_page(missions_run(loaded, ("metacontrol", "none"), run=12, seed=1)),
             "report": report_page([campaign]),
         }
         for page, text in pages.items():

@@ -208,7 +208,7 @@ def figure(
     from suave_des.results.figures import draw_results
 
     def rules_of(record: MissionRecord) -> Rules:
-        from suave_des.pages.decisions import adaptation_rules
+        from suave_des.pages.recorded import adaptation_rules
 
         return adaptation_rules(record)
 
@@ -268,7 +268,7 @@ def replay(
     """
     from suave_des.files import check_output_file
     from suave_des.pages.page import write_page
-    from suave_des.pages.recorded import MissionSelection, missions_in, missions_run
+    from suave_des.pages.recorded import missions_in, missions_run
     from suave_des.pages.replay import replay_page
     from suave_des.scenario.loader import load_scenario
 
@@ -281,19 +281,14 @@ def replay(
     else:
         check_no_use({"--point": point}, "without a campaign's folder")
     page_file = out or (folders[0] if folders else Path()) / "replay.html"
-    chosen = MissionSelection(
-        comma_separated(managers),
-        run=_RUN if run_number is None else run_number,
-        seed=_SEED if seed is None else seed,
-        point=point or _POINT,
-        confirmed=yes,
-    )
+    names, run = comma_separated(managers), _RUN if run_number is None else run_number
     if out is not None or not folders:
         check_output_file(page_file, overwrite=True)
     if scenario is not None:
-        missions = missions_run(load_scenario(scenario, **files.replacements), chosen)
+        loaded = load_scenario(scenario, **files.replacements)
+        missions = missions_run(loaded, names or ("metacontrol",), run, _SEED if seed is None else seed)
     else:
-        missions = missions_in(folders, chosen)
+        missions = missions_in(folders, names, run, point or _POINT, confirmed=yes)
     write_page(page_file, replay_page(missions), show=show)
     print(f"{' and '.join(each.record.name for each in missions)}: {page_file}")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +16,7 @@ from suave_des.cli.options import (
     ManagersInData,
     Quiet,
     check_no_use,
+    comma_separated,
     command_line,
 )
 from suave_des.files import check_output_folder, make_output_folder, write_files
@@ -25,7 +25,6 @@ from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.records.runs import Runs
-    from suave_des.results.real import Conditions
 
 TARGETS_NOT_MET = 1
 """Exit status with --strict."""
@@ -68,7 +67,7 @@ def validate(
             ("runs", "workers", "seed", "out", "overwrite"),
             {
                 "runs": "Missions for each manager; with a campaign file, under each condition.",
-                "out": "Folder for tables, validation.json and figures.",
+                "out": "Folder for tables and validation.json.",
             },
             {"runs": f"{_RUNS}, over all conditions"},
         ),
@@ -85,9 +84,8 @@ def validate(
     """
     from suave_des import __version__
     from suave_des.results.real import CONDITION, read_conditions, read_real, targets_of
-    from suave_des.results.validation import DETECTIONS_FIGURE, DISTRIBUTIONS_FIGURE, FILES
+    from suave_des.results.validation import FILES
     from suave_des.results.validation import validate as compare
-    from suave_des.results.validation_output import detections_png, distributions_png, remarks, tables
 
     name = scenario or DEFAULT_SCENARIO
     out, seed, overwrite = options.get("out"), options.get("seed", 1), "overwrite" in options
@@ -96,24 +94,29 @@ def validate(
     wants_conditions = runs_file is None or scenario is not None
     conditions = read_conditions(name, **files.replacements) if wants_conditions else None
     real = read_real(_data_files(name, data), conditions)
-    chosen = real.choose(managers)
+    chosen = real.choose(comma_separated(managers))
     shares, limits, targets_paths = targets_of(real, targets)
     word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
 
     campaign: CampaignResult | None = None
     sources: dict[str, object] = {
-        "data": _one_or_all([_named(file) for file in real.files]),
-        "targets": _one_or_all([_shown(path) for path in targets_paths]),
+        "data": [_named(file) for file in real.files],
+        "targets": [_shown(path) for path in targets_paths],
         "seed": seed,
     }
     if runs_file is not None:
-        recorded = _recorded(runs_file, chosen, scenario, out, conditions, overwrite=overwrite)
+        from suave_des.records.runs import read_runs
+
+        recorded = read_runs(runs_file, () if conditions is None else conditions.names)
+        recorded.check_simulated(chosen)
+        if out is not None:
+            check_output_folder(out, "campaign", overwrite=overwrite)
+            make_output_folder(out)
         simulated = recorded.frame
         sources |= {"runs_file": _named(recorded)}
     else:
         from suave_des.campaign.campaign import run_campaign
 
-        real.check_can_be_run(chosen)
         runs = -(-_RUNS // len(conditions or "1"))
         settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
         with progress(name, quiet=quiet) as show:
@@ -131,20 +134,16 @@ def validate(
         notes += [f"Condition {number}: {conditions.text(number)}" for number in range(1, len(conditions) + 1)]
     for line in [*notes, ""] if notes else ():
         console.print(line)
-    for table in tables(validation, word):
+    for table in validation.tables(word):
         print_table(console, table, {"NOT MET": "bold red"})
         console.print()
-    console.print("\n".join(remarks(validation, word)))
+    console.print("\n".join(validation.remarks(word)))
     if out is None:
-        console.print("\nNo files were written; --out DIR keeps tables and figures.")
+        console.print("\nNo files were written; --out DIR keeps the tables.")
     else:
-        contents: dict[str, str | bytes] = {
-            **validation.texts({"version": __version__, "command": command_line(), **sources}),
-            DISTRIBUTIONS_FIGURE: distributions_png(validation, real.frame, simulated, word),
-            DETECTIONS_FIGURE: detections_png(validation, real.frame, simulated, word),
-        }
-        write_files(out, contents, stale=FILES)
-        console.print(f"\nTables, figures and validation.json are in {out}")
+        about = {"version": __version__, "command": command_line(), **sources}
+        write_files(out, validation.texts(about), stale=FILES)
+        console.print(f"\nTables and validation.json are in {out}")
     if campaign is not None:
         exit_telling_failures(campaign)
     if strict and not validation.all_met:
@@ -160,40 +159,8 @@ def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
     return [published_for(scenario) or find(PAPERS_RUNS, "scenarios/published")]
 
 
-def _recorded(
-    path: Path,
-    chosen: tuple[str, ...],
-    scenario: str | None,
-    out: Path | None,
-    conditions: Conditions | None,
-    *,
-    overwrite: bool,
-) -> Runs:
-    """Read the missions of an earlier campaign, and make the output folder."""
-    from suave_des.campaign.spec import read_campaign_file
-    from suave_des.records.runs import read_runs
-    from suave_des.scenario.loader import load_scenario
-
-    recorded = read_runs(path, () if conditions is None else conditions.names)
-    if scenario is None:
-        name = None
-    else:
-        file = read_campaign_file(scenario)
-        name = load_scenario(scenario if file is None else file.scenario).scenario.name
-    recorded.check_simulated(chosen, name)
-    if out is not None:
-        check_output_folder(out, "campaign", overwrite=overwrite)
-        make_output_folder(out)
-    return recorded
-
-
 def _named(runs: Runs) -> dict[str, str | None]:
     return {"file": _shown(runs.path), "sha256": runs.sha256}
-
-
-def _one_or_all(found: Sequence[object]) -> object:
-    """Return what there is one of as it is, and several or none as they are listed in JSON."""
-    return found[0] if len(found) == 1 else list(found) or None
 
 
 def _shown(path: Path) -> str:

@@ -1,27 +1,44 @@
-"""Missions with their whole record, for a page: read from folders, repeated from a campaign, or newly run."""
+"""Missions with their whole record, for a page: read, repeated or run, and the reasoning of their MAPE-K cycles."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from suave_des.campaign.campaign import opened_campaign
 from suave_des.campaign.inputs import check_inputs
-from suave_des.campaign.missions import MissionRunner
 from suave_des.campaign.spec import check_mission
-from suave_des.errors import InputError
-from suave_des.metrics.result import MissionResult
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.kb.explain import LEFT_OUT, verdicts
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.states import ManagingSettings
+from suave_des.kb.tracing import Derivation
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
+from suave_des.knowledge.planning import performance
+from suave_des.knowledge.rdf import local_name
+from suave_des.knowledge.rules import write_rule
+from suave_des.knowledge.state import Reasoning
+from suave_des.metrics.result import KnowledgeRecord, MissionResult
 from suave_des.records.mission_folder import MISSION_FILE, MissionRecord, read_mission, record_of
 from suave_des.records.store import STORE_FILE
+from suave_des.resources import find
+from suave_des.results.mission import adaptations
+from suave_des.results.mission_figures import Rules
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
+from suave_des.scenario.yamlfile import InputFiles
+from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.simulation.simulator import Simulator
 
 MOST_MISSIONS = 2
 """Missions that a replay shows side by side."""
+Plain = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -57,27 +74,17 @@ def recorded(record: MissionRecord) -> Recorded:
         raise InputError(problem, file=MISSION_FILE, remedy="run the mission again") from None
 
 
-@dataclass(frozen=True)
-class MissionSelection:
-    """Which missions of a scenario or campaign are wanted.
+def missions_in(
+    folders: Sequence[Path], managers: Sequence[str] = (), run: int = 1, point: int = 0, *, confirmed: bool = False
+) -> list[Recorded]:
+    """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which are run again.
 
-    Attributes:
-        managers: names; none: of a campaign the last and the first, of a scenario metacontrol.
+    Args:
+        folders: of missions or of campaigns.
+        managers: names; none: of a campaign the last and the first.
         run: number of the run, the same for all.
-        seed: of everything that is random; a campaign has its own.
         point: of a campaign's sweep.
         confirmed: whether the code of managers and functions that a campaign's folder names may run.
-    """
-
-    managers: tuple[str, ...] = ()
-    run: int = 1
-    seed: int = 1
-    point: int = 0
-    confirmed: bool = False
-
-
-def missions_in(folders: Sequence[Path], chosen: MissionSelection) -> list[Recorded]:
-    """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which are run again.
 
     Raises:
         InputError: there is neither a mission nor a campaign in a folder, or too many missions for one page.
@@ -88,7 +95,11 @@ def missions_in(folders: Sequence[Path], chosen: MissionSelection) -> list[Recor
         if (folder / MISSION_FILE).is_file():
             missions.append(recorded(read_mission(folder)))
         elif (folder / STORE_FILE).is_file():
-            missions += missions_of(opened_campaign(folder, chosen.managers, confirmed=chosen.confirmed), chosen)
+            opened = opened_campaign(folder, tuple(managers), confirmed=confirmed)
+            known = opened.campaign.spec.managers
+            chosen = managers or tuple(dict.fromkeys((known[-1], known[0])))
+            _check_number(len(chosen))
+            missions += [recorded_result(*opened.run(manager, run, point)) for manager in chosen]
         else:
             problem = f"has neither a mission ({MISSION_FILE}) nor a campaign that can be run again ({STORE_FILE})"
             remedy = "give the folder that run or campaign wrote with --out"
@@ -100,35 +111,198 @@ def missions_in(folders: Sequence[Path], chosen: MissionSelection) -> list[Recor
     return missions
 
 
-def missions_of(opened: MissionRunner, chosen: MissionSelection) -> list[Recorded]:
-    """Run missions of a campaign again.
-
-    Raises:
-        InputError: the campaign has no such mission, or too many are wanted.
-        MissionError: a manager raised.
-    """
-    known = opened.campaign.spec.managers
-    managers = chosen.managers or tuple(dict.fromkeys((known[-1], known[0])))
-    _check_number(len(managers))
-    return [recorded_result(*opened.run(manager, chosen.run, chosen.point)) for manager in managers]
-
-
-def missions_run(loaded: LoadedScenario, chosen: MissionSelection) -> list[Recorded]:
+def missions_run(
+    loaded: LoadedScenario, managers: Sequence[str] = ("metacontrol",), run: int = 1, seed: int = 1
+) -> list[Recorded]:
     """Run missions of a scenario.
 
     Raises:
         InputError: something chosen cannot be used.
         MissionError: a manager raised.
     """
-    managers = chosen.managers or ("metacontrol",)
     _check_number(len(managers))
-    check_mission(chosen.run, chosen.seed)
+    check_mission(run, seed)
     check_inputs([loaded], managers, {})
     simulator = Simulator(loaded)
-    return [recorded_result(loaded, simulator.run(each, chosen.run, chosen.seed, record=True)) for each in managers]
+    return [recorded_result(loaded, simulator.run(each, run, seed, record=True)) for each in managers]
 
 
 def _check_number(number: int) -> None:
     if number > MOST_MISSIONS:
         problem = f"{number} missions are given, and the replay shows {MOST_MISSIONS} side by side at most"
         raise InputError(problem, remedy="name one or two")
+
+
+# Cycles
+
+
+def explain_cycles(mission: Recorded) -> Plain:
+    """Reason about a mission's recorded states again, and explain what follows and what is decided.
+
+    Where the ontologies are not there any more, only the states are given, with a note.
+
+    Returns:
+        Plain data for the page. cycles: in order of time, with t_s, objectives (status by function; None while all is
+        well), groundings (design in use by function), components (status of each that reported one), measured (value of
+        each quality attribute), inferred (index of what followed; -1: nothing) and decided (function, design before and
+        chosen, reason, and all designs with name, verdict, expected performance, and the reason why one is left out).
+        inferences: what followed, each kind of situation once, with t_s and facts (fact, source, rule, bindings, and
+        because of which facts). rules: text of each rule that took part. note: why some of it is missing, or empty.
+    """
+    cycles: list[Plain] = []
+    known: Plain = {"cycles": cycles, "inferences": [], "rules": {}, "note": ""}
+    if not mission.record.knowledge:
+        return known
+    try:
+        base, note = _base(mission)
+        settings, reasoner = ManagingSettings.of(mission.scenario), mission.scenario.knowledge.reasoner
+        knowledge = KnowledgeBase.of(base, settings, reasoner, TimeLimit(TIME_LIMIT_S, "the reasoner"))
+    except InputError as error:
+        cycles += [_cycle(record, -1, []) for record in mission.record.knowledge]
+        return known | {"note": f"Decisions are not explained: {error}"}
+    explainer = _Explainer(knowledge)
+    for record in mission.record.knowledge:
+        try:
+            reasoning = knowledge.infer(record.state)
+            cycles.append(_cycle(record, explainer.inferred(record.t_s, reasoning), list(explainer.decided(reasoning))))
+        except KnowledgeError as error:
+            note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
+            cycles.append(_cycle(record, -1, []))
+    rules = {
+        rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
+        for rule in knowledge.base.content.enabled_rules
+        if rule.name in explainer.rules
+    }
+    return known | {"inferences": explainer.inferences, "rules": rules, "note": note}
+
+
+def _base(mission: Recorded) -> tuple[Ontology, str]:
+    """Open the mission's ontologies, with a note where one of them has changed since."""
+    if mission.loaded is not None:
+        return open_base(mission.loaded), ""
+    knowledge, files = mission.scenario.knowledge, InputFiles()
+    # A file beside the scenario has its name from there in the scenario, and its path among the inputs.
+    paths = {Path(name).name: Path(name) for name in mission.record.inputs if Path(name).is_file()}
+    ontologies, rules = (
+        [paths.get(Path(name).name) or find(name, "ontology") for name in names]
+        for names in (knowledge.ontologies, knowledge.rules)
+    )
+    base = read_base(mission.scenario, ontologies, rules)
+    for path in (*ontologies, *rules):
+        files.ontology(path)
+    before = {Path(name).name: digest for name, digest in mission.record.inputs.items()}
+    changed = [
+        Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest
+    ]
+    note = f"{', '.join(changed)} changed since the mission: decisions are explained with today's." if changed else ""
+    return base, note
+
+
+class _Explainer:
+    """Explains states, the facts of each kind of situation once."""
+
+    def __init__(self, knowledge: KnowledgeBase) -> None:
+        self.knowledge = knowledge
+        self.inferences: list[Plain] = []
+        self.index: dict[object, int] = {}
+        self.rules: set[str] = set()
+
+    def inferred(self, t_s: float, reasoning: Reasoning) -> int:
+        """The index of what follows; the numbers in its derivations are those of the first such cycle."""
+        facts, state = reasoning.inference.facts, reasoning.inference.state
+        if not facts:
+            return -1
+        key = facts, state.objectives, state.groundings, state.components
+        if key not in self.index:
+            self.index[key] = len(self.inferences)
+            derived = self.knowledge.explain(state).facts
+            for derivation in derived:
+                self.rules |= derivation.rules()
+            self.inferences.append({"t_s": t_s, "facts": list(map(_step, derived))})
+        return self.index[key]
+
+    def decided(self, reasoning: Reasoning) -> Iterator[Plain]:
+        inference = reasoning.inference
+        for decision in reasoning.plan.decisions:
+            designs: list[Plain] = [
+                {
+                    "name": each.design,
+                    "verdict": each.verdict,
+                    "performance": float(performance(inference, each.design)),
+                    "reason": each.reason if each.verdict == LEFT_OUT else "",
+                }
+                for each in verdicts(self.knowledge.base, reasoning, decision)
+            ]
+            designs.sort(key=lambda each: (-each["performance"], each["name"]))
+            yield {
+                "function": decision.function,
+                "before": inference.state.grounded(decision.function),
+                "chosen": decision.design,
+                "reason": decision.reason,
+                "designs": designs,
+            }
+
+
+def _cycle(record: KnowledgeRecord, inferred: int, decided: Sequence[Plain]) -> Plain:
+    state = record.state
+    return {
+        "t_s": round(record.t_s, 2),
+        "objectives": {each.function: each.status for each in state.objectives},
+        "groundings": dict(state.groundings),
+        "components": dict(state.components),
+        "measured": {name: round(float(value), 3) for name, value in state.measurements},
+        "inferred": inferred,
+        "decided": decided,
+    }
+
+
+def _step(derivation: Derivation) -> Plain:
+    return {
+        "fact": str(derivation.fact),
+        "source": derivation.source,
+        "rule": derivation.rule,
+        "bindings": [(name, _shown(value)) for name, value in derivation.bindings],
+        "because": list(map(_step, derivation.premises)),
+    }
+
+
+def _shown(value: object) -> str:
+    """A bound value, a number with three decimals at most."""
+    return f"{float(value):.3f}".rstrip("0").rstrip(".") if isinstance(value, Decimal) else str(value)
+
+
+def adaptation_rules(record: MissionRecord) -> Rules:
+    """Find the rules that fired in the reasoning cycle from which each adaptation of a mission comes.
+
+    Returns:
+        Names of rules, by mission time (s) and function of the adaptation; empty for a manager that does not reason.
+
+    Raises:
+        InputError: the mission's scenario is of another version.
+    """
+    known = explain_cycles(recorded(record))
+    found = {}
+    for each in adaptations(record):
+        cycle = _decided_in(known["cycles"], each.t_s, each.function, each.after)
+        if cycle is not None and cycle["inferred"] >= 0:
+            words = each.before.removeprefix("fd_"), each.function.removeprefix("f_")
+            facts = known["inferences"][cycle["inferred"]]["facts"]
+            steps = [step for step in facts if any(word in step["fact"] for word in words)]
+            found[each.t_s, each.function] = tuple(dict.fromkeys(rule for step in steps for rule in _rules_of(step)))
+    return found
+
+
+def _decided_in(cycles: Sequence[Plain], t_s: float, function: str, design: str) -> Plain | None:
+    """Return the last cycle before a time that chose a design for a function in place of another."""
+    for cycle in reversed(cycles):
+        for each in cycle["decided"] if cycle["t_s"] <= t_s else ():
+            if each["function"] == function and each["before"] != each["chosen"] == design:
+                return cycle
+    return None
+
+
+def _rules_of(step: Plain) -> Iterator[str]:
+    for premise in step["because"]:
+        yield from _rules_of(premise)
+    if step["rule"] is not None:
+        yield step["rule"]

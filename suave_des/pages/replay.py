@@ -11,9 +11,8 @@ from suave_des import __version__
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.managed.follow import InspectionPath
 from suave_des.monitor.diagnostics import FAILED
-from suave_des.pages.decisions import explain_cycles
 from suave_des.pages.page import page
-from suave_des.pages.recorded import Recorded
+from suave_des.pages.recorded import Recorded, explain_cycles
 from suave_des.results.mission import adaptations, details, mode_spans
 from suave_des.scenario.models import Scenario
 from suave_des.world.pipeline import sample_points

@@ -8,15 +8,21 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pandas
 
 from suave_des import __version__
-from suave_des.errors import InputError
+from suave_des.campaign.campaign import opened_campaign
+from suave_des.campaign.missions import MissionRunner
+from suave_des.domain import SEA_BED_Z_M
+from suave_des.errors import InputError, SuaveDesError
+from suave_des.metrics.result import MissionResult
 from suave_des.pages.page import compressed, page
-from suave_des.pages.paths import no_paths, paths_of
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.store import read_manifest
 from suave_des.results.assisted import compare_assisted
@@ -31,6 +37,10 @@ PATHS: Final = 12
 _MOST_WAYS: Final = 120
 _STYLES: Final = ("common.css", "report.css")
 _SCRIPTS: Final = ("common.js", "charts.js", "report.js")
+_PERIOD_S: Final = 1.0
+_TOLERANCE_S: Final = 1e-3
+_EVENTS: Final = ("mode_requested", "component_status", "pipeline_detected")
+"""What is kept of a mission's way."""
 MOST_DRAWN: Final = 20_000
 """Missions whose values are in a page; of more, every second, third, ... run is, under all managers."""
 _DIGITS = 2
@@ -57,11 +67,12 @@ def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[P
     results = _results(missions)
     if assisted_by is not None:
         results["sections"] = [*_assisted(folders, *assisted_by), *results["sections"]]
-    ways = no_paths("Paths and timelines are in the report of one campaign's folder only")
+    note = "Paths and timelines are in the report of one campaign's folder only"
+    ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": note}
     if len(folders) == 1 and folders[0].is_dir() and missions.frame["run"].notna().all():
         managers = list(dict.fromkeys(missions.frame["manager"]))
         fitting = max(1, min(runs, _MOST_WAYS // len(managers))) if runs else 0
-        ways = paths_of(folders[0], missions.frame, managers, fitting)
+        ways = _paths_of(folders[0], missions.frame, managers, fitting)
     scenarios = [name for name in dict.fromkeys(missions.frame["scenario"]) if name]
     title = ", ".join([*scenarios, *dict.fromkeys(missions.frame["manager"])])
     content = {
@@ -73,7 +84,10 @@ def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[P
         "ways": ways,
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
-    check_page_size(text, LIMIT_BYTES)
+    size = len(text.encode(errors="backslashreplace"))  # as it is written
+    if size > LIMIT_BYTES:
+        problem = f"the page would have {size / 1e6:.1f} MB, more than {LIMIT_BYTES / 1e6:g}"
+        raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
     return text
 
 
@@ -90,18 +104,6 @@ def plotly_script() -> str:
     except (ImportError, OSError):
         remedy = "pip install 'suave-des[report]'"
         raise InputError("the report's charts need plotly, which is not installed", remedy=remedy) from None
-
-
-def check_page_size(text: str, limit_bytes: int) -> None:
-    """Check that a page can be sent by mail.
-
-    Raises:
-        InputError: it is too large.
-    """
-    size = len(text.encode(errors="backslashreplace"))  # as it is written
-    if size > limit_bytes:
-        problem = f"the page would have {size / 1e6:.1f} MB, more than {limit_bytes / 1e6:g}"
-        raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
 
 
 def _results(missions: Missions) -> dict[str, Any]:
@@ -214,3 +216,73 @@ def _facts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for key in ("sweep", "perturbations"):
         if manifest.get(key):
             yield key, json.dumps(manifest[key])
+
+
+# Ways
+
+
+def _paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> dict[str, Any]:
+    """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
+
+    `groups` are managers in the order of the page's groups; `runs` is how many runs of each: 0 for none.
+
+    Returns:
+        pipeline: vertices, x and y in m; paths: in the order of groups and runs; note: why there are none, or empty. A
+        path has group (its number), run, t_s, x_m, y_m, altitude_m (above the sea bed), visibility_m (as measured),
+        modes (times at which the mode of the function that moves it changed, with its name), and events (times of mode
+        requests, component reports and the first sight, with kind and detail).
+    """
+    note = "Paths and timelines are left out; suave-des report --paths N adds those of N runs"
+    if runs == 0:
+        return {"pipeline": [], "paths": [], "note": note}
+    try:
+        opened = opened_campaign(folder)
+        vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
+        paths = list(_paths(opened, frame, groups, runs))
+    except SuaveDesError as error:
+        note = f"Paths and timelines are left out: {getattr(error, 'problem', error)}"
+        return {"pipeline": [], "paths": [], "note": note}
+    note = "" if paths else "No mission could be run again as it was"
+    return {"pipeline": vertices, "paths": paths, "note": note}
+
+
+def _paths(
+    opened: MissionRunner, frame: pandas.DataFrame, groups: Sequence[str], runs: int
+) -> Iterator[dict[str, Any]]:
+    known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
+    is_swept = opened.campaign.variation.sweep.points > 1
+    for number, manager in enumerate(groups):
+        for run in _representative_runs(frame, groups, runs):
+            if (manager, run) in known.index:
+                _, result = opened.run(manager, run)
+                off_s = result.metrics.search_time_s - float(known[manager, run])
+                if is_swept or abs(off_s) < _TOLERANCE_S:
+                    yield {"group": number, "run": run, **_path(result)}
+
+
+def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
+    """Choose runs to look at: those in which each manager was quickest, in the middle and slowest, and the first."""
+    chosen: dict[int, None] = {}
+    for manager in groups:
+        own = frame[frame["manager"] == manager].sort_values(["search_time_s", "run"], kind="stable")["run"]
+        for place in (0, len(own) // 2, len(own) - 1):
+            if len(own):
+                chosen.setdefault(int(own.iloc[place]))
+    chosen |= dict.fromkeys(sorted({int(run) for run in frame["run"]})[:runs])
+    return sorted(list(chosen)[:runs])
+
+
+def _path(result: MissionResult) -> dict[str, Any]:
+    points = result.trajectory
+    period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
+    some = points[:: max(1, round(_PERIOD_S / period_s))]
+    x_m, y_m, altitude_m = np.round([(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2).T.tolist()
+    return {
+        "t_s": [round(each.t_s, 1) for each in some],
+        "x_m": x_m,
+        "y_m": y_m,
+        "altitude_m": altitude_m,
+        "visibility_m": [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
+        "modes": [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
+        "events": [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
+    }

@@ -83,8 +83,6 @@ _INFERRED_PLACE = "detection_x_m_inferred"
 """Column of published runs, of which it is concluded what they saw first."""
 _AVERAGES = ("average", "mean", "std")
 """First words of rows that sum up the missions of the exemplar's files."""
-_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
-"""What programs separate columns by, besides commas."""
 
 
 @dataclass(frozen=True)
@@ -116,17 +114,8 @@ class Runs:
         lines = ", ".join(map(str, self.averages))
         return (f"{self.path}: line{'s' * (len(self.averages) > 1)} {lines} left out: averages, not missions",)
 
-    def error(self, column: str, name: str, problem: str, remedy: str | None) -> InputError:
-        """Make an error about the first mission that has a name in a column."""
-        line = self.frame.index[self.frame[column] == name][0]
-        return line_error(self.path, line, problem, remedy)
-
-    def check_simulated(self, managers: Sequence[str], scenario: str | None) -> None:
+    def check_simulated(self, managers: Sequence[str] = ()) -> None:
         """Check that these missions are of one scenario, and that there are some of each manager.
-
-        Args:
-            managers: that are needed.
-            scenario: that is needed; none: any one.
 
         Raises:
             InputError: they are not, or there are none.
@@ -134,10 +123,8 @@ class Runs:
         names = [name for name in self.frame["scenario"].unique() if name]
         if len(names) > 1:
             problem = f"has missions of several scenarios: {names[0]} and {names[1]}"
-            raise self.error("scenario", names[1], problem, "give the missions of one scenario")
-        if names and scenario not in (None, names[0]):
-            problem = f"has missions of scenario {names[0]}, not of {scenario}"
-            raise self.error("scenario", names[0], problem, f"name scenario {names[0]}, or give another file")
+            line = self.frame.index[self.frame["scenario"] == names[1]][0]
+            raise line_error(self.path, line, problem, "give the missions of one scenario")
         for manager in managers:
             if manager not in self.managers:
                 remedy = f"it has {', '.join(self.managers)}; choose among them with --managers"
@@ -151,7 +138,7 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
     limit stands for it, as in the published table. A file that has a time limit, but does not say which missions found
     the pipeline, has found it in those whose search took less. In files that are no campaign's a reaction time of 0
-    stands for no reaction. Rows of averages, blank rows and repeated headers of the exemplar's files are left out.
+    stands for no reaction. Rows of averages, blank rows and the header where it is repeated are left out.
 
     Args:
         path: of the file; columns that are no metrics are numbers where all their values are, and else text.
@@ -162,25 +149,30 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     """
     path = Path(path)
     remedy = "one line for each mission, cells separated by commas"
-    header, numbered, digest = read_csv(path, SIZE_LIMIT_BYTES, remedy)
-    part = _Part(path, header, 1, needed)
-    parts, averages = [part], []
-    for line, cells in numbered:
-        if part.layout is not _OWN and _first_word(cells) in _AVERAGES:
+    cells, numbered, digest = read_csv(path, SIZE_LIMIT_BYTES, remedy)
+    header = [name.strip() for name in cells]
+    for column in filter(None, header):
+        if header.count(column) > 1:
+            raise line_error(path, 1, f"has column {shown(column)} twice", "name each column once")
+    layout = max(_LAYOUTS, key=lambda layout: sum(layout[name] in header for name in _NEEDED))
+    for column in (wanted := (*(layout[name] for name in _NEEDED), *needed)):
+        if column not in header:
+            remedy = f"the columns {', '.join(wanted)} are needed, separated by commas"
+            raise line_error(path, 1, f"has no column {column!r}", remedy)
+    rows, lines, averages = [], [], []
+    for line, row in numbered:
+        if layout is not _OWN and _first_word(row) in _AVERAGES:
             averages.append(line)
-        elif any(layout[DISTANCE] in cells and layout["manager"] in cells for layout in _LAYOUTS):
-            part = _Part(path, cells, line, needed)  # a header again, as in files that were put together
-            parts.append(part)
-        else:
-            if len(cells) != len(part.header):
-                problem = f"has {number_of(len(cells), 'value')}, but the header has {len(part.header)}"
+        elif layout[DISTANCE] not in row:  # else it is the header again, as in files that were put together
+            if len(row) != len(header):
+                problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
                 raise line_error(path, line, problem, "give each column a value, if only an empty one")
-            part.rows.append(cells)
-            part.lines.append(line)
-    frames = [each.frame() for each in parts if each.lines]
-    if not frames:
-        raise line_error(path, 1, "has no missions under its header", "one line for each mission is needed")
-    return Runs(path, pandas.concat(frames), digest, tuple(averages))
+            rows.append(row)
+            lines.append(line)
+    if not rows:
+        raise line_error(path, 1, "has no missions under its header", remedy)
+    text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str).apply(lambda column: column.str.strip())
+    return Runs(path, _Cells(path, text, layout).missions(), digest, tuple(averages))
 
 
 def is_foreign(path: Path) -> bool:
@@ -197,45 +189,28 @@ def _first_word(cells: Sequence[str]) -> str:
     return next((word for cell in cells for word in cell.split()), "").rstrip(":").lower()
 
 
-class _Part:
-    """Rows under one header.
+class _Cells:
+    """The cells of a file, as text.
 
     Args:
         path: of the file.
-        cells: the header.
-        line: of it.
-        needed: further columns that it must have.
-
-    Raises:
-        InputError: with the line, here and in all methods: about the header, or about a row.
+        text: its cells, indexed by line.
+        layout: names of its columns, by ours.
     """
 
-    def __init__(self, path: Path, cells: Sequence[str], line: int, needed: Sequence[str]) -> None:
-        self.path, self.header = path, [name.strip() for name in cells]
-        self.rows: list[Sequence[str]] = []
-        self.lines: list[int] = []
-        for column in filter(None, self.header):
-            if self.header.count(column) > 1:
-                raise line_error(path, line, f"has column {shown(column)} twice", "name each column once")
-        apart = next((mark for mark in _SEPARATORS if len(self.header) == 1 and mark in self.header[0]), None)
-        if apart is not None:
-            problem = f"has its columns separated by {_SEPARATORS[apart]}"
-            raise line_error(path, line, problem, "separate them by commas, and write numbers with a decimal point")
-        self.layout = max(_LAYOUTS, key=lambda layout: sum(layout[name] in self.header for name in _NEEDED))
-        for column in (wanted := (*(self.layout[name] for name in _NEEDED), *needed)):
-            if column not in self.header:
-                remedy = f"the columns {', '.join(wanted)} are needed"
-                raise line_error(path, line, f"has no column {column!r}", remedy)
-
-    def frame(self) -> pandas.DataFrame:
-        """Check and convert the cells; a frame with COLUMNS and the further ones, indexed by line."""
-        text = pandas.DataFrame(self.rows, columns=self.header, index=self.lines, dtype=str)
-        text = text.apply(lambda column: column.str.strip())
-        ours = {column: name for name, column in self.layout.items()}
+    def __init__(self, path: Path, text: pandas.DataFrame, layout: Mapping[str, str]) -> None:
+        ours = {column: name for name, column in layout.items()}
         if "detection_x_m" not in text:
             ours[_INFERRED_PLACE] = "detection_x_m"
-        self.text = text.rename(columns=ours)
+        self.path, self.layout, self.text = path, layout, text.rename(columns=ours)
         self.names = {name: column for column, name in ours.items()}
+
+    def missions(self) -> pandas.DataFrame:
+        """Check and convert the cells; a frame with COLUMNS and the further ones, indexed by line.
+
+        Raises:
+            InputError: with the line, here and in all methods: about a row.
+        """
         is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
         managers = [str(name) for name in self.text["manager"].unique()]
         are_names = {name: len(name.split()) == 1 or bool(name and not is_own) for name in managers}
@@ -254,9 +229,9 @@ class _Part:
         elif limit_s is not None:
             found = (search_time_s < limit_s).astype(float)
         values: dict[str, Any] = {name: "" if name in ("scenario", "seed") else math.nan for name in COLUMNS}
-        values |= {name: self._converted(name) for name in self.text if name and name not in (_LIMIT, FOUND)}
+        values |= {name: self._converted(name) for name in map(str, self.text) if name not in ("", _LIMIT, FOUND)}
         values |= {SEARCH_TIME: search_time_s, DISTANCE: self._numbers(DISTANCE, least=0.0), FOUND: found}
-        frame = pandas.DataFrame(values, index=text.index)
+        frame = pandas.DataFrame(values, index=self.text.index)
         if not is_campaigns:  # the exemplar writes 0.0 for none, a campaign nothing
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)
         return frame

@@ -146,7 +146,7 @@ def _read_source(path: Path) -> Missions:
 def _read_file(path: Path, manifest: Mapping[str, Any] = MappingProxyType({})) -> Missions:
     """Read one file, with the manifest of its campaign."""
     runs = read_runs(path)
-    runs.check_simulated((), None)
+    runs.check_simulated()
     frame = runs.frame.reset_index(drop=True)
     if frame["scenario"].iloc[0]:
         return _checked(Missions(frame, _swept(manifest, frame), runs.notes), path)

@@ -8,7 +8,7 @@ the share of missions that there may be in them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Unpack
@@ -22,7 +22,6 @@ from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Sweep, Variation, cell_of, check_drawn, vary
 from suave_des.errors import InputError, did_you_mean, line_error, number_of
 from suave_des.records.runs import Runs, read_runs
-from suave_des.registry import manager_class
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
@@ -203,14 +202,10 @@ class Conditions:
         )
         for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
             given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
-            fitting = [str(number) for number in 1 + np.flatnonzero(fits[:, row])]
-            if fitting:
-                remedy = f"add columns for {', '.join(name for name in self.names if name not in named) or CONDITION}"
-                problem = f"conditions {', '.join(fitting)} of the campaign all have {given}"
-            else:
-                shown = "; ".join(map(self.text, range(1, min(len(self), 8) + 1)))
-                problem, remedy = f"no condition of the campaign has {given}", f"it has {shown}"
-            raise InputError(problem, place=str(row), remedy=remedy)
+            fitting = ", ".join(str(number) for number in 1 + np.flatnonzero(fits[:, row])) or "none"
+            shown = "; ".join(map(self.text, range(1, min(len(self), 8) + 1)))
+            problem = f"conditions of the campaign that have {given}: {fitting}"
+            raise InputError(problem, place=str(row), remedy=f"name one; the campaign has {shown}")
         return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
 
     def in_order(self, managers: pandas.Series[str]) -> NDArray[np.int64]:
@@ -263,37 +258,18 @@ class RealRuns:
         """In the order of their first missions."""
         return tuple(self.frame["manager"].unique())
 
-    def choose(self, wanted: str | None) -> tuple[str, ...]:
-        """Choose the managers to compare: those named, separated by commas, or all.
+    def choose(self, wanted: Sequence[str]) -> tuple[str, ...]:
+        """Choose the managers to compare: those named, or all.
 
         Raises:
             InputError: one has no mission.
         """
-        if wanted is None:
-            return self.managers
-        source = ", ".join(str(file.path) for file in self.files)
-        names = tuple(dict.fromkeys(name.strip() for name in wanted.split(",") if name.strip()))
-        if not names:
-            raise InputError("no managers are given", remedy=f"of {source}: {', '.join(self.managers)}")
-        for manager in names:
+        for manager in wanted:
             if manager not in self.managers:
+                source = ", ".join(str(file.path) for file in self.files)
                 remedy = did_you_mean(manager, self.managers, "its managers")
                 raise InputError(f"has no mission of manager {manager!r}", file=source, remedy=remedy)
-        return names
-
-    def check_can_be_run(self, managers: Iterable[str]) -> None:
-        """Check that missions of some of its managers can be simulated.
-
-        Raises:
-            InputError: there is no such manager, with the line that names it.
-        """
-        for name in managers:
-            try:
-                manager_class(name)
-            except InputError as error:
-                remedy = f"{error.remedy}; or choose others with --managers" if error.remedy else None
-                file = next(file for file in self.files if name in file.managers)
-                raise file.error("manager", name, error.problem, remedy) from None
+        return tuple(dict.fromkeys(wanted)) or self.managers
 
 
 def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None) -> RealRuns:

@@ -1,4 +1,4 @@
-"""Compare simulated missions with real ones: samples, pairs of managers, clusters, and targets for all of them."""
+"""Compare simulated missions with real ones: samples, pairs of managers, clusters, targets, and the tables."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ import numpy as np
 import pandas
 
 from suave_des.draws import Streams
-from suave_des.errors import InputError
-from suave_des.estimates import interval_names, mean_of, share_of, std_of
-from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME
+from suave_des.errors import InputError, number_of
+from suave_des.estimates import interval_names, mean_of, percent, share_of, std_of
+from suave_des.records.metrics import DISTANCE, FOUND, METRICS, PAPER_METRICS, REACTION_TIME, SEARCH_TIME
 from suave_des.results import statistics
+from suave_des.results.comparison import Row, rows_of
 from suave_des.results.real import CONDITION, ConditionLimits, Region, Share, count
 from suave_des.results.statistics import SIGNIFICANCE, Sample
+from suave_des.tables import Table
 
 COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
@@ -39,8 +41,8 @@ TABLES = {
     "targets": "validation_targets.csv",
 }
 """Names of the tables, and their files."""
-JSON_FILE, DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE = "validation.json", "distributions.png", "detections.png"
-FILES = (*TABLES.values(), JSON_FILE, DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE)
+JSON_FILE = "validation.json"
+FILES = (*TABLES.values(), JSON_FILE)
 """All files of a validation."""
 
 
@@ -73,32 +75,46 @@ class Validation:
 
     def texts(self, provenance: Mapping[str, object]) -> dict[str, str]:
         """Write each text file, by its name; the JSON file says from what the validation comes (provenance)."""
-        tables = {name: [_rounded(row) for row in getattr(self, name).to_dict("records")] for name in TABLES}
+        frames = {name: getattr(self, name).map(_rounded) for name in TABLES}
         met = self.targets["met"].tolist()
         content = {
             "provenance": dict(provenance),
             "targets_summary": {"met": met.count(True), "not_met": met.count(False), "not_judged": met.count(None)},
             "not_found_counts_as_s": self.not_found_s,
-            **tables,
+            **{name: rows_of(frame) for name, frame in frames.items()},
         }
         files = {
-            file: pandas.DataFrame(tables[name], dtype=object).to_csv(index=False, lineterminator="\n")
-            if tables[name]
-            else ""
+            file: frames[name].to_csv(index=False, lineterminator="\n") if len(frames[name]) else ""
             for name, file in TABLES.items()
-            if tables[name] or name != "conditions"
+            if len(frames[name]) or name != "conditions"
         }
         return {**files, JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"}
 
+    def tables(self, real: str) -> Iterator[Table]:
+        """Yield every table that has rows; `real` is what the real missions are called: "published" or "real"."""
+        yield from (table for table in _tables(self, real) if table.rows)
 
-def _rounded(row: Mapping[Any, Any]) -> dict[str, Any]:
+    def remarks(self, real: str) -> Iterator[str]:
+        """Say how search times count, what the targets ask for, and how many are met."""
+        if self.not_found_s is not None:
+            yield f"Missions that never found the pipeline count as {self.not_found_s:g} s, on both sides."
+        yield (
+            f"Means must lie in the {real} mean's 95% t interval, standard deviations in the {real} one's"
+            " 95% chi-square interval."
+        )
+        met = self.targets["met"].tolist()
+        is_met, is_not = ("is" if met.count(each) == 1 else "are" for each in (True, False))
+        yield f"{met.count(True)} of {number_of(len(met), 'target')} {is_met} met, {met.count(False)} {is_not} not met."
+        if None in met:
+            yield (
+                f"{met.count(None)} cannot be judged: too few missions. For conclusions the simulation needs at least"
+                f" as many of each manager as there are {real} ones."
+            )
+
+
+def _rounded(value: Any) -> Any:
     """Round to eight digits, which hides the last ones, in which machines differ; p values of 1e-12 keep theirs."""
-    return {
-        str(name): (float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None)
-        if isinstance(value, float)
-        else value
-        for name, value in row.items()
-    }
+    return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if isinstance(value, float) else value
 
 
 def validate(
@@ -315,21 +331,20 @@ def compare_conditions(
         A row for each metric, manager and condition, with the columns of validation_conditions.csv; empty if no
         conditions are known.
     """
-    rows = []
-    sides = {"real": real, "simulated": simulated}
-    for metric in metrics if all(CONDITION in side for side in sides.values()) else ():
-        for manager in managers:
-            known = {
-                name: {int(str(number)): sample(part, manager, metric) for number, part in side.groupby(CONDITION)}
-                for name, side in sides.items()
-            }
-            for number in sorted(set(known["real"]) & set(known["simulated"])):
-                row: dict[str, Any] = {"manager": manager, "metric": metric, "condition": number}
-                for name, own in known.items():
-                    row |= _without_intervals(_described(name, own[number]), f"{name}_mean", f"{name}_std")
-                if row["real_n"] and row["simulated_n"]:
-                    rows.append(row | {"difference_of_medians": row["simulated_median"] - row["real_median"]})
-    return pandas.DataFrame(rows)
+    if CONDITION not in real or CONDITION not in simulated:
+        return pandas.DataFrame()
+    parts = []
+    for metric in metrics:
+        sides = []
+        for name, side in (("real", real), ("simulated", simulated)):
+            by = side[side[metric].notna()].groupby(["manager", CONDITION], observed=True)[metric]
+            statistics_of = by.agg(["count", "mean", "std", "median"])
+            sides.append(statistics_of.set_axis([f"{name}_{each}" for each in ("n", "mean", "std", "median")], axis=1))
+        both = pandas.concat(sides, axis=1, join="inner").sort_index().reset_index()
+        both.insert(1, "metric", metric)
+        parts += [both[both["manager"] == manager] for manager in managers]
+    found = pandas.concat(parts, ignore_index=True)
+    return found.assign(difference_of_medians=found["simulated_median"] - found["real_median"])
 
 
 def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
@@ -395,3 +410,103 @@ def _judged(found: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
         value, low, high = (math.nan if each is None else float(each) for each in (value, low, high))
         rows.append((*names, value, low, high, None if value != value else not (value < low or value > high)))
     return pandas.DataFrame(rows, columns=_TARGET).astype({"met": object})
+
+
+# Tables
+
+_VERDICTS: Mapping[bool | None, str] = {True: "met", False: "NOT MET", None: "not judged"}
+_KINDS = {
+    "mean": "mean",
+    "std": "std",
+    "ks": "KS p",
+    "conclusion": "agreeing conclusions",
+    "condition_median": "difference within conditions",
+    "condition_std": "std ratio within conditions",
+}
+
+
+class _Number(float):
+    """A number of a row, written as nothing where it is missing; the styles "p" and "share" are our own."""
+
+    def __new__(cls, value: float | None) -> _Number:
+        return super().__new__(cls, math.nan if value is None else value)
+
+    def __format__(self, style: str) -> str:
+        if self != self:
+            return ""
+        if style == "share":
+            return percent(self)
+        if style == "p":
+            style = ".3f" if self >= 0.001 else ".0e"
+        return format(float(self), style)
+
+
+def _table(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
+    """Fill a table with the rows of a frame; each column has a heading and a template for its cells."""
+    rows = []
+    for row in rows_of(frame):
+        values = {name: each if isinstance(each, str) else _Number(each) for name, each in row.items()}
+        values["brief"] = METRICS[row["metric"]].brief if "metric" in row else ""
+        cells = (template.format_map(values) for _, template in columns)
+        rows.append(["" if cell == " to " else cell for cell in cells])
+    return Table([heading for heading, _ in columns], rows, title, align)
+
+
+def _interval(name: str, style: str) -> tuple[str, str]:
+    low, high = interval_names(name)
+    return "95% interval", f"{{{low}:{style}}} to {{{high}:{style}}}"
+
+
+def _tables(validation: Validation, real: str) -> Iterator[Table]:
+    runs = "real runs" if real == "real" else real
+    head = ("metric", "{brief}"), ("manager", "{manager}")
+    numbers = [
+        [(name, f"{{{side}_{name}:{'.0f' if name == 'n' else '.2f'}}}") for name in ("n", "mean", "std", "median")]
+        for side in ("published", "simulated")
+    ]
+    title = f"Samples: {runs}, then simulated"
+    yield _table(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
+    title = f"Simulated compared with {runs} (difference = simulated - {real})"
+    columns: tuple[tuple[str, str], ...] = (
+        ("difference of means", "{difference_of_means:+.2f}"),
+        _interval("difference_of_means", "+.1f"),
+    )
+    ratio = ("std ratio", "{std_ratio:.2f}"), _interval("std_ratio", ".2f")
+    tests = ("KS p", "{ks_p:p}"), ("AD p", "{ad_p:p}")
+    yield _table(validation.cells, title, "ll", *head, *columns, *ratio, *tests)
+    title = f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size"
+    columns = (head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}"))
+    better = (f"{real}: better", "{published_better}"), ("simulated agrees", "{agreement:share}")
+    yield _table(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better)
+    title = f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)"
+    shares = validation.shares
+    if len(shares):
+        low, high = (shares[name].astype(float) for name in interval_names("published_share"))
+        share = shares["simulated_share"].astype(float)
+        shares = shares.assign(mark=np.where((share < low) | (share > high), "*", ""))
+    count = real, "{published_count:.0f} of {published_n:.0f}"
+    simulated = ("simulated", "{simulated_share:share}"), ("", "{mark}")
+    interval = _interval("published_share", ".0%")
+    yield _table(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
+    conditions = validation.conditions
+    if len(conditions):
+        conditions = conditions[conditions["metric"].isin(PAPER_METRICS)]
+    sides = [(name, f"{{{side}_{name}:.2f}}") for side in ("real", "simulated") for name in ("median", "std")]
+    counts = ("condition", "{condition:.0f}"), ("n", "{real_n:.0f}")
+    columns = (*head, *counts, *sides, ("difference", "{difference_of_medians:+.2f}"))
+    yield _table(conditions, f"Condition by condition: {runs}, then simulated", "ll", *columns)
+    stds = (f"std: {real}", "{real_std:.2f}"), ("simulated", "{simulated_std:.2f}"), ("ratio", "{std_ratio:.2f}")
+    columns = (*head, ("|difference|", "{difference:.2f}"), *stds)
+    within = over_conditions(validation.conditions)
+    yield _table(within, "Within conditions: medians over the conditions", "ll", *columns)
+    rows = [_target(each) for each in rows_of(validation.targets)]
+    yield Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl")
+
+
+def _target(each: Row) -> tuple[str, ...]:
+    kind = each["kind"]
+    what = f"{METRICS[each['what']].brief}: {_KINDS[kind]}" if kind in _KINDS else each["what"]
+    style = ".0%" if kind in ("conclusion", "share") else ".2f"
+    value, low, high = (format(_Number(each[name]), style) for name in ("value", "low", "high"))
+    must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else ""
+    return each["subject"], what, value, must_be, _VERDICTS[each["met"]]

@@ -62,8 +62,7 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
         ("", 1, "has no column 'manager'"),
         ("manager,search_time_s\nnone,1\n", 1, "has no column 'distance_inspected_m'"),
         (f"{OWN},manager\nnone,1,2,none\n", 1, "has column 'manager' twice"),
-        (OWN.replace(",", ";") + "\nnone;1;2\n", 1, "has its columns separated by semicolons"),
-        (OWN.replace(",", "\t") + "\nnone\t1\t2\n", 1, "has its columns separated by tabs"),
+        (OWN.replace(",", ";") + "\nnone;1;2\n", 1, "has no column 'manager'"),
         (f"{OWN}\n", 1, "has no mission"),
         (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s: expected a finite number, got 'soon'"),
         (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m: expected a finite number, at least 0, got ''"),
@@ -91,20 +90,16 @@ def test_a_wrong_file_is_named_with_its_line_and_what_would_be_right(write, cont
 
 def test_a_simulated_file_must_have_each_manager(write):
     runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
-    runs.check_simulated(["none"], None)
+    runs.check_simulated(["none"])
     with pytest.raises(InputError, match="no mission of manager 'bt'"):
-        runs.check_simulated(["none", "bt"], None)
+        runs.check_simulated(["none", "bt"])
 
 
-def test_a_simulated_file_must_be_of_one_scenario_and_of_the_one_named(write):
-    runs = read_runs(write("runs.csv", f"scenario,{OWN}\nsea,none,1,2\n"))
-    runs.check_simulated(["none"], "sea")
-    runs.check_simulated(["none"], None)
-    with pytest.raises(InputError, match="line 2: has missions of scenario sea, not of lake"):
-        runs.check_simulated(["none"], "lake")
+def test_a_simulated_file_must_be_of_one_scenario(write):
+    read_runs(write("runs.csv", f"scenario,{OWN}\nsea,none,1,2\n")).check_simulated(["none"])
     mixed = read_runs(write("mixed.csv", f"scenario,{OWN}\nsea,none,1,2\nlake,none,1,2\n"))
     with pytest.raises(InputError, match="line 3: has missions of several scenarios: sea and lake"):
-        mixed.check_simulated(["none"], None)
+        mixed.check_simulated(["none"])
 
 
 def test_further_columns_are_numbers_where_all_their_values_are(write):
@@ -141,15 +136,13 @@ def test_rows_of_averages_and_blank_rows_of_the_exemplars_files_are_left_out(wri
     assert runs.notes == (f"{runs.path}: lines {lines} left out: averages, not missions",)
 
 
-def test_files_of_the_exemplar_that_were_put_together_are_read_under_each_of_their_headers(write):
+def test_files_of_the_exemplar_that_were_put_together_are_read(write):
     rows = [OF_2023.format("none", 204, 27.1), "", HEADER_2023, OF_2023.format("random", -1, 0.0)]
-    rows += [HEADER_1_5, OF_1_5.format("bt", False, 251, 0.0, 0.0), OF_1_5.format("bt", True, 44, 47.6, 0.05)]
     runs = read_runs(write("results.csv", "\n".join([HEADER_2023, *rows])))
-    assert runs.frame["manager"].tolist() == ["none", "random", "bt", "bt"]
-    assert runs.frame["search_time_s"].tolist() == [204.0, 300.0, 251.0, 44.0]
-    assert runs.frame["pipeline_found"].tolist() == [1.0, 0.0, 0.0, 1.0]
-    assert runs.frame.index.tolist() == [2, 5, 7, 8]
-    assert runs.frame["mean_reaction_time_s"].isna().tolist() == [True, True, True, False]
+    assert runs.frame["manager"].tolist() == ["none", "random"]
+    assert runs.frame["search_time_s"].tolist() == [204.0, 300.0]
+    assert runs.frame["pipeline_found"].tolist() == [1.0, 0.0]
+    assert runs.frame.index.tolist() == [2, 5]
 
 
 def test_an_error_below_a_repeated_header_names_its_own_line(write):

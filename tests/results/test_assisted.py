@@ -154,7 +154,7 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit() -> None:
 @pytest.mark.parametrize(
     ("changed", "text"),
     [
-        ({"real": real_missions(2, points=POINTS + 9.0)}, "no condition of the campaign has start.y_m=10.1"),
+        ({"real": real_missions(2, points=POINTS + 9.0)}, "that have start.y_m=10.1: none"),
         ({"same": missions(2, POINTS, 1)}, "there is 1 simulated mission"),
         ({"same": missions(2, POINTS[:1], 5)}, "sweep no conditions"),
         ({"real": real_missions(2, points=POINTS[:2])}, "there are 2 conditions"),

@@ -58,8 +58,6 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
         "validation_shares.csv",
         "validation_targets.csv",
         "validation.json",
-        "distributions.png",
-        "detections.png",
     }
     cells = rows(tmp_path / "out" / "validation.csv")
     assert [(cell["manager"], cell["published_n"], cell["simulated_n"]) for cell in cells[:3]] == [
@@ -68,7 +66,7 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
         ("random", "20", "3"),
     ]
     sources = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]
-    assert (sources["scenario"], sources["runs"], sources["data"]["file"]) == (
+    assert (sources["scenario"], sources["runs"], sources["data"][0]["file"]) == (
         "seams2023",
         3,
         "shipped/seams2023_runs.csv",
@@ -81,7 +79,7 @@ def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validat
     ended = validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options)
     assert ended.status == 0
     assert not (tmp_path / "recorded" / "runs.csv").exists()
-    for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv", "detections.png"):
+    for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv"):
         assert (tmp_path / "recorded" / name).read_bytes() == (tmp_path / "simulated" / name).read_bytes()
 
 
@@ -90,9 +88,6 @@ def test_the_published_runs_against_themselves_meet_every_target(validate):
     assert ended.status == 0
     assert "28 of 28 targets are met, 0 are not met." in ended.out
     assert "NOT MET" not in ended.out
-    told = " ".join(ended.out.split())
-    assert "A KS p of 0.05 or more does not show that distributions are equal" in told
-    assert "differ by more than about 43%." in told  # 20 missions against 20: 1.358 * sqrt(2 / 20)
 
 
 def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
@@ -122,13 +117,13 @@ def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tm
             ["--data", "missing.csv"],
             "missing.csv: no such file (give a path, or one of the shipped files: planta_exp1",
         ),
-        (["--data", "unknown.csv"], "unknown.csv: line 2: there is no manager 'magic'"),
+        (["--data", "unknown.csv"], "there is no manager 'magic'"),
         (["--data", "words.csv"], "words.csv: line 2: search_time_s: expected a finite number, got 'soon'"),
         (["--managers", "nobody"], "has no mission of manager 'nobody'"),
         (["--runs", "0"], "runs: 0 "),
         (["--targets", "missing.yaml"], "missing.yaml: no such file"),
         (["--runs-file", "other.csv"], "other.csv: has no mission of manager 'none'"),
-        (["release15", "--runs-file", "scenario.csv"], "scenario.csv: line 2: has missions of scenario seams2023"),
+        (["--runs-file", "scenario.csv"], "scenario.csv: line 3: has missions of several scenarios"),
         (["--runs-file", "scenario.csv", "--reasoner", "pellet"], "--reasoner cannot be used with --runs-file"),
         (["--runs-file", str(DATA), "--out", "full"], "full: the output folder is not empty"),
         (["--runs", "1", "--out", "full"], "full: the output folder is not empty"),
@@ -139,7 +134,7 @@ def test_bad_input_is_one_line_and_status_2_and_writes_nothing(validate, tmp_pat
         "unknown.csv": f"{HEADER}\nmagic,1,2\n",
         "words.csv": f"{HEADER}\nnone,soon,2\n",
         "other.csv": f"{HEADER}\nbt,1,2\n",
-        "scenario.csv": f"scenario,{HEADER}\nseams2023,none,1,2\n",
+        "scenario.csv": f"scenario,{HEADER}\nseams2023,none,1,2\nrelease15,none,1,2\n",
         "full/results.txt": "mine",
     }
     (tmp_path / "full").mkdir()

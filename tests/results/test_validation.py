@@ -11,7 +11,6 @@ from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.results.real import Share, read_targets, targets_beside
 from suave_des.results.validation import JSON_FILE, TABLES, validate
-from suave_des.results.validation_output import detections_png, distributions_png
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 MANAGERS = ("none", "random", "metacontrol")
@@ -124,13 +123,6 @@ class TestFiles:
         assert len(files[TABLES["cells"]].splitlines()) == 7
         assert len(files[TABLES["pairs"]].splitlines()) == 7
         assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
-
-    @pytest.mark.usefixtures("few_resamples")
-    def test_figures_are_pictures_and_repeat(self, good, published, like_published):
-        for draw in (distributions_png, detections_png):
-            picture = draw(good, published, like_published)
-            assert picture.startswith(b"\x89PNG")
-            assert picture == draw(good, published, like_published)
 
 
 class TestSplitCheck:

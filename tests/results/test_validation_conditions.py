@@ -36,8 +36,8 @@ def test_a_column_may_give_the_number(column):
 @pytest.mark.parametrize(
     ("columns", "problem", "row"),
     [
-        ({"start.y_m": [2.455, 3.9]}, "no condition of the campaign has start.y_m=3.9", "1"),
-        ({"start.y_m": [2.8]}, "conditions 2, 3 of the campaign all have start.y_m=2.8", "0"),
+        ({"start.y_m": [2.455, 3.9]}, "that have start.y_m=3.9: none", "1"),
+        ({"start.y_m": [2.8]}, "that have start.y_m=2.8: 2, 3", "0"),
         ({"block": [1, 4]}, "block: there is no condition 4", "1"),
         ({"block": [0]}, "block: there is no condition 0", "0"),
         ({"block": [1.5]}, "block: there is no condition 1.5", "0"),
@@ -145,10 +145,6 @@ def test_reaction_times_are_compared_of_the_missions_that_have_one():
     assert reaction[["published_n", "published_mean"]].tolist() == [3, 2.0]
 
 
-@pytest.mark.parametrize(
-    ("wanted", "problem"),
-    [("nonw", "no mission of manager 'nonw'"), (",", "no managers")],
-)
-def test_managers_without_missions_or_named_twice_are_refused(write, wanted, problem):
-    with pytest.raises(InputError, match=problem):
-        read_real([write("runs.csv", f"{OWN}\nnone,1,2\n")]).choose(wanted)
+def test_managers_without_missions_are_refused(write):
+    with pytest.raises(InputError, match="no mission of manager 'nonw'"):
+        read_real([write("runs.csv", f"{OWN}\nnone,1,2\n")]).choose(["nonw"])
