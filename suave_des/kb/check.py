@@ -9,7 +9,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from rdflib import RDF, Graph, Namespace, URIRef
 from rdflib.term import Node
@@ -27,19 +27,18 @@ from suave_des.kb.space import (
 from suave_des.knowledge.checks import Subject, check_revision, findings_in, rules_of_2023, static_findings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, place_of
-from suave_des.knowledge.pellet import ReasonerTimeoutError, TimeLimit
+from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import HAS_VALUE, local_name
 from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState, measurement_name
 from suave_des.monitor.diagnostics import RECOVERED
 from suave_des.resources import shipped_folder
 
-__all__ = ["MAX_STATES", "Subject", "check", "combined", "simple_states"]
+__all__ = ["MAX_STATES", "Subject", "check", "states_to_ask"]
 
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
-_PARTS: Final = ("groundings", "components", "measurements")
 _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.INFO}
 
 
@@ -90,16 +89,8 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
     try:
         # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
         pellet = Reasoner(base, "cached", TimeLimit(subject.time_limit_s, "--time-limit"))
-        states = tuple(islice(simple_states(base, subject.measured), MAX_STATES)) or (KnowledgeState(),)
-        try:
-            for state in combined(states, apart=bool(rules_of_2023(base.content))):
-                pellet.analyze(state)
-        except ReasonerTimeoutError:
-            raise
-        except KnowledgeError:
-            for state in states:  # the first that contradicts itself is the easiest to understand
-                pellet.analyze(state)
-            raise  # only a combination does
+        for state in [KnowledgeState(), *islice(states_to_ask(base, subject.measured), MAX_STATES)]:
+            pellet.analyze(state)
     except InputError as error:
         found = Finding.of(error)
         if found.rule not in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
@@ -111,64 +102,29 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
             yield Finding(Level.INFO, message)
 
 
-def combined(states: Sequence[KnowledgeState], *, apart: bool = False) -> tuple[KnowledgeState, ...]:
-    """Combine states that do not exclude one another: 45 instead of 186 for the shipped ontologies.
+def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:
+    """States in which contradictions are looked for: all designs, reports, and ranges of measured values occur in one.
 
-    A contradiction occurs in every state that contains it: Pellet's reasoning is monotonic.
-
-    Args:
-        states: the states.
-        apart: whether recovered components are left in states of their own, because the rules of 2023 contradict any
-            other problem then.
+    Pellet's reasoning is monotonic, so a contradiction occurs in every state that contains it. Only attributes that
+    have an effect and, if those are given, are measured count, and one component of those that are treated alike. With
+    the rules of 2023, which contradict any other problem once a component recovered, that is in states of its own.
     """
-    joined: list[dict[tuple[str, str], Any]] = []
-    for state in states:
-        parts: dict[tuple[str, str], Any] = {
-            (kind, name): value for kind in _PARTS for name, value in getattr(state, kind)
-        }
-        is_apart = apart and RECOVERED in dict(state.components).values()
-        fitting = (
-            other
-            for other in joined
-            if not (apart and (is_apart or RECOVERED in other.values()))
-            and all(other.get(key, value) == value for key, value in parts.items())
-        )
-        if (found := next(fitting, None)) is None:
-            joined.append(parts)
-        else:
-            found.update(parts)
-    return tuple(
-        KnowledgeState.of(
-            map(ObjectiveState, (name for kind, name in parts if kind == "groundings")),
-            **{kind: {name: value for (each, name), value in parts.items() if each == kind} for kind in _PARTS},
-        )
-        for parts in joined
-    )
-
-
-def simple_states(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:
-    """Each design in use, alone, with a report of a component, and with a value in each range of each attribute.
-
-    Only attributes that have an effect and, if those are given, are measured count, and one component of those that
-    are treated alike.
-    """
-    scale = Scale(numbers_in(base))
-    reports = [{group[0]: status} for group in interchangeable_components(base) for status in component_statuses(base)]
-    measurements = [
-        {name: value}
-        for name in base.quality_attributes
-        if has_effect(base, name) and (measured is None or name in measured)
-        for place in range(1, len(scale))
-        if (value := scale.value(place)) is not None
+    scale, groups = Scale(numbers_in(base)), interchangeable_components(base)
+    apart = RECOVERED if rules_of_2023(base.content) else None
+    attributes = [
+        name for name in base.quality_attributes if has_effect(base, name) and (measured is None or name in measured)
     ]
-    for reported, values in (({}, {}), *((each, {}) for each in reports), *(({}, each) for each in measurements)):
-        for function in base.functions:
-            for design in base.designs(function):
+    designs = {function: found for function in base.functions if (found := base.designs(function))}
+    for number in range(max(map(len, designs.values()), default=0)):
+        groundings = {function: found[number % len(found)] for function, found in designs.items()}
+        for status in component_statuses(base):
+            for place in range(len(scale) if attributes and status != apart else 1):
+                value = scale.value(place)
                 yield KnowledgeState.of(
-                    [ObjectiveState(function)],
-                    groundings={function: design},
-                    components=reported,
-                    measurements=values,
+                    map(ObjectiveState, groundings),
+                    groundings=groundings,
+                    components={group[0]: status for group in groups},
+                    measurements={} if value is None else dict.fromkeys(attributes, value),
                 )
 
 

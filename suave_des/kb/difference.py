@@ -5,7 +5,7 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -15,17 +15,13 @@ from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate
-from suave_des.kb.matching import Probes
 from suave_des.kb.policy import Policy
-from suave_des.kb.space import PolicySpace, Situation
+from suave_des.kb.space import PolicySpace
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
-from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.rules import literal_text
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, Metric, metric_of
-from suave_des.scenario.loader import Replacements, load_scenario
-from suave_des.scenario_knowledge import open_base
+from suave_des.scenario.loader import Replacements
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
@@ -232,17 +228,13 @@ class MissionDifference(NamedTuple):
         return Table(("", "A", "B", "B - A", "95% interval", "different"), rows)
 
     def lines(self) -> Iterator[str]:
-        """Which missions differ, and the largest changes each way."""
+        """Which missions differ."""
+        if not self.changed:
+            yield "no mission differs; kb try says whether the rules fire in recorded missions"
+            return
         more = len(self.changed) - _MOST_RUNS
         numbers = ", ".join(map(str, self.changed[:_MOST_RUNS]))
         yield f"runs that differ: {numbers}" + (f" and {more} more" if more > 0 else "")
-        yield "largest changes"
-        for metric, pairs, _, _ in self.metrics:
-            change = (pairs["b"] - pairs["a"]).to_numpy()
-            for at in sorted({change.argmin(), change.argmax()}) if metric.name in METRICS and change.any() else ():
-                if change[at]:
-                    run, (one, other) = pairs.index.to_numpy()[at], pairs.to_numpy()[at]
-                    yield f"  run {run}: {metric.title} {one:.1f} {metric.unit} -> {other:.1f} {metric.unit}"
 
 
 def compare_missions(
@@ -280,40 +272,6 @@ def compare_missions(
         remedy = "suave-des campaign with the same files says why"
         raise InputError(f"{runs - len(common)} of {runs} missions failed", remedy=remedy)
     return paired(before.loc[common], after.loc[common])
-
-
-def firing_states(
-    scenario: str, runs: int, one: Replacements, other: Replacements, *, seed: int, limit: TimeLimit
-) -> tuple[int, int]:
-    """Count the states of missions with one knowledge base in which a rule fires that only one of the two has.
-
-    Args:
-        scenario, runs, one, other, seed: as of compare_missions.
-        limit: of Pellet's time for one state.
-
-    Returns:
-        how many states, and of how many.
-    """
-    from suave_des.api import run_mission
-
-    loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
-    bases = list(map(open_base, loaded))
-    texts = [{rule.text for rule in base.content.enabled_rules} for base in bases]
-    changed = [
-        rule.body for base in bases for rule in base.content.enabled_rules if not all(rule.text in t for t in texts)
-    ]
-    probes = Probes(bases[1], limit, changed)
-    regions = regions_of(bases[1])
-    fires: dict[Hashable, bool] = {}
-    states = firing = 0
-    for run in range(1, runs + 1):
-        for record in run_mission(loaded[0], _MANAGER, run, seed).knowledge:
-            key = regions.key(record.state)
-            if key not in fires:
-                fires[key] = bool(probes.holding(Situation(record.state)))
-            states += 1
-            firing += fires[key]
-    return firing, states
 
 
 def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:

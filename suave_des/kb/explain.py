@@ -1,4 +1,4 @@
-"""Explain why a fact follows, why a function design is chosen or not, and why a state contradicts itself."""
+"""Explain why a fact follows, and why a function design is chosen or not."""
 
 from __future__ import annotations
 
@@ -18,10 +18,8 @@ from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, facts_of, local_name, value_of
 from suave_des.knowledge.state import (
     NO_GROUNDING,
-    ContradictionError,
     Decision,
     Fact,
-    KnowledgeState,
     Reasoning,
     objective_name,
     value_text,
@@ -107,16 +105,10 @@ class Explanation:
     Attributes:
         facts: how facts follow.
         decisions: why functions get their designs.
-        contradiction: for a state that contradicts itself, what Pellet says about it.
-        rules: the rules that take part in the contradiction.
-        clashes: how each of the values follows that a functional property would have.
     """
 
     facts: tuple[Derivation, ...] = ()
     decisions: tuple[DecisionExplanation, ...] = ()
-    contradiction: str | None = None
-    rules: tuple[str, ...] = ()
-    clashes: tuple[tuple[Derivation, ...], ...] = ()
 
     def __str__(self) -> str:
         """As `kb explain` prints it."""
@@ -124,14 +116,6 @@ class Explanation:
 
     def lines(self) -> Iterator[str]:
         """All of it, one fact or decision after the other."""
-        if self.contradiction is not None:
-            yield f"contradiction: {self.contradiction}"
-            yield f"rules in it: {', '.join(self.rules) or 'none'}"
-            for sides in self.clashes:
-                yield f"{sides[0].fact.property} of {sides[0].fact.subject} would have {len(sides)} values:"
-                for side in sides:
-                    yield from side.lines("  ")
-            return
         for derivation in self.facts:
             yield from derivation.lines()
         for decision in self.decisions:
@@ -140,33 +124,20 @@ class Explanation:
             yield "nothing is inferred, and nothing is decided"
 
 
-def explain(
-    base: Ontology,
-    state: KnowledgeState,
-    question: str,
-    reasoning: Reasoning | ContradictionError,
-    pellet: InProcessPellet,
-) -> Explanation:
+def explain(base: Ontology, question: str, reasoning: Reasoning, pellet: InProcessPellet) -> Explanation:
     """Answer a question about a state; see KnowledgeBase.explain.
 
     Args:
         base: the ontologies and rules.
-        state: the state.
         question: a fact, "why DESIGN?", "why not DESIGN?", or nothing.
-        reasoning: what is inferred of all terms and planned in the state, or that it contradicts itself.
+        reasoning: what is inferred of all terms and planned in the state.
         pellet: with the ontologies, made by `pellet_for`.
     """
     question = question.strip()
     why = _WHY.fullmatch(question)
     if question and not why and "(" not in question:
         raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
-    tracer = Tracer(base, state, pellet)
-    if isinstance(reasoning, ContradictionError):
-        problem, clashes, rules = tracer.clashes()
-        if not rules and not clashes:
-            raise reasoning  # the message has all there is to say
-        return Explanation(contradiction=problem, clashes=clashes, rules=rules)
-    explainer = _Explainer(base, reasoning, tracer)
+    explainer = _Explainer(base, reasoning, Tracer(base, reasoning.inference.state, pellet))
     if why:
         return Explanation(decisions=(explainer.design(why.group(2), wanted=why.group(1) is None),))
     if question:

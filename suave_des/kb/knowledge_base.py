@@ -190,7 +190,7 @@ class KnowledgeBase:
         return self._with_all_terms.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
-        """Explain why a fact or a decision follows in a state, or why the state contradicts itself.
+        """Explain why a fact or a decision follows in a state.
 
         Args:
             state: the state.
@@ -199,15 +199,11 @@ class KnowledgeBase:
 
         Raises:
             InputError: the question is none of these, or names what the knowledge base does not have.
-            KnowledgeError: the reasoner takes too long.
+            KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
         """
-        reasoning: Reasoning | ContradictionError
-        try:
-            reasoning = self.infer(state)
-        except ContradictionError as error:
-            reasoning = error
+        reasoning = self.infer(state)
         return self.limit.run(
-            lambda: explain(self.base, state, question, reasoning, self._tracing_pellet),
+            lambda: explain(self.base, question, reasoning, self._tracing_pellet),
             f"explaining the state {state}",
             self.base.rules,
         )

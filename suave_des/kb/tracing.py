@@ -25,11 +25,9 @@ from suave_des.knowledge.pellet.in_process import (
 )
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, fact_of, is_fact, n_triple
 from suave_des.knowledge.rules import Atom, AtomKind, Rule
-from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState
+from suave_des.knowledge.state import Fact, KnowledgeState
 
-_FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
-_FUNCTIONAL: Final = OWL + "FunctionalProperty"
 
 
 @dataclass(frozen=True)
@@ -132,12 +130,9 @@ class Tracer:
         """Derive a triple that is entailed."""
         with one_at_a_time:
             found = self._derive(_canonical(triple), frozenset())
-            if found is None:  # what Pellet says that it follows from, without the steps between
+            if found is None:  # the axioms that Pellet says that it follows from, without the steps between
                 trace = self._trace(triple, self.asserted, self.base.content.enabled_rules)
-                named = {fact.groups() for axiom in trace.axioms if (fact := _FACT.match(axiom))}
-                leaves = [each for each in sorted(self.asserted, key=str) if _as_axiom(each) in named]
-                premises = tuple(map(self._leaf, leaves))
-                found = Derivation(self._fact(triple), "axioms", premises=premises, axioms=self._axioms(trace))
+                found = Derivation(self._fact(triple), "axioms", axioms=self._axioms(trace))
             return found
 
     def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
@@ -186,44 +181,6 @@ class Tracer:
                     axioms = self._axioms(self._trace(triple, [other]))
                     yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
 
-    def clashes(self) -> tuple[str, tuple[tuple[Derivation, ...], ...], tuple[str, ...]]:
-        """Explain a state that contradicts itself.
-
-        What follows if no property is functional is what clashes.
-
-        Returns:
-            what Pellet says; how each value follows of each functional property that has several; and the names of the
-            rules involved.
-        """
-        content, names = self.base.content, self.base.names
-        triples = tuple(each for each in content.triples if each[1:] != (RDF_TYPE, _FUNCTIONAL))
-        functional = {each[0] for each in content.triples if each[1:] == (RDF_TYPE, _FUNCTIONAL)}
-        relaxed = Tracer(replace(self.base, content=replace(content, triples=triples)), self.state)
-        values: dict[tuple[str, str], list[Triple]] = {}
-        try:
-            for triple in relaxed.known:
-                if triple[1] in functional:
-                    values.setdefault((names.short(triple[0]), names.short(triple[1])), []).append(triple)
-        except ContradictionError:  # for another reason, too
-            values = {}
-        sides = {key: tuple(map(relaxed.derive, found)) for key, found in values.items() if len(found) > 1}
-        # What follows from another clash is not one of its own.
-        clashes = {
-            key: each
-            for key, each in sides.items()
-            if not any(
-                (g.fact.subject, g.fact.property) in sides for one in each for top in one.premises for g in top.all()
-            )
-        }
-        if clashes:
-            rules = {name for each in clashes.values() for side in each for name in side.rules()}
-            message = "; ".join(f"{subject} has two values of the functional {name}" for subject, name in clashes)
-            return message, tuple(clashes.values()), tuple(sorted(rules))
-        with one_at_a_time:
-            trace = trace_contradiction(self._text(self.asserted, content.enabled_rules))
-        rules = {self.base.rules[number].name for number in trace.rules}
-        return self._shorten(trace.message).strip(), (), tuple(sorted(rules))
-
     def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
         """What Pellet says of the property or class of an atom, from a fact and the schema alone."""
         key = fact, asked
@@ -241,11 +198,8 @@ class Tracer:
 
     def _axioms(self, trace: Trace) -> tuple[str, ...]:
         """The axioms of the schema in a trace: domains, subclasses and the like."""
-        return tuple(self._shorten(each) for each in trace.axioms if not each.startswith(("rule(", "prop(", "type(")))
-
-    def _shorten(self, text: str) -> str:
-        """A text of Pellet's with names in place of IRIs."""
-        return _IRI.sub(lambda iri: self.base.names.short(iri.group()), text)
+        schema = (each for each in trace.axioms if not each.startswith(("rule(", "prop(", "type(")))
+        return tuple(_IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema)
 
     def _leaf(self, triple: Triple) -> Derivation:
         return Derivation(self._fact(triple), "state" if triple in self.base.assertions(self.state) else "ontology")
@@ -267,12 +221,6 @@ def pellet_for(base: Ontology) -> InProcessPellet:
 
 def _canonical(triple: Triple) -> Triple:
     return (*triple[:2], canonical(triple[2]))
-
-
-def _as_axiom(triple: Triple) -> tuple[str, str, str]:
-    """The beginning of a fact as Pellet writes it: enough to identify it among those asserted."""
-    subject, predicate, value = triple
-    return ("type", subject, str(value)) if predicate == RDF_TYPE else ("prop", predicate, subject)
 
 
 def _denial(triple: Triple) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import subprocess
@@ -14,9 +15,10 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.errors import KnowledgeError
 from suave_des.findings import Level
-from suave_des.kb.check import Subject, check, combined, simple_states
+from suave_des.kb.check import Subject, check, states_to_ask
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.reasoner import regions_of
 from suave_des.resources import shipped_folder
 from tests.helpers.checks import SUAVE, errors, findings_of, found_by_pellet, only, subject
 from tests.helpers.owl_text import individual
@@ -51,12 +53,15 @@ def test_shapes_are_checked_once_for_the_same_files(tmp_path: Path, monkeypatch:
         shaped("other")
 
 
-def test_pellet_is_asked_for_fewer_states_that_contain_all_simple_ones() -> None:
+def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report_and_range() -> None:
     base = Ontology.load()
-    simple = tuple(simple_states(base))
-    asked = [set(base.assertions(state)) for state in combined(simple)]
-    assert len(asked) < len(simple) / 3
-    assert all(any(every >= set(base.assertions(state)) for every in asked) for state in simple)
+    states = list(states_to_ask(base))
+    assert len(states) < 100
+    for function in base.functions:
+        wanted = set(itertools.product(base.designs(function), ("FALSE", "RECOVERED")))
+        assert {(state.grounded(function), state.components[0][1]) for state in states} == wanted
+        wanted = set(itertools.product(base.designs(function), regions_of(base).thresholds))
+        assert {(state.grounded(function), *state.measured("water_visibility")) for state in states} > wanted
 
 
 def test_an_attribute_that_is_declared_again_with_the_same_operator_is_no_error(edited) -> None:

@@ -14,13 +14,11 @@ from suave_des.kb.difference import (
     compare_axioms,
     compare_missions,
     compare_policies,
-    firing_states,
     joined,
     paired,
 )
 from suave_des.kb.space import PolicySpace
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import TimeLimit
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, TOMASYS
@@ -77,17 +75,6 @@ def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other
     assert other <= 21 < one and search.difference.value == other - one
 
 
-@pytest.mark.parametrize("number", [0, 9])
-def test_states_are_counted_in_which_a_rule_fires_that_only_one_of_two_has(tmp_path: Path, number: int) -> None:
-    """Visibility is above 0 in every mission, and never above 9 m, whichever of the two has the rule."""
-    body = f"isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ greaterThan(?v, {number})"
-    more = {"rules": [rules_file(tmp_path, f"own: {body} -> fd_realisability(fd_spiral_high, false)")]}
-    short = {"values": {"mission.time_limit_s": 20}}
-    for one, other in ((more, {}), ({}, more)):
-        firing, states = firing_states("seams2023", 1, {**short, **one}, {**short, **other}, seed=1, limit=TimeLimit())
-        assert states > 0 and firing == (states if number == 0 else 0)
-
-
 def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):
     shipped = shipped_folder("ontology") / "suave.owl"
     arguments = ("diff", shipped, bolder, "--max-failed", "0", "--quiet", "--missions")
@@ -108,8 +95,7 @@ def test_the_difference_of_missions_is_the_second_less_the_first() -> None:
         assert (*metric.pairs.mean(), metric.difference.value) == pytest.approx((310 / 3, 320 / 3, 10 / 3))
         assert interval is not None and interval[0] < 10 / 3 < interval[1]
         assert metric.changed == 2
-    said = list(found.lines())
-    assert said[0] == "runs that differ: 1, 2" and "120.0 s -> 126.0 s" in said[2]
+    assert list(found.lines()) == ["runs that differ: 1, 2"]
 
 
 def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_missions() -> None:

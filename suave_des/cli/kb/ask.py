@@ -108,7 +108,7 @@ def explain(
     ] = "",
     at: At = None,
 ) -> None:
-    """Explain why a fact follows in a state, why a design is chosen or not, or why the state contradicts itself."""
+    """Explain why a fact follows in a state, or why a design is chosen or not."""
     knowledge = options.knowledge()
     print(knowledge.explain(state_at(at, knowledge), question))
 
@@ -188,12 +188,16 @@ def why_not(
 
     The exit status is 0 even if a rule fires.
     """
-    from suave_des.kb.states import ManagingSettings, StateBuilder
+    from suave_des.kb.states import FactReader, ManagingSettings, StateBuilder
     from suave_des.kb.why_not import RuleQuestions
     from suave_des.knowledge.pellet import TimeLimit
+    from suave_des.scenario_knowledge import open_base
 
     loaded = options.loaded()
-    questions = RuleQuestions.open(loaded, facts or ())
+    base = open_base(loaded)
+    reader = FactReader(base)
+    reader.declare(facts or ())
+    questions = RuleQuestions(base.with_facts(map(reader.triple, facts or ())))
     builder = StateBuilder(questions.base, ManagingSettings.of(loaded.scenario))
     builder.add_words(at or ())
     state, limit = builder.state(), TimeLimit(time_limit, "--time-limit")

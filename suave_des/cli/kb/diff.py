@@ -60,7 +60,7 @@ def diff(
     if missions is not None:
         print()
         print(shown(missions.table(difference)))
-        print(*missions.lines() if missions.changed else [_firing(both, mission_options)], sep="\n")
+        print(*missions.lines(), sep="\n")
 
 
 def _missions(both: list[ReasonerOptions], options: MissionOptions) -> MissionDifference:
@@ -77,15 +77,3 @@ def _missions(both: list[ReasonerOptions], options: MissionOptions) -> MissionDi
             workers=options.workers,
             on_progress=on_progress,
         )
-
-
-def _firing(both: list[ReasonerOptions], options: MissionOptions) -> str:
-    """Whether rules that only one of the two has fire at all."""
-    from suave_des.kb.difference import firing_states
-    from suave_des.knowledge.pellet import TimeLimit
-
-    assert options.missions is not None
-    replaced = [each.replacements | {"modes_file": options.modes} for each in both]
-    limit = TimeLimit(both[0].time_limit, "--time-limit")
-    firing, states = firing_states(both[0].scenario, options.missions, *replaced, seed=options.seed, limit=limit)
-    return f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"
