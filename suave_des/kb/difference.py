@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-import pandas
 import rdflib
 from rdflib.term import Node
 
@@ -25,6 +24,8 @@ from suave_des.scenario.loader import Replacements
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
+    import pandas
+
     from suave_des.campaign.progress import OnProgress
 
 #: Metrics of missions that are always compared; others are where they differ.
@@ -151,6 +152,8 @@ class PolicyDifference:
 
 def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
     """Compare two policies over the same space."""
+    import pandas
+
     functions = tuple(name for name in one.functions if name in other.functions)
     compared = [*(f"{name}_then" for name in functions), "statuses"]
     both = one.cases.merge(other.cases[["state", *compared]], on="state", suffixes=("_a", "_b"))
@@ -184,7 +187,8 @@ def joined(cells: pandas.DataFrame, attributes: Sequence[str]) -> pandas.DataFra
         found["run"] = (found[first] != found.groupby(same)[last].shift() + 1).cumsum()
         ranges = found.groupby([*same, "run"], as_index=False)
         found = ranges.agg(**{first: (first, "min"), last: (last, "max"), "states": ("states", "sum")})
-    return pandas.DataFrame(found.groupby(["all", *ends], as_index=False)["states"].sum())
+    joined_ranges: pandas.DataFrame = found.groupby(["all", *ends], as_index=False)["states"].sum()
+    return joined_ranges
 
 
 class PairedDifference(NamedTuple):
@@ -276,6 +280,8 @@ def compare_missions(
 
 def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:
     """Compare rows of runs.csv with the same run numbers, which are their index."""
+    import pandas
+
     from suave_des.results.statistics import mean_interval
 
     differs = before.ne(after) & ~(before.isna() & after.isna())

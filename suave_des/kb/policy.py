@@ -6,9 +6,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, NamedTuple
-
-import pandas
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.space import (
@@ -27,6 +25,9 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, KnowledgeState
 from suave_des.tables import Table
+
+if TYPE_CHECKING:  # an inference alone needs no pandas, the larger part of its start
+    import pandas
 
 FLIP_FLOP: Final = "flip-flop"
 _EXAMPLES: Final = 5
@@ -124,6 +125,8 @@ def make_policy(
             file=", ".join(map(str, base.files)),
             remedy="give an ontology that uses TOMASys as suave.owl does",
         )
+    import pandas
+
     space = space or PolicySpace.of(base, settings)
     states = States.of(base, settings, max_failed, space)
     depends = Dependence.of(base, space)

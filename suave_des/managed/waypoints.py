@@ -2,8 +2,8 @@
 
 The exemplar's functions check at every tick of a timer whether their way-point is reached; then they send the next one.
 Nothing else changes at most ticks, so a function looks ahead: it queues the next way-points, knows the tick at which
-each will be reached, and sets an alarm for the tick at which it has to act. When the vehicle's control changes earlier,
-it counts the ticks until then, and looks ahead again from there.
+each will be reached, and sets an alarm for the tick at which it has to act. When control or the way-points change
+earlier, it counts what has been reached by then, and looks ahead again at the next tick.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Due(Enum):
     RESEND = auto()
     """It is sent again, as it was not reached in time."""
     LOOK = auto()
-    """Nothing is sent, but looked ahead again: the way-points have changed, or the last one sent is resumed."""
+    """Nothing is sent, but looked ahead again: control or the way-points have changed, or the last one is resumed."""
 
 
 @dataclass(eq=False)
@@ -50,11 +50,10 @@ class WaypointFunction(FunctionNode):
     _due: Due = field(default=Due.SEND, init=False)
     _act_at: int = field(default=0, init=False)  # the next tick at which it acts
     _arrivals: list[int] = field(default_factory=list, init=False)  # ticks that will find the queued ones reached
-    _sent: int = field(default=-1, init=False)  # tick at which the current way-point was sent last
-    _is_sent_again: bool = field(default=False, init=False)  # whether that was not the first time
+    _resend_at: int = field(default=0, init=False)  # tick that sends the current way-point again if it is not reached
 
     def __post_init__(self) -> None:
-        self._alarm, self._looking_again = Alarm(self.env, self._act), Alarm(self.env, self._look_again)
+        self._alarm = Alarm(self.env, self._act)
         self.sender.vehicle.control_listeners.append(self._control_changed)
 
     # What a function says of its way-points.
@@ -90,8 +89,7 @@ class WaypointFunction(FunctionNode):
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
         """Start ticking at mission time t, and send the current way-point, unless the last one sent is resumed."""
-        self._due, self._is_sent_again = Due.LOOK if resumes else Due.SEND, self._is_sent_again and resumes
-        self._arrivals, self._act_at = [], 0
+        self._due, self._arrivals, self._act_at = Due.LOOK if resumes else Due.SEND, [], 0
         if t_s > self.env.now:
             self._alarm.set(t_s)
         else:
@@ -101,11 +99,10 @@ class WaypointFunction(FunctionNode):
         """Stop ticking, and cancel the queued way-points."""
         self.catch_up()
         self._alarm.cancel()
-        self._looking_again.cancel()
         check, self._check = self._check, None
         if check is not None:
             self.sender.vehicle.cancel_waypoints(self.env.now, check)
-            self._sent -= check.last_tick_until(self.env.now) + 1  # on resumption the first tick is 0 again
+            self._resend_at -= check.last_tick_until(self.env.now) + 1  # on resumption the first tick is 0 again
 
     def catch_up(self) -> None:
         """Count the way-points that have been reached by now."""
@@ -117,9 +114,14 @@ class WaypointFunction(FunctionNode):
         check = self._check
         if check is not None and self._act_at > (tick := check.last_tick_until(self.env.now)):
             self.sender.vehicle.cancel_waypoints(self.env.now, check)
-            self._looking_again.cancel()
             self._arrivals, self._due = [], Due.LOOK
             self._set_alarm(check, tick + 1)
+
+    def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
+        """Look ahead again at the next tick after somebody else changes control, which cancels queued way-points."""
+        if self._check is not None and self._check is not check and self._due is not Due.LOOK:
+            self.catch_up()
+            self.waypoints_changed()
 
     def _act(self) -> None:
         """Do what is due at this tick, and look ahead to the next tick at which something is."""
@@ -128,14 +130,13 @@ class WaypointFunction(FunctionNode):
         self._count_arrivals(tick)
         self.tick()
         while self._check is not None and self._act_at == tick:
-            if self._due is Due.RESEND:
+            first = tick if self._due is Due.LOOK else tick + check.first_check_ticks
+            if self._due is Due.SEND:
+                self._resend_at = tick + check.resend_ticks
+            elif self._due is Due.RESEND:
                 self.not_reached()
-                self._is_sent_again = True
-            if self._due is Due.LOOK:
-                self._look_ahead(check, tick, first=tick)
-            else:
-                self._sent = tick
-                self._look_ahead(check, tick, first=tick + check.first_check_ticks)
+                self._resend_at = tick + check.resend_again_ticks
+            self._look_ahead(check, tick, first)
 
     def _look_ahead(self, check: ArrivalCheck, tick: int, first: int) -> None:
         """Queue the way-points, the current one included if it is due, and see when they will be reached."""
@@ -144,9 +145,8 @@ class WaypointFunction(FunctionNode):
             self._check = None
             self.completed()
             return
-        last = self._sent + (check.resend_again_ticks if self._is_sent_again else check.resend_ticks)
         z_m, send = self.set_point_z_m(), self._due is not Due.LOOK
-        self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=last, send=send)
+        self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=self._resend_at, send=send)
         self._due = Due.SEND if self._arrivals[-1:] == [act_at] else Due.RESEND
         if act_at > tick:
             self._set_alarm(check, act_at)
@@ -154,26 +154,13 @@ class WaypointFunction(FunctionNode):
             self._act_at = tick
             self._count_arrivals(tick)
 
-    def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
-        """Look ahead again after a change of control by somebody else, and all others in the same event."""
-        if self._check is not None and self._check is not check and self._due is not Due.LOOK:
-            self._looking_again.set_now()
-
-    def _look_again(self) -> None:
-        check = self._check
-        if check is not None and self._act_at > (tick := check.last_tick_until(self.env.now)):
-            self._count_arrivals(tick)
-            self._due = Due.LOOK
-            self._look_ahead(check, tick, first=tick + 1)
-
     def _count_arrivals(self, tick: int) -> None:
         reached = bisect_right(self._arrivals, tick)
-        if reached:
-            self._sent = self._arrivals[reached - 1]
+        if reached and self._check is not None:
+            self._resend_at = self._arrivals[reached - 1] + self._check.resend_ticks
             del self._arrivals[:reached]
             is_sent_separately = self._due is Due.SEND and not self._arrivals  # the set-point after the last one queued
             self.sender.queued_were_sent(reached - is_sent_separately)
-            self._is_sent_again = False
             self.reached(reached)
 
     def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:

@@ -34,20 +34,21 @@ def tick(self: WaypointFunction) -> None:
             return
         if self._due is not Due.LOOK:
             self.sender.send(*self.waypoints(1)[0, :2].tolist(), self.set_point_z_m())
-            self._sent, self._due = now, Due.LOOK
-        if now < self._sent + check.first_check_ticks:
-            break
+            again = self._due is Due.RESEND
+            self._resend_at = now + (check.resend_again_ticks if again else check.resend_ticks)
+            self._due = Due.LOOK
+            if check.first_check_ticks:
+                break
         here, there = self.sender.vehicle.position(check.time_s(now)), self.waypoints(1)[0, :3].tolist()
         x_m, y_m, z_m = (abs(a - b) for a, b in zip(here, there, strict=True))
         if max(x_m, y_m) <= check.half_width_m and z_m <= check.half_height_m:
             self.reached(1)
-            self._is_sent_again = False
-        elif now >= self._sent + (check.resend_again_ticks if self._is_sent_again else check.resend_ticks):
+            self._due = Due.SEND
+        elif now >= self._resend_at:
             self.not_reached()
-            self._is_sent_again = True
+            self._due = Due.RESEND
         else:
             break
-        self._due = Due.SEND
     self._set_alarm(check, now + 1)
 
 
