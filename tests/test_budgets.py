@@ -25,13 +25,13 @@ def files_of(place: str) -> list[Path]:
 
 
 @pytest.mark.parametrize("place", BUDGETS)
-def test_within_its_budget(place: str) -> None:
+def test_within_its_budget(place):
     lines, modules = size(files_of(place))
     most_lines, most_modules = BUDGETS[place]
     assert lines <= most_lines, f"{place} has {lines} lines: make it simpler, or take its budget from another package"
     assert not most_modules or modules <= most_modules
 
 
-def test_every_package_has_a_budget() -> None:
+def test_every_package_has_a_budget():
     packages = {f"suave_des/{path.name}" for path in (ROOT / "suave_des").iterdir() if (path / "__init__.py").exists()}
     assert packages | {"suave_des", "tests"} <= set(BUDGETS)

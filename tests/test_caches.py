@@ -1,7 +1,5 @@
 """Files of the cache folder: what is damaged there is left out, and several processes share them."""
 
-from __future__ import annotations
-
 import os
 import random
 from concurrent.futures import ProcessPoolExecutor
@@ -24,12 +22,12 @@ def filled(tmp_path: Path) -> Path:
     return file
 
 
-def test_what_was_added_is_read(filled: Path) -> None:
+def test_what_was_added_is_read(filled):
     assert dict(SharedEntries(filled.parent, "d").read()) == ENTRIES
     assert not list(SharedEntries(filled.parent, "e").read())
 
 
-def test_damaged_entries_are_left_out_and_what_follows_them_is_read(filled: Path) -> None:
+def test_damaged_entries_are_left_out_and_what_follows_them_is_read(filled):
     content = filled.read_bytes().replace(b"IN_ERROR_3", b"IN_ERROR_4") + b"\xff\x00 trash [\n" + b"cut sh"
     filled.write_bytes(content)
     entries = SharedEntries(filled.parent, "d")
@@ -38,17 +36,17 @@ def test_damaged_entries_are_left_out_and_what_follows_them_is_read(filled: Path
 
 
 @pytest.mark.parametrize("content", [b"", b"\x80\x04pickled", b"x" * 24 + b" [[],[]]\n"])
-def test_a_file_of_something_else_has_no_entries(filled: Path, content: bytes) -> None:
+def test_a_file_of_something_else_has_no_entries(filled, content):
     filled.write_bytes(content)
     assert not list(SharedEntries(filled.parent, "d").read())
 
 
-def test_a_file_of_other_entries_has_none(filled: Path) -> None:
+def test_a_file_of_other_entries_has_none(filled):
     filled.rename(filled.with_name("e.jsonl"))
     assert not list(SharedEntries(filled.parent, "e").read())
 
 
-def test_random_bytes_are_never_read(filled: Path) -> None:
+def test_random_bytes_are_never_read(filled):
     original = filled.read_bytes()
     draw = random.Random(5)
     for _ in range(300):
@@ -65,13 +63,13 @@ def _add_many(folder: str, number: int) -> None:
         entries.add(f"{number} {count}", "x" * count)
 
 
-def test_several_processes_share_a_file(tmp_path: Path) -> None:
+def test_several_processes_share_a_file(tmp_path):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         list(pool.map(_add_many, [str(tmp_path)] * 2, range(2)))
     assert len(dict(SharedEntries(tmp_path, "d").read())) == 400
 
 
-def test_only_the_latest_files_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_the_latest_files_are_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("suave_des.caches.remove_oldest", lambda folder, pattern: remove_oldest(folder, pattern, 2))
     for number, digest in enumerate("abc"):
         SharedEntries(tmp_path, digest).add("key", digest)
@@ -80,13 +78,13 @@ def test_only_the_latest_files_are_kept(tmp_path: Path, monkeypatch: pytest.Monk
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.jsonl", "c.jsonl"]
 
 
-def test_a_file_that_is_full_gets_no_more_entries(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_full_gets_no_more_entries(filled, monkeypatch):
     monkeypatch.setattr("suave_des.caches.MAX_BYTES", filled.stat().st_size)
     SharedEntries(filled.parent, "d").add("more", 1)
     assert dict(SharedEntries(filled.parent, "d").read()) == ENTRIES
 
 
-def test_a_file_with_a_checksum(tmp_path: Path) -> None:
+def test_a_file_with_a_checksum(tmp_path):
     path = tmp_path / "code"
     assert read_checked(path) is None
     path.write_bytes(with_checksum(b"machine code"))

@@ -1,10 +1,7 @@
 """Libraries are loaded without what is not used of them, which still works for whoever wants it."""
 
-from __future__ import annotations
-
 import ast
 import os
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -13,6 +10,7 @@ import pytest
 
 import suave_des
 from suave_des.imports import hidden, main_hidden
+from tests.helpers.command import python
 
 COMPILING = """
 import sys
@@ -48,40 +46,32 @@ print(numpy.asarray(jpype.JArray(jpype.JDouble)(numpy.arange(3.0))))
 """
 
 
-def run(program: str, folder: Path) -> list[str]:
-    (folder / "program.py").write_text(program)
-    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
-    command = [sys.executable, "program.py"]
-    ended = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, check=True)
-    return ended.stdout.splitlines()
-
-
-def test_linear_algebra_is_loaded_by_what_uses_it_only(tmp_path: Path) -> None:
-    first, second, third = run(COMPILING, tmp_path)
+def test_linear_algebra_is_loaded_by_what_uses_it_only():
+    first, second, third = python("-c", COMPILING).stdout.splitlines()
     assert first == "3.0 False"
     assert [round(float(number), 9) for number in second.split()[:2]] == [7.0, -5.0]
     assert second.endswith("True")
     assert third == "1.0"
 
 
-def test_java_starts_without_numpy_which_can_be_used_with_it(tmp_path: Path) -> None:
-    assert run(REASONING, tmp_path) == ["False", "[0. 1. 2.]"]
+def test_java_starts_without_numpy_which_can_be_used_with_it():
+    assert python("-c", REASONING).stdout.splitlines() == ["False", "[0. 1. 2.]"]
 
 
-def test_what_is_hidden_cannot_be_imported_meanwhile_and_can_afterwards() -> None:
+def test_what_is_hidden_cannot_be_imported_meanwhile_and_can_afterwards():
     sys.modules.pop("this", None)
     with pytest.raises(ImportError), hidden("this"):
         __import__("this")
     assert "this" not in sys.modules
 
 
-def test_what_is_loaded_is_not_hidden() -> None:
+def test_what_is_loaded_is_not_hidden():
     with hidden("os"):
         assert __import__("os") is os
     assert sys.modules["os"] is os
 
 
-def test_the_script_is_back_when_two_threads_have_hidden_it() -> None:
+def test_the_script_is_back_when_two_threads_have_hidden_it():
     main = sys.modules["__main__"]
     inside, leave = [threading.Event(), threading.Event()], [threading.Event(), threading.Event()]
 
@@ -116,7 +106,7 @@ def imported_by(file: Path, modules: set[str]) -> set[str]:
     return found & modules
 
 
-def test_no_modules_import_each_other_in_a_circle() -> None:
+def test_no_modules_import_each_other_in_a_circle():
     package = Path(suave_des.__file__).parent
     # A package's __init__.py hands on names of modules below it, and is no part of a circle.
     files = {

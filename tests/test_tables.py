@@ -9,7 +9,7 @@ TABLE = Table(
 )
 
 
-def test_text_has_names_to_the_left_and_numbers_to_the_right() -> None:
+def test_text_has_names_to_the_left_and_numbers_to_the_right():
     assert TABLE.text().split("\n") == [
         "manager                   n    mean    95% interval",
         "none                     20  187.85  168.0 to 207.7",
@@ -18,7 +18,7 @@ def test_text_has_names_to_the_left_and_numbers_to_the_right() -> None:
     assert TABLE.width() == len(TABLE.text().split("\n")[0])
 
 
-def test_a_text_that_is_too_wide_breaks_names_and_never_numbers() -> None:
+def test_a_text_that_is_too_wide_breaks_names_and_never_numbers():
     assert TABLE.text(45).split("\n") == [
         "manager            n    mean    95% interval",
         "none              20  187.85  168.0 to 207.7",
@@ -28,19 +28,19 @@ def test_a_text_that_is_too_wide_breaks_names_and_never_numbers() -> None:
     assert TABLE.text(10) == TABLE.text(40)  # as narrow as it gets
 
 
-def test_a_row_of_one_cell_is_a_heading_of_those_below() -> None:
+def test_a_row_of_one_cell_is_a_heading_of_those_below():
     table = Table(("difference", "p"), [("search time (s)",), ("a - b", "0.02")])
     assert table.text() == "difference     p\nsearch time (s)\na - b       0.02"
     assert table.markdown().split("\n")[2] == "| search time (s) |  |"
     assert r"\multicolumn{2}{l}{search time (s)}" in table.latex()
 
 
-def test_markdown_shows_names_as_they_are() -> None:
+def test_markdown_shows_names_as_they_are():
     table = Table(("a|b", "n"), [("<b>*_x_*</b>", "1")])
     assert table.markdown() == "| a\\|b | n |\n| --- | ---: |\n| &lt;b&gt;\\*\\_x\\_\\*&lt;/b&gt; | 1 |"
 
 
-def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing() -> None:
+def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing():
     table = Table(("Manager", "Mean", "Std", "Mean", "Std"), [("a_b & c", "1", "-2", "3e-05", "-1.0 to -0.5")], "50%")
     lines = [line.strip() for line in table.latex(("Time (s)", "Way (m)")).split("\n")]
     assert lines == [
@@ -60,14 +60,14 @@ def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing() -> Non
     ]
 
 
-def test_csv_and_html_have_the_same_cells() -> None:
+def test_csv_and_html_have_the_same_cells():
     table = Table(("name", "n"), [('<i>"a", b</i>', "1")], "t & u")
     assert table.csv() == 'name,n\n"<i>""a"", b</i>",1\n'
     assert "<caption>t &amp; u</caption>" in table.html()
     assert "<td>&lt;i&gt;&quot;a&quot;, b&lt;/i&gt;</td>" in table.html()
 
 
-def test_names_break_after_separators_and_before_capitals_and_numbers_keep_their_sign() -> None:
+def test_names_break_after_separators_and_before_capitals_and_numbers_keep_their_sign():
     assert broken_name("tests.helpers.own:MyManager", 14) == "tests.helpers.\n  own:My\n  Manager"
     assert broken_name("metacontrol (n = 20)", 14) == "metacontrol\n  (n = 20)"
     assert broken_name("first\n_second", 7) == "first\n_second"

@@ -1,6 +1,5 @@
 """The studies in analysis/: a small repetition of each gives what is committed."""
 
-import ast
 import importlib
 import re
 import sys
@@ -8,15 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pandas
 import pytest
 
-import suave_des
+from suave_des.results.assisted import compare_assisted, deviations
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "analysis"
 SCRIPTS = sorted(FOLDER.glob("*.py"))
-PARTS = sorted((FOLDER / "calibration").glob("*.py"))
 CASES = {
     "when_adapting_pays": [("seams2023", "period 80 s (paper)", 2.57, "exemplar's")],
     "rule_worth": ["S11", "QAWaterVisibility"],
@@ -156,17 +155,6 @@ def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chan
         assert (found[name]["high90"] - mean) ** 2 == pytest.approx(quantile**2 * variance, rel=1e-5)
 
 
-@pytest.mark.parametrize("script", [*SCRIPTS, *PARTS], ids=lambda script: script.stem)
-def test_a_study_takes_public_names_from_the_package_itself(script):
-    imported = [
-        alias.name
-        for node in ast.walk(ast.parse(script.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("suave_des.")
-        for alias in node.names
-    ]
-    assert not set(imported) & set(suave_des.__all__)
-
-
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_the_readme_has_the_plain_command_of_each_study(script):
     text = (FOLDER / "README.md").read_text(encoding="utf-8")
@@ -191,3 +179,41 @@ def test_without_what_is_taken_out_missions_differ_more_from_the_real_ones(study
 def test_the_committed_facts_are_those_of_the_published_runs(study, table):
     before = pandas.read_csv(FOLDER / "published_facts" / f"{table}.csv")
     pandas.testing.assert_frame_equal(getattr(study("published_facts"), table)(), before)
+
+
+DEVIATIONS = ROOT / "scenarios" / "published" / "planta_exp1_deviations.csv"
+
+
+def test_intervals_hold_the_mean_of_whatever_plays_the_real_system(study):
+    module = study("assisted")
+    chance = np.random.default_rng(1)
+    at = chance.choice([50.0, 120.0, 130.0], (150, 1))
+    real = [{"a": at + off + chance.normal(0.0, 5.0, (150, 8))} for off in (-10.0, 20.0)]
+    useful, useless = ({"a": each + chance.normal(0.0, 5.0, (150, 8))} for each in (at, chance.permutation(at)))
+    for simulator in (useful, useless):
+        rows = list(module.coverage(real, simulator, [(3, 2), (6, 1), (12, 1)], 200))
+        assert min(row["assisted"] for row in rows) >= 0.91
+    assert next(module.coverage(real, useful, [(6, 1)], 200))["assisted_half"] < 15.0
+
+
+def test_the_shipped_deviations_are_those_of_the_published_missions(study):
+    module = study("assisted")
+    same = module.under_real_conditions(4, 1)
+    drawn = same.drop(columns=[name for name in same if "." in name])
+    drawn = drawn.assign(run=drawn.groupby("manager", observed=True).cumcount() + 1)
+    found = deviations(compare_assisted([module.REAL], same, drawn, metrics=module.METRICS).conditions)
+    shipped = pandas.read_csv(DEVIATIONS)
+    assert list(found.columns) == list(shipped.columns)
+    keys = ["manager", "metric", "conditions", "runs"]
+    pandas.testing.assert_frame_equal(found[keys].astype(str), shipped[keys].astype(str))
+    assert found["chance_std"].to_numpy() == pytest.approx(shipped["chance_std"].to_numpy(), abs=1e-3)
+    near = shipped["chance_std"] / 2.0 + 1.0
+    assert ((found["deviation_mean"] - shipped["deviation_mean"]).abs() < near).all()
+
+
+def test_the_committed_conclusion_is_of_the_committed_tables(study):
+    module = study("assisted")
+    tables = [pandas.read_csv(FOLDER / "assisted" / name) for name in ("coverage.csv", "gains.csv")]
+    assert (FOLDER / "assisted" / "conclusion.md").read_text(encoding="utf-8").strip() == module.conclude(*tables)
+    least = tables[0].groupby("simulator")["assisted"].min()
+    assert min(least["shipped"], least["biased"]) >= 0.9 and least["useless"] >= 0.84

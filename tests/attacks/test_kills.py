@@ -1,11 +1,8 @@
 """Kills at random moments: no mission is lost or counted twice, and no byte differs."""
 
-from __future__ import annotations
-
 import random
 import signal
 import time
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +14,7 @@ FILES = ("runs.csv", "summary.csv", "manifest.json")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path: Path, number: signal.Signals) -> None:
+def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path, number):
     (tmp_path / "short.yaml").write_text(chaos.SHORT)
     arguments = ["short.yaml", "--managers", ",".join(chaos.MANAGERS), "--runs", "400"]
     whole = chaos.start([*arguments, "--out", "whole"], tmp_path)
@@ -43,7 +40,7 @@ def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path:
 
 
 @pytest.mark.slow
-def test_an_overwriting_campaign_that_is_killed_leaves_no_results_of_the_old_one(tmp_path: Path) -> None:
+def test_an_overwriting_campaign_that_is_killed_leaves_no_results_of_the_old_one(tmp_path):
     (tmp_path / "short.yaml").write_text(chaos.SHORT)
     stream = random.Random(1)
     for _ in range(12):

@@ -1,6 +1,4 @@
-"""A pipe in place of a file in a folder of results is not waited for: nobody writes into it."""
-
-from __future__ import annotations
+"""A pipe in place of a file in a folder of results is refused or not waited for: nobody writes into it."""
 
 import os
 import shutil
@@ -38,9 +36,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("kind", "names", "commands"), [("campaign", OF_CAMPAIGN, CAMPAIGN), ("mission", OF_MISSION, MISSION)]
 )
-def test_no_command_waits_for_it(
-    kind: str, names: tuple[str, ...], commands: tuple[tuple[str, ...], ...], folders: Path, tmp_path: Path
-) -> None:
+def test_no_command_waits_for_it(kind, names, commands, folders, tmp_path):
     (tmp_path / "rule.swrl").write_text('Late: c_status(?c, "FALSE") -> c_status(?c, "FALSE")\n')
     for name in names:
         out = tmp_path / "out"
@@ -53,3 +49,24 @@ def test_no_command_waits_for_it(
                 done = command_here(*command, cwd=tmp_path)
             assert done.returncode in (0, 2), (name, command, done.stderr)
             assert done.returncode == 0 or done.stderr.count("\n") == 1, (name, command, done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("runs.csv", ("compare", ".")),
+        ("manifest.json", ("report", ".", "--paths", "0")),
+        ("runs.csv", ("validate", "--runs-file", "runs.csv")),
+        ("suave/bt_suave.csv", ("compare", "suave")),
+        ("suave/other.csv", ("compare", "suave")),
+        ("suave/other.csv", ("validate", "--data", "suave/other.csv")),
+    ],
+)
+def test_a_pipe_is_refused(name, command, tmp_path):
+    run_campaign("release15", ["none", "bt"], 1, 1, out=tmp_path / "out", suave_format=True)
+    (tmp_path / "out" / name).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / "out" / name)
+    with ends_within(60):
+        done = command_here(*command, cwd=tmp_path / "out")
+    assert done.returncode == 2
+    assert "is not a regular file" in done.stderr

@@ -1,7 +1,6 @@
-"""What a campaign does when something goes wrong: what is kept, and what is told."""
+"""What a campaign does when something goes wrong: what is kept and told; and what is seen of it while it runs."""
 
-from __future__ import annotations
-
+import io
 import json
 import os
 import re
@@ -10,10 +9,13 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
+from rich.console import Console
 
+from suave_des.campaign import progress as display
 from suave_des.campaign import workers
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.missions import GIVEN_UP, MissionRunner, WorkerError
+from suave_des.campaign.missions import GIVEN_UP, WorkerError
+from suave_des.campaign.progress import Progress
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD, rows_of
 
@@ -22,7 +24,7 @@ RUNS = 12
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path: Path) -> None:
+def test_a_manager_that_raises_costs_its_own_mission_only(workers, tmp_path):
     manager = f"{AWKWARD}:RaisesInHalf"
     result = run_campaign("seams2023", [manager, "none"], RUNS, 1, workers, tmp_path / "out")
     failed = [failure.run for failure in result.failures]
@@ -41,32 +43,14 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path
     assert manifest["missions"]["failed"] == len(failed)
 
 
-def test_a_manager_that_calls_exit_is_a_manager_that_raises() -> None:
-    result = run_campaign("seams2023", [f"{AWKWARD}:Quits", "none"], 1, 1)
+def test_a_manager_that_calls_exit_is_one_that_raises_and_when_all_missions_fail_there_are_no_rows(tmp_path):
+    result = run_campaign("seams2023", [f"{AWKWARD}:Quits"], 1, 1, out=tmp_path / "out")
     assert [failure.cause for failure in result.failures] == ["SystemExit: no more (awkward_managers.py, line 39)"]
-    assert len(result.rows) == 1
-
-
-def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
-    result = run_campaign("seams2023", [f"{AWKWARD}:RaisesAlways"], 2, 1, out=tmp_path / "out")
-    assert len(result.failures) == 2
     assert rows_of(tmp_path / "out") == []
-    assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith(f"{AWKWARD}:RaisesAlways,0,")
+    assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith(f"{AWKWARD}:Quits,0,")
 
 
-def test_interrupted_before_the_first_mission_is_done_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def ctrl_c(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(MissionRunner, "each", ctrl_c)
-    with pytest.raises(KeyboardInterrupt):
-        run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_others_go_on(tmp_path: Path) -> None:
+def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_others_go_on(tmp_path):
     manager = f"{AWKWARD}:DiesInSome"
     result = run_campaign("seams2023", ["none", manager], 12, 1, 2, tmp_path / "out")
     assert 0 < len(result.failures) < 6
@@ -79,13 +63,13 @@ def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_othe
     assert [row["run"] for row in rows if row["manager"] == "none"] == [str(run) for run in range(1, 13)]
 
 
-def test_when_every_worker_dies_the_campaign_stops_with_one_line(tmp_path: Path) -> None:
+def test_when_every_worker_dies_the_campaign_stops_with_one_line(tmp_path):
     with pytest.raises(WorkerError, match=r"8 worker processes in a row ended before a mission was done"):
         run_campaign("seams2023", [f"{AWKWARD}:DiesAlways"], 20, 1, 2, tmp_path / "out")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: int) -> None:
+def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers):
     result = run_campaign("seams2023", [f"{AWKWARD}:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0)
     assert 0 < len(result.failures) < 12
     for failure in result.failures:
@@ -113,9 +97,7 @@ class LoopsLater(NoManager):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_manager_whose_missions_all_take_too_long_is_given_up(
-    workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_manager_whose_missions_all_take_too_long_is_given_up(workers, tmp_path, monkeypatch):
     (tmp_path / "loops.py").write_text(LOOPS)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -132,14 +114,14 @@ def test_a_manager_whose_missions_all_take_too_long_is_given_up(
     assert (later.done, len(later.failures), later.remarks) == (1, 5, ())  # one could be done: it is tried again
 
 
-def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch):
     monkeypatch.setattr(workers, "_MARGIN_S", 2.0)
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
     assert [(failure.run, failure.cause) for failure in result.failures] == [(2, "not done after 8 s (time-out)")]
     assert result.done == 2
 
 
-def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch):
     monkeypatch.setattr(workers, "_MARGIN_S", 1.0)
     started_s = time.monotonic()
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 2, 201, 2, time_out_s=1.0)
@@ -147,7 +129,7 @@ def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch: p
     assert time.monotonic() < started_s + 45.0  # long before the missions come back, and before a start is overdue
 
 
-def test_missions_run_in_as_many_processes_as_asked_for() -> None:
+def test_missions_run_in_as_many_processes_as_asked_for():
     manager = f"{AWKWARD}:TellsItsProcess"
     alone = run_campaign("seams2023", [manager], 2, 1)
     assert {failure.cause.partition(" (")[0] for failure in alone.failures} == {f"RuntimeError: process {os.getpid()}"}
@@ -158,20 +140,7 @@ def test_missions_run_in_as_many_processes_as_asked_for() -> None:
 
 
 class TestRefusedBeforeAnythingIsWritten:
-    def test_an_ontology_that_is_given_is_checked_even_if_no_manager_uses_it(self, tmp_path: Path) -> None:
-        (tmp_path / "broken.owl").write_text("<rdf")
-        with pytest.raises(InputError, match=r"broken\.owl"):
-            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", ontologies=[tmp_path / "broken.owl"])
-        assert not (tmp_path / "out").exists()
-
-    def test_a_folder_with_results(self, tmp_path: Path) -> None:
-        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
-        before = (tmp_path / "out" / "runs.csv").read_bytes()
-        with pytest.raises(InputError, match=r"out: the output folder is not empty: .*--overwrite"):
-            run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out")
-        assert (tmp_path / "out" / "runs.csv").read_bytes() == before
-
-    def test_overwriting_replaces_results_and_leaves_other_files(self, tmp_path: Path) -> None:
+    def test_overwriting_replaces_results_and_leaves_other_files(self, tmp_path):
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
         (tmp_path / "out" / "notes.txt").write_text("mine")
         run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
@@ -181,7 +150,7 @@ class TestRefusedBeforeAnythingIsWritten:
         ]
 
 
-def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path, monkeypatch):
     real = Path.open
 
     def full(path: Path, mode: str = "r", **options: Any) -> IO[Any]:
@@ -198,3 +167,45 @@ def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path: Path, monkey
     monkeypatch.undo()
     resume_campaign(tmp_path / "out")
     assert len(rows_of(tmp_path / "out")) == 1
+
+
+def shown_on(console: Console, label: str = "seams2023", *, quiet: bool = False) -> None:
+    """Show a campaign that goes on for a while."""
+    with display.shown(label, console, quiet=quiet) as show:
+        for done in range(41):
+            if show is not None:
+                show(Progress(done, int(done > 6), 80))
+
+
+@pytest.mark.parametrize("width", [40, 120])
+def test_on_a_terminal_it_fits_and_is_gone_at_the_end(width):
+    text = io.StringIO()
+    shown_on(Console(file=text, force_terminal=True, width=width, color_system=None))
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text.getvalue()).replace("\r", "\n")
+    assert all(len(line) <= width for line in plain.splitlines())
+    assert [line for line in plain.splitlines() if line][-1].startswith("seams2023: 40 of 80")
+    assert width < 100 or re.search(r"40 of 80 missions, 1 failed, [\d,]+/s, [\w ]+ left", plain)
+    assert text.getvalue().rstrip().endswith("\x1b[2K")  # lines are erased, and nothing comes after
+
+
+class TestLines:
+    def test_a_short_campaign_has_none(self):
+        text = io.StringIO()
+        shown_on(Console(file=text))
+        assert text.getvalue() == ""
+
+    @pytest.mark.parametrize("terminal", [{}, {"force_terminal": True, "_environ": {"TERM": "dumb"}}])
+    def test_a_long_one_has_some_and_a_last_one(self, terminal, monkeypatch):
+        monkeypatch.setattr(display, "_FIRST_LINE_S", 0.0)
+        text = io.StringIO()
+        shown_on(Console(file=text, width=40, **terminal), "my[bold]file.yaml")
+        first, *_, last = text.getvalue().splitlines()
+        assert first.startswith("suave-des: my[bold]file.yaml: ")
+        assert re.match(r"suave-des: my\[bold]file.yaml: 40 of 80 missions, 1 failed(,|$)", last)
+
+    @pytest.mark.parametrize("is_terminal", [False, True])
+    def test_quiet_means_nothing(self, is_terminal, monkeypatch):
+        monkeypatch.setattr(display, "_FIRST_LINE_S", 0.0)
+        text = io.StringIO()
+        shown_on(Console(file=text, force_terminal=is_terminal), quiet=True)
+        assert text.getvalue() == ""

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
 import socket
+import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+import suave_des
 from benchmarks import chaos
 from suave_des.campaign import cluster as dask_cluster
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
@@ -21,7 +24,116 @@ from suave_des.errors import InputError
 from suave_des.records.store import STORE_FILE
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD
-from tests.helpers.clusters import Cluster, kill, wait_until
+
+_TELLS_WHAT_IT_OPENS = """
+import os, sys
+
+def tell(event, arguments):
+    if event == "open" and str(arguments[0]).startswith(os.environ["FORBIDDEN"]):
+        with open(os.environ["OPENED"], "a") as file:
+            file.write(f"{arguments[0]}\\n")
+
+sys.addaudithook(tell)
+"""
+
+# Dask looks at its own work a hundred times a second, which costs each process a twentieth of a core when it waits.
+_QUIET = {
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
+    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "10s",
+}
+
+
+class Cluster:
+    """A scheduler and workers, each a process.
+
+    Args:
+        folder: for their home, caches, scratch files and logs.
+        forbidden: a folder whose files workers must not open; `opened` tells those that they did.
+        settings: more environment variables.
+    """
+
+    def __init__(self, folder: Path, forbidden: Path, **settings: str) -> None:
+        self.folder, self._opened = folder, folder / "opened.txt"
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self.workers: list[subprocess.Popen[bytes]] = []
+        hooks = folder / "hooks"
+        hooks.mkdir(parents=True)
+        (hooks / "sitecustomize.py").write_text(_TELLS_WHAT_IT_OPENS)
+        own = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("SUAVE_DES_", "XDG_", "DASK_", "PYTEST_"))
+        }
+        self._environment = {
+            **own,
+            "HOME": str(folder),
+            "PYTHONPATH": os.pathsep.join([str(hooks), str(Path(suave_des.__file__).parents[1])]),
+            **_QUIET,
+            "FORBIDDEN": str(forbidden),
+            "OPENED": str(self._opened),
+            **settings,
+        }
+        with socket.socket() as found:
+            found.bind(("127.0.0.1", 0))
+            port = found.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{port}"
+        self.scheduler = self._start("dask_scheduler", "--host", "127.0.0.1", "--port", str(port))
+
+    def add_worker(self, threads: int = 1, *, replaced: bool = False) -> subprocess.Popen[bytes]:
+        """Start a worker, which is replaced when it ends, if so wanted."""
+        scratch = ("--local-directory", str(self.folder / "scratch"))
+        worker = self._start(
+            "dask_worker", self.address, "--nanny" if replaced else "--no-nanny", "--nthreads", str(threads), *scratch
+        )
+        self.workers.append(worker)
+        return worker
+
+    def wait_for_workers(self, number: int) -> None:
+        """Wait until so many workers have come to the scheduler."""
+        wait_until(lambda: self.log("dask_scheduler").count("Register worker") >= number)
+
+    def opened(self) -> list[str]:
+        """Forbidden files that workers opened."""
+        return self._opened.read_text().splitlines() if self._opened.exists() else []
+
+    def log(self, command: str) -> str:
+        """What the scheduler or the workers said."""
+        return "".join(path.read_text() for path in sorted(self.folder.glob(f"{command}_*.log")))
+
+    def stop(self) -> None:
+        """End all processes."""
+        for process in self._processes:
+            process.kill()
+            process.wait()
+
+    def _start(self, command: str, *arguments: str) -> subprocess.Popen[bytes]:
+        with (self.folder / f"{command}_{len(self._processes)}.log").open("wb") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.{command}", *arguments, "--no-dashboard"],
+                cwd=self.folder,
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+            )
+        self._processes.append(process)
+        return process
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    """End a process as the system does when memory is short."""
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
+def wait_until(is_so: Callable[[], bool], longest_s: float = 120.0) -> None:
+    """Wait for something, and fail if it does not come."""
+    end_s = time.monotonic() + longest_s
+    while not is_so():
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
+
 
 MINE = "my_managers.careful:Careful"
 
@@ -95,9 +207,7 @@ def small_cluster(_small_clusters: list[Cluster], tmp_path_factory: pytest.TempP
     return _small_clusters[-1]
 
 
-def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
-    cluster: Cluster, users_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(cluster, users_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(users_folder)
     asked = ("own.yaml", ["metacontrol", MINE], 60, 1)
     run_campaign(*asked, out=tmp_path / "here")
@@ -116,22 +226,7 @@ def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
     assert cluster.opened() == []
 
 
-def test_the_hook_that_watches_workers_would_tell(
-    cluster: Cluster, users_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (users_folder / "opens_a_file.py").write_text(
-        "from pathlib import Path\n"
-        "from suave_des.managing.simple import NoManager\n"
-        "class Reader(NoManager):\n"
-        "    def task_requested(self, task):\n"
-        f"        Path({str(users_folder / 'sea.csv')!r}).read_text()\n"
-    )
-    monkeypatch.syspath_prepend(users_folder)
-    run_campaign("seams2023", ["opens_a_file:Reader"], 1, 1, scheduler=cluster.address)
-    assert set(cluster.opened()) == {str(users_folder / "sea.csv")}
-
-
-def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(small_cluster: Cluster) -> None:
+def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(small_cluster):
     causes = {
         "DiesInSome": "the cluster's worker died while running it, 1 times (killed, out of memory, or stuck?)",
         "HangsInSome": "not done after 3 s (time-out), in adapt (awkward_managers.py",
@@ -147,7 +242,7 @@ def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(sm
     assert all(row[3:] == idle[row[2]] for row in result.rows)
 
 
-def test_ctrl_c_on_the_command_line(cluster: Cluster, scenario: Path, tmp_path: Path) -> None:
+def test_ctrl_c_on_the_command_line(cluster, scenario, tmp_path):
     asked = ["short.yaml", "--managers", "none", "--runs", "100000", "--scheduler", cluster.address, "--out", "out"]
     process = chaos.start(asked, tmp_path)
     journal = tmp_path / "out" / f"{STORE_FILE}-wal"
@@ -161,7 +256,7 @@ def test_ctrl_c_on_the_command_line(cluster: Cluster, scenario: Path, tmp_path: 
     assert run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2  # workers are free for it
 
 
-def test_interrupted_there_and_resumed_here(cluster: Cluster, scenario: Path, tmp_path: Path) -> None:
+def test_interrupted_there_and_resumed_here(cluster, scenario, tmp_path):
     def stop(progress: Progress) -> None:
         raise KeyboardInterrupt
 
@@ -177,9 +272,7 @@ def test_interrupted_there_and_resumed_here(cluster: Cluster, scenario: Path, tm
     assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
 
 
-def test_another_version_on_a_worker_is_named_and_nothing_is_written(
-    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_on_a_worker_is_named_and_nothing_is_written(cluster, tmp_path, monkeypatch):
     here = {**dask_cluster.code_versions(), "numpy": "1.0"}
     monkeypatch.setattr(dask_cluster, "code_versions", lambda: here)
     with pytest.raises(InputError, match=r"numpy is [\d.]+ on worker tcp://\S+, and 1.0 here, which could change"):
@@ -187,9 +280,7 @@ def test_another_version_on_a_worker_is_named_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_scheduler_that_is_lost_in_the_middle(
-    small_cluster: Cluster, scenario: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scheduler_that_is_lost_in_the_middle(small_cluster, scenario, tmp_path, capfd):
     stopped_s = []
 
     def kill_scheduler(progress: Progress) -> None:
@@ -212,15 +303,13 @@ def test_a_scheduler_that_is_lost_in_the_middle(
 
 class TestBadInput:
     @pytest.mark.parametrize("address", ["foo", "tcp://", "tcp://:8786", "tcp://here:99999", "http://here:8786", ""])
-    def test_what_is_no_address(self, address: str, tmp_path: Path) -> None:
+    def test_what_is_no_address(self, address, tmp_path):
         with pytest.raises(InputError, match=r"is not an address of a Dask scheduler \(give tcp://HOST:PORT"):
             run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", scheduler=address)
         assert not (tmp_path / "out").exists()
 
     @pytest.mark.parametrize("listens", [True, False])
-    def test_a_scheduler_that_does_not_answer(
-        self, listens: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_a_scheduler_that_does_not_answer(self, listens, tmp_path, monkeypatch, capfd):
         assert dask_cluster.ANSWER_TIMEOUT_S == 10.0
         monkeypatch.setattr(dask_cluster, "ANSWER_TIMEOUT_S", 1.0)
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "earlier")
@@ -240,16 +329,16 @@ class TestBadInput:
         assert resume_campaign(tmp_path / "earlier").done == 1
         assert capfd.readouterr().err == ""
 
-    def test_a_worker_s_address(self, cluster: Cluster) -> None:
+    def test_a_worker_s_address(self, cluster):
         worker = re.findall(r"worker at: *(tcp://[0-9.:]+)", cluster.log("dask_worker"))[-1]
         with pytest.raises(InputError, match=rf"{worker} does not answer as a Dask scheduler"):
             run_campaign("seams2023", ["none"], 1, 1, scheduler=worker)
 
-    def test_dask_is_not_installed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_dask_is_not_installed(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(InputError, match=r"\(pip install 'suave-des\[dask\]'\)"):
             run_campaign("seams2023", ["none"], 1, 1, scheduler="tcp://127.0.0.1:8786")
 
-    def test_workers_besides_a_scheduler(self) -> None:
+    def test_workers_besides_a_scheduler(self):
         with pytest.raises(InputError, match=r"workers: 2 cannot be used with a scheduler"):
             run_campaign("seams2023", ["none"], 1, 1, 2, scheduler="tcp://127.0.0.1:8786")

@@ -59,7 +59,7 @@ def search_times(**options: object) -> list[float]:
     return run_campaign("seams2023", runs=3, **options)["search_time_s"].tolist()  # type: ignore[arg-type]
 
 
-def test_a_sweep_varies_a_managers_own_setting_which_the_scenario_need_not_have(settable: str) -> None:
+def test_a_sweep_varies_a_managers_own_setting_which_the_scenario_need_not_have(settable):
     modes = ["fd_spiral_low", "fd_spiral_high"]
     frame = run_campaign("seams2023", [settable], runs=3, sweep={f"managers.{settable}.mode": modes})
     for mode in modes:
@@ -67,7 +67,7 @@ def test_a_sweep_varies_a_managers_own_setting_which_the_scenario_need_not_have(
         assert rows["search_time_s"].tolist() == search_times(managers=[f"fixed:{mode}"])
 
 
-def test_values_by_key_path_are_those_of_the_scenario() -> None:
+def test_values_by_key_path_are_those_of_the_scenario():
     assert load_scenario("seams2023", values={"mission.time_limit_s": 120}).scenario.mission.time_limit_s == 120.0
     by_sweeps_name = load_scenario("seams2023", values={"visibility.period_s": 40})
     assert by_sweeps_name.scenario.signals["water_visibility"].period_s == 40.0
@@ -75,12 +75,12 @@ def test_values_by_key_path_are_those_of_the_scenario() -> None:
         load_scenario("seams2023", values={"mission.time_limit": 120})
 
 
-def test_names_of_managers_may_have_points_in_key_paths() -> None:
+def test_names_of_managers_may_have_points_in_key_paths():
     loaded = with_values(load_scenario("seams2023"), {"managers.package.module:Class.gain": 2.5})
     assert loaded.manager_settings("package.module:Class") == {"gain": 2.5}
 
 
-def test_options_of_the_command_line(folder: Path, settable: str) -> None:
+def test_options_of_the_command_line(folder, settable):
     set_limit = ("--set", "mission.time_limit_s=150", "--set", "battery={discharge_time_s: 1e3}")
     chosen = ("--manager-option", "mode=fd_spiral_high", "--manager-option", f"{settable}.other=[1, x]")
     done = command_here("run", "seams2023", "--manager", settable, *set_limit, *chosen, "--out", "out", cwd=folder)
@@ -102,20 +102,20 @@ def test_options_of_the_command_line(folder: Path, settable: str) -> None:
         (("--manager-option", "other:Manager.mode=x"), "is for none of the managers"),
     ],
 )
-def test_options_that_make_no_sense_are_bad_input(tmp_path: Path, options: tuple[str, ...], words: str) -> None:
+def test_options_that_make_no_sense_are_bad_input(tmp_path, options, words):
     done = command_here("run", "seams2023", "--manager", "none", *options, cwd=tmp_path)
     assert done.returncode == 2 and words in done.stderr and "Traceback" not in done.stderr
 
 
 class TestDeclaredFiles:
-    def test_they_and_the_managers_code_are_hashed(self, folder: Path, settable: str) -> None:
+    def test_they_and_the_managers_code_are_hashed(self, folder, settable):
         (folder / "table.txt").write_text("fd_spiral_high")
         options = {settable: {"table": "table.txt"}}
         run_campaign("seams2023", [settable], 1, out=folder / "out", manager_options=options)
         inputs = json.loads((folder / "out" / "manifest.json").read_text())["inputs_sha256"]
         assert {"table.txt", f"{settable.partition(':')[0]}.py"} <= inputs.keys()
 
-    def test_they_are_found_beside_the_scenario_that_names_them(self, folder: Path, settable: str) -> None:
+    def test_they_are_found_beside_the_scenario_that_names_them(self, folder, settable):
         (folder / "below").mkdir()
         (folder / "below" / "table.txt").write_text("fd_spiral_high")
         scenario = f'base: seams2023\nmanagers: {{"{settable}": {{table: table.txt}}}}\n'
@@ -123,23 +123,21 @@ class TestDeclaredFiles:
         found = run_mission(folder / "below" / "mine.yaml", settable, 1, 1).metrics.search_time_s
         assert found == run_mission("seams2023", "fixed:fd_spiral_high", 1, 1).metrics.search_time_s
 
-    def test_a_missing_one_is_noticed_before_any_mission(self, folder: Path, settable: str) -> None:
+    def test_a_missing_one_is_noticed_before_any_mission(self, folder, settable):
         with pytest.raises(InputError, match=r"table\.txt.*reads this file, and it is not there"):
             run_campaign("seams2023", [settable], 1, manager_options={settable: {"table": "table.txt"}})
 
-    def test_each_value_of_a_sweep_is_looked_at(self, folder: Path, settable: str) -> None:
+    def test_each_value_of_a_sweep_is_looked_at(self, folder, settable):
         (folder / "one.txt").write_text("fd_spiral_high")
         with pytest.raises(InputError, match=r"two\.txt"):
             run_campaign("seams2023", [settable], 1, sweep={f"managers.{settable}.table": ["one.txt", "two.txt"]})
 
-    def test_a_file_that_is_not_declared_is_not_given(self, folder: Path, settable: str) -> None:
+    def test_a_file_that_is_not_declared_is_not_given(self, folder, settable):
         with pytest.warns(UserWarning, match=r"secret\.txt' is not declared"):
             run_campaign("seams2023", [settable.replace("Settable", "Careless")], 1)
 
     @pytest.mark.parametrize("changed", ["a/table.txt", "a/table.yaml"])
-    def test_a_change_of_one_is_noticed_when_the_campaign_is_resumed(
-        self, folder: Path, settable: str, changed: str
-    ) -> None:
+    def test_a_change_of_one_is_noticed_when_the_campaign_is_resumed(self, folder, settable, changed):
         """Also of a YAML file, and of one of two with the same name in different folders."""
         managers, files = [settable, settable.replace("Settable", "Other")], [changed, changed.replace("a/", "b/")]
         for name in files:
@@ -151,7 +149,7 @@ class TestDeclaredFiles:
         done = command_here(*RESUME, "--managers", ",".join(managers), "--runs", "2", cwd=folder)
         assert done.returncode == 2 and f"files_sha256.{changed} was" in done.stderr
 
-    def test_a_change_of_the_program_of_one_of_two_is_noticed_when_the_campaign_is_resumed(self, folder: Path) -> None:
+    def test_a_change_of_the_program_of_one_of_two_is_noticed_when_the_campaign_is_resumed(self, folder):
         program = Path(__file__).parents[2] / "docs" / "examples" / "exec" / "manager.pl"
         commands = []
         for name in ("a/manager.pl", "b/manager.pl"):
@@ -165,7 +163,7 @@ class TestDeclaredFiles:
         assert done.returncode == 2 and "files_sha256.a/manager.pl was" in done.stderr
 
 
-def test_a_check_that_raises_is_bad_input(folder: Path) -> None:
+def test_a_check_that_raises_is_bad_input(folder):
     text = "\nclass Picky(NoManager):\n    @classmethod\n    def check(cls, loaded):\n        return loaded.no_such\n"
     with (folder / f"settable_{folder.name}.py").open("a") as module:
         module.write(text)
@@ -198,24 +196,24 @@ class TestReceivedFolder:
         as_received(own / "out")
         return own
 
-    def test_a_folder_that_this_user_began_here_asks_for_nothing(self, own: Path) -> None:
+    def test_a_folder_that_this_user_began_here_asks_for_nothing(self, own):
         done = command_here(*RESUME, cwd=own)
         assert "give --managers" not in done.stderr and (own / "imported").exists()
 
-    def test_from_another_folder_it_is_asked_for_again(self, own: Path) -> None:
+    def test_from_another_folder_it_is_asked_for_again(self, own):
         """There, another module of the same name might be found."""
         (own / "below").mkdir()
         done = command_here("campaign", "--resume", "../out", cwd=own / "below")
         assert done.returncode == 2 and "give --managers" in done.stderr
         assert not (own / "below" / "imported").exists()
 
-    def test_its_managers_are_not_imported_unasked(self, received: Path, settable: str) -> None:
+    def test_its_managers_are_not_imported_unasked(self, received, settable):
         done = command_here(*RESUME, cwd=received)
         assert done.returncode == 2 and f"give --managers {settable}" in done.stderr
         assert not (received / "imported").exists()
 
     @pytest.mark.parametrize("how", ["named", "confirmed"])
-    def test_they_are_when_the_user_says_so(self, received: Path, settable: str, how: str) -> None:
+    def test_they_are_when_the_user_says_so(self, received, settable, how):
         options = ("--managers", settable) if how == "named" else ("--yes",)
         done = command_here(*RESUME, *options, cwd=received)
         assert (received / "imported").exists()
@@ -223,12 +221,12 @@ class TestReceivedFolder:
             f"files_sha256.{settable.partition(':')[0]}.py was" in done.stderr
         )  # the code is another one than the campaign began with
 
-    def test_a_manager_that_it_does_not_have_cannot_be_added_but_compared(self, received: Path) -> None:
+    def test_a_manager_that_it_does_not_have_cannot_be_added_but_compared(self, received):
         done = command_here(*RESUME, "--managers", "bt", cwd=received)
         assert done.returncode == 2 and "the campaign has no manager 'bt'" in done.stderr
         assert "with the same seed into another folder" in done.stderr
 
-    def test_managers_of_the_campaign_file_are_not_run_unasked_either(self, folder: Path) -> None:
+    def test_managers_of_the_campaign_file_are_not_run_unasked_either(self, folder):
         """The campaign file decides what runs, whatever the folder's own store says."""
         (folder / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nmanagers: [none]\nruns: 1\n")
         assert command_here("campaign", "mine.yaml", "--out", "out", cwd=folder).returncode == 0
@@ -271,19 +269,19 @@ class TestReceivedFunction:
         return folder
 
     @pytest.mark.parametrize("command", [RESUME, ("replay", "out")])
-    def test_it_is_not_imported_unasked(self, received: Path, command: tuple[str, ...]) -> None:
+    def test_it_is_not_imported_unasked(self, received, command):
         done = command_here(*command, cwd=received)
         assert done.returncode == 2 and f"run the code of lights_{received.name}:Lights" in done.stderr
         assert not (received / "imported").exists()
         assert command_here(*command, "--yes", cwd=received).returncode == 0
         assert (received / "imported").exists()
 
-    def test_a_report_imports_nothing(self, received: Path) -> None:
+    def test_a_report_imports_nothing(self, received):
         pytest.importorskip("plotly")
         assert command_here("report", "out", cwd=received).returncode == 0
         assert not (received / "imported").exists()
 
-    def test_a_class_that_a_sweep_names_is_not_imported_unasked_either(self, received: Path) -> None:
+    def test_a_class_that_a_sweep_names_is_not_imported_unasked_either(self, received):
         name = f"lights_{received.name}:Lights"
         text = f'campaign: 1\nscenario: mine.yaml\nmanagers: [none]\nsweep: {{functions.f_lights.node: ["{name}"]}}\n'
         (received / "swept.yaml").write_text(text)

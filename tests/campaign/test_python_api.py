@@ -1,7 +1,5 @@
 """What `suave_des` offers to scripts and notebooks."""
 
-from __future__ import annotations
-
 import csv
 import json
 import subprocess
@@ -13,10 +11,16 @@ import pandas
 import pytest
 
 import suave_des
+from suave_des import load_scenario, run_campaign, run_mission, with_values
 from suave_des.campaign.campaign import CampaignInterrupted
+from suave_des.campaign.variation import plain
 from suave_des.errors import InputError
+from suave_des.managing.metacontrol import Metacontrol
+from suave_des.managing.simple import NoManager
 from suave_des.records.store import Store
+from suave_des.registry import name_of
 from tests.helpers import AWKWARD
+from tests.helpers.command import python
 
 
 @pytest.fixture
@@ -36,7 +40,7 @@ def interrupted_after(monkeypatch: pytest.MonkeyPatch):
     return after
 
 
-def test_names_are_there_and_importing_the_package_imports_nothing_else() -> None:
+def test_names_are_there_and_importing_the_package_imports_nothing_else():
     code = (
         "import sys, suave_des\n"
         "loaded = [name for name in sys.modules if name.startswith('suave_des.')]\n"
@@ -44,18 +48,11 @@ def test_names_are_there_and_importing_the_package_imports_nothing_else() -> Non
         "missing = set(suave_des.__all__) - set(dir(suave_des))\n"
         "print(loaded, heavy or '', missing or '')"
     )
-    root = Path(suave_des.__file__).parents[1]
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
-    assert ended.stdout.split() == ["[]"]
-
-
-def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="module 'suave_des' has no attribute 'run_campain'"):
-        _ = suave_des.run_campain  # type: ignore[attr-defined]
+    assert python("-c", code).stdout.split() == ["[]"]
 
 
 class TestRunCampaign:
-    def test_a_row_is_a_mission_and_every_column_has_a_type(self) -> None:
+    def test_a_row_is_a_mission_and_every_column_has_a_type(self):
         frame = suave_des.run_campaign("seams2023", ["random", "none"], runs=3, seed=1)
         assert list(frame["manager"]) == ["random"] * 3 + ["none"] * 3
         assert list(frame["manager"].cat.categories) == ["random", "none"]
@@ -65,12 +62,12 @@ class TestRunCampaign:
         assert [str(frame[name].dtype) for name in names] == ["category", "int64", "int64", "bool", "int64"]
         assert frame["mean_reaction_time_s"].isna().any()
 
-    def test_it_is_what_runs_csv_says(self, scenario: Path, tmp_path: Path) -> None:
+    def test_it_is_what_runs_csv_says(self, scenario, tmp_path):
         frame = suave_des.run_campaign(scenario, ["none"], 4, 1, out=tmp_path / "out")
         read = pandas.read_csv(tmp_path / "out" / "runs.csv")
         pandas.testing.assert_frame_equal(frame, read, check_dtype=False, check_categorical=False)
 
-    def test_attrs_tell_the_rest_as_plain_values(self, tmp_path: Path) -> None:
+    def test_attrs_tell_the_rest_as_plain_values(self, tmp_path):
         with pytest.warns(
             UserWarning, match=rf"\d of 6 missions failed, see attrs\['failures'\]: manager {AWKWARD}:"
         ) as told:
@@ -94,20 +91,14 @@ class TestRunCampaign:
         json.dumps(frame.attrs)  # or pandas could not keep them in a Parquet file
         pandas.concat([frame, frame])
 
-    def test_defaults_are_those_of_the_command_line(self, scenario: Path) -> None:
-        frame = suave_des.run_campaign(scenario)
-        assert frame.groupby("manager", observed=True).size().to_dict() == {"none": 20, "random": 20, "metacontrol": 20}
-
-    def test_without_any_row_the_types_are_the_same(self, scenario: Path) -> None:
+    def test_without_any_row_the_types_are_the_same(self, scenario):
         with pytest.warns(UserWarning, match="1 of 1 missions failed"):
             nothing = suave_des.run_campaign(scenario, [f"{AWKWARD}:RaisesAlways"], 1)
         some = suave_des.run_campaign(scenario, ["none"], 1)
         assert len(nothing) == 0
         assert [str(kind) for kind in nothing.dtypes] == [str(kind) for kind in some.dtypes]
 
-    def test_ctrl_c_at_a_prompt_gives_what_is_there(
-        self, scenario: Path, tmp_path: Path, interrupted_after, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_ctrl_c_at_a_prompt_gives_what_is_there(self, scenario, tmp_path, interrupted_after, monkeypatch):
         monkeypatch.setattr(sys, "ps1", ">>> ", raising=False)
         for out in (None, tmp_path / "out"):
             interrupted_after(7)
@@ -118,57 +109,126 @@ class TestRunCampaign:
             monkeypatch.setattr(sys, "ps1", ">>> ", raising=False)
         assert len(suave_des.resume_campaign(tmp_path / "out")) == 20
 
-    def test_ctrl_c_in_a_script_stops_the_script(self, scenario: Path, interrupted_after) -> None:
+    def test_ctrl_c_in_a_script_stops_the_script(self, scenario, interrupted_after):
         interrupted_after(7)
         with pytest.raises(CampaignInterrupted) as stopped:
             suave_des.run_campaign(scenario, ["none"], 20, 1)
         assert len(stopped.value.result.frame()) == 7
-
-    def test_progress_is_shown_when_asked_for(
-        self, scenario: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("suave_des.campaign.progress._FIRST_LINE_S", 0.0)
-        suave_des.run_campaign(scenario, ["none"], 3)
-        assert capsys.readouterr().err == ""
-        suave_des.run_campaign(scenario, ["none"], 3, progress=True)
-        assert "3 of 3 missions" in capsys.readouterr().err
 
 
 class TestArguments:
     @pytest.mark.parametrize(
         ("call", "words"),
         [
-            (
-                lambda: suave_des.run_mission("seams2023", mananger="none"),
-                "run_mission has no argument 'mananger' .did ",
-            ),
+            (lambda: suave_des.run_mission("seams2023", mananger="none"), "run_mission has no argument 'mananger'"),
             (lambda: suave_des.run_mission(), "run_mission: missing a required argument: 'scenario'"),
             (lambda: suave_des.run_mission(3), "scenario: expected a name, a path or a loaded scenario, got 3"),
             (lambda: suave_des.run_mission("seams2023", "none", run="1"), "run: expected a whole number, got '1'"),
             (lambda: suave_des.run_campaign("seams2023", rnus=3), "no argument 'rnus' .did you mean 'runs'"),
-            (lambda: suave_des.run_campaign("seams2023", command=["x"]), "no argument 'command'"),
             (lambda: suave_des.load_scenario("seams2023", rules="a.swrl"), "rules: expected a list, got 'a.swrl'"),
             (lambda: suave_des.with_values("seams2023", {}), "loaded: expected a loaded scenario, got 'seams2023'"),
             (lambda: suave_des.Mission("seams2023", sed=3), "Mission has no argument 'sed' .did you mean 'seed'"),
             (lambda: suave_des.KnowledgeBase.load(rulez="x"), "KnowledgeBase.load has no argument 'rulez'"),
-            (lambda: suave_des.CampaignFrame().compare(metrcs=["x"]), "compare has no argument 'metrcs' .did "),
         ],
     )
-    def test_that_a_function_has_not_or_of_another_type_are_told_in_plain_words(self, call, words: str) -> None:
+    def test_that_a_function_has_not_or_of_another_type_are_told_in_plain_words(self, call, words):
         with pytest.raises(InputError, match=words):
             call()
 
-    def test_numbers_may_be_of_numpy(self, scenario: Path) -> None:
+    def test_numbers_may_be_of_numpy(self, scenario):
         assert len(suave_des.run_campaign(scenario, "none", runs=np.int64(2), seed=np.uint8(3))) == 2
 
 
 class TestFigures:
-    @pytest.mark.parametrize(("kind", "panels"), [("map", 3), ("timeline", 3)])
-    def test_a_mission_draws_itself(self, kind: str, panels: int) -> None:
+    def test_a_mission_draws_itself(self):
         mission = suave_des.run_mission("seams2023", "none", run=1, seed=8)
-        assert len(mission.figure(kind).axes) == panels
-
-    def test_a_figure_that_there_is_not_is_refused(self) -> None:
-        mission = suave_des.run_mission("seams2023", "none", values={"mission.time_limit_s": 20})
+        assert [len(mission.figure(kind).axes) for kind in ("map", "timeline")] == [3, 3]
         with pytest.raises(InputError, match=r"there is no figure 'mapp' of a mission .did you mean 'map'"):
             mission.figure("mapp")
+
+
+FAILURE_S = "thruster_events.0.time_s"
+
+
+class Mine(NoManager):
+    """Does nothing of its own."""
+
+
+def test_a_class_is_known_by_its_registered_name_or_by_its_place():
+    assert [name_of(each) for each in (Metacontrol, "bt", Mine)] == ["metacontrol", "bt", f"{__name__}:Mine"]
+
+
+@pytest.mark.parametrize("wrong", [int, 3, None], ids=str)
+def test_what_is_no_manager_is_refused(wrong):
+    with pytest.raises(InputError, match="expected a manager"):
+        name_of(wrong)
+
+
+def test_a_class_inside_a_function_cannot_be_found_by_workers():
+    class Inner(NoManager):
+        """Cannot be imported."""
+
+    with pytest.raises(InputError, match="top level of a module, script or notebook cell"):
+        name_of(Inner)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [20.0, 40.0],
+        (20.0, 40.0),
+        np.array([20.0, 40.0]),
+        pandas.Series([20.0, 40.0]),
+        range(20, 60, 20),
+        np.arange(20, 60, 20),
+        (value for value in (20, 40)),
+    ],
+    ids=lambda values: type(values).__name__,
+)
+def test_a_sweep_takes_what_has_values(values):
+    (given,) = plain({FAILURE_S: values}).values()
+    assert given == [20, 40]
+    assert {type(value) for value in given} <= {int, float}
+
+
+def test_arrays_in_the_forms_of_a_sweep_become_lists():
+    design = np.array([[1.0, 2.0], [3.0, 4.0]])
+    zipped = plain({"zip": {"start.x_m": design[:, 0], "start.y_m": design[:, 1]}})
+    assert zipped == {"zip": {"start.x_m": [1.0, 3.0], "start.y_m": [2.0, 4.0]}}
+    sample = {"method": "sobol", "points": np.int64(4), "ranges": {"start.x_m": np.array([1.0, 2.0])}}
+    assert plain({"sample": sample})["sample"] == {**sample, "points": 4, "ranges": {"start.x_m": [1.0, 2.0]}}
+
+
+def test_a_loaded_scenario_runs_as_its_file_does_and_with_its_values():
+    asked = {"runs": 2, "progress": False}
+    of_file = run_campaign("seams2023", ["none"], **asked)
+    pandas.testing.assert_frame_equal(run_campaign(load_scenario("seams2023"), "none", **asked), of_file)
+    short = with_values(load_scenario("seams2023"), {"mission.time_limit_s": 50})
+    assert run_campaign(short, NoManager, runs=1, progress=False)["search_time_s"].tolist() == [50.0]
+    assert run_mission(short, NoManager).metrics.search_time_s == 50.0
+
+
+def test_files_of_a_loaded_scenario_are_not_replaced_later():
+    with pytest.raises(InputError, match="give rules to load_scenario"):
+        run_mission(load_scenario("seams2023"), "none", rules=["mine.swrl"])
+
+
+IN_NOTEBOOK = """
+from suave_des import run_campaign
+from suave_des.managing.simple import NoManager
+SEARCH = "f_generate_search_path"
+class Mine(NoManager):
+    def task_requested(self, task):
+        for function in task.functions:
+            self.system.change_mode(function, "fd_spiral_high" if function == SEARCH else "fd_follow_pipeline")
+
+one, two = (run_campaign("seams2023", Mine, runs=3, workers=n, progress=False) for n in (1, 2))
+print(one.equals(two), len(two), two["manager"].iloc[0])
+"""
+
+
+def test_a_manager_of_a_notebook_runs_on_several_workers():
+    done = subprocess.run(
+        [sys.executable, "-"], input=IN_NOTEBOOK, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.stdout == "True 3 __main__:Mine\n", done.stderr

@@ -1,7 +1,5 @@
 """Output folders that come from elsewhere, are damaged, or were left by a command that was killed."""
 
-from __future__ import annotations
-
 import json
 import os
 import random
@@ -45,35 +43,30 @@ class TestLinks:
         yield path
         assert path.read_text() == "precious"
 
-    @pytest.mark.parametrize("name", ["campaign.sqlite-wal", "campaign.sqlite-journal"])
-    @pytest.mark.parametrize("link", ["symlink_to", "hardlink_to"])
-    def test_where_the_campaign_is_resumed(self, received: Path, precious: Path, name: str, link: str) -> None:
-        getattr(received / name, link)(precious)
+    @pytest.mark.parametrize(
+        ("name", "link"),
+        [
+            *(("campaign.sqlite-wal", "symlink_to"), ("campaign.sqlite-wal", "hardlink_to")),
+            *(("campaign.sqlite-journal", "symlink_to"), ("campaign.sqlite-journal", "hardlink_to")),
+            *(("campaign.sqlite", "symlink_to"), ("suave", "symlink_to")),
+        ],
+    )
+    def test_where_the_campaign_is_resumed(self, received, precious, name, link):
+        target = {"suave": precious.parent, "campaign.sqlite": received / "elsewhere.sqlite"}.get(name, precious)
+        if name == "campaign.sqlite":
+            (received / name).rename(target)
+        getattr(received / name, link)(target)
         with pytest.raises(InputError, match=r"is a (hard )?link") as raised:
             resume_campaign(received, runs=5)
         assert raised.value.file == str(received / name)
 
-    def test_to_a_folder_of_other_files_in_place_of_the_exemplars(self, received: Path, precious: Path) -> None:
-        (precious.parent / "mine.csv").write_text("mine")
-        (received / "suave").symlink_to(precious.parent)
-        with pytest.raises(InputError, match="is a link") as raised:
-            resume_campaign(received, runs=5)
-        assert raised.value.file == str(received / "suave")
-        assert (precious.parent / "mine.csv").read_text() == "mine"
-
-    def test_in_place_of_the_store(self, received: Path, precious: Path) -> None:
-        (received / "campaign.sqlite").rename(received / "elsewhere.sqlite")
-        (received / "campaign.sqlite").symlink_to(received / "elsewhere.sqlite")
-        with pytest.raises(InputError, match="is a link"):
-            resume_campaign(received, runs=5)
-
-    def test_where_a_new_campaign_goes(self, precious: Path, tmp_path: Path) -> None:
+    def test_where_a_new_campaign_goes(self, precious, tmp_path):
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / "campaign.sqlite").symlink_to(precious)
         with pytest.raises(InputError, match="is a link"):
             run_campaign("seams2023", ["none"], 1, out=tmp_path / "out", overwrite=True)
 
-    def test_in_place_of_a_file_that_is_being_written(self, precious: Path, tmp_path: Path) -> None:
+    def test_in_place_of_a_file_that_is_being_written(self, precious, tmp_path):
         part = tmp_path / f".runs.csv.{os.getpid()}.part"
         part.symlink_to(precious)
         write_files(tmp_path, {"runs.csv": "new"})
@@ -127,7 +120,7 @@ class TestDamage:
     @pytest.mark.parametrize(
         "damage", ["UPDATE about SET value = '[]'", "UPDATE about SET crc = 1", "DELETE FROM about"]
     )
-    def test_of_what_is_noted_is_told_with_a_remedy(self, received: Path, name: str, damage: str) -> None:
+    def test_of_what_is_noted_is_told_with_a_remedy(self, received, name, damage):
         with sqlite3.connect(received / "campaign.sqlite") as store:
             store.execute(f"{damage} WHERE name = '{name}'")
         if name == "identity":
@@ -155,7 +148,7 @@ class TestDamage:
             "PRAGMA user_version = 9",
         ],
     )
-    def test_of_tables_is_no_traceback(self, received: Path, damage: str) -> None:
+    def test_of_tables_is_no_traceback(self, received, damage):
         with sqlite3.connect(received / "campaign.sqlite") as store:
             try:
                 store.execute(damage)
@@ -164,7 +157,7 @@ class TestDamage:
         self.resumed(received)
 
     @pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in range(1, 8))])
-    def test_of_what_has_the_right_checksum_is_no_traceback(self, received: Path, part: int) -> None:
+    def test_of_what_has_the_right_checksum_is_no_traceback(self, received, part):
         """As somebody would forge it who knows the program."""
         whole = (received / "campaign.sqlite").read_bytes()
         for name, edit in list(forgeries(received / "campaign.sqlite"))[part::8]:
@@ -178,8 +171,29 @@ class TestDamage:
                 except SuaveDesError as error:
                     assert len(str(error).splitlines()) == 1, name
 
+    @pytest.mark.parametrize(
+        ("damage", "told"),
+        [
+            ("UPDATE outcomes SET content = replace(content, '2.5', '2.6') WHERE run = 3", "the outcome of run 3 is"),
+            (b"something else " * 100, "file is not a database"),
+            (None, r"[\s\S]*start a new campaign with --overwrite"),
+            (b"", "there is no campaign in it"),  # as one that was killed at its very start leaves
+        ],
+    )
+    def test_of_the_file_or_one_digit_is_told(self, received, damage, told):
+        path = received / "campaign.sqlite"
+        if isinstance(damage, str):
+            with sqlite3.connect(path) as store:
+                store.execute(damage)
+            store.close()
+        else:
+            size = path.stat().st_size
+            path.write_bytes(path.read_bytes()[: size // 3] + b"\xff" * (size * 2 // 3) if damage is None else damage)
+        with pytest.raises(InputError, match=told):
+            resume_campaign(received)
+
     @pytest.mark.slow
-    def test_of_bytes_is_no_traceback(self, received: Path) -> None:
+    def test_of_bytes_is_no_traceback(self, received):
         whole = (received / "campaign.sqlite").read_bytes()
         stream = random.Random(1)
         for _ in range(300):
@@ -193,9 +207,7 @@ class TestDamage:
 
 
 class TestOverwrite:
-    def test_results_of_the_old_campaign_go_before_new_missions_begin(
-        self, received: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_results_of_the_old_campaign_go_before_new_missions_begin(self, received, monkeypatch):
         found = []
 
         def killed(*_: object, **__: object) -> None:
@@ -207,9 +219,7 @@ class TestOverwrite:
             run_campaign("release15", ["bt"], 2, 1, out=received, overwrite=True)
         assert not {"runs.csv", "summary.csv", "manifest.json"} & set(found)
 
-    def test_results_of_another_campaign_than_the_store_s_are_not_drawn(
-        self, received: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_results_of_another_campaign_than_the_store_s_are_not_drawn(self, received, tmp_path, capsys):
         other = tmp_path / "other"
         run_campaign("seams2023", ["none"], 3, 2, out=other)
         shutil.copy(other / "campaign.sqlite", received / "campaign.sqlite")
@@ -218,13 +228,13 @@ class TestOverwrite:
         assert ended.value.code == 2
         assert "are of different campaigns" in capsys.readouterr().err
 
-    def test_a_campaign_with_more_runs_is_the_same_campaign(self, received: Path) -> None:
+    def test_a_campaign_with_more_runs_is_the_same_campaign(self, received):
         before = json.loads((received / "manifest.json").read_text())["campaign_sha256"]
         resume_campaign(received, runs=4)
         assert json.loads((received / "manifest.json").read_text())["campaign_sha256"] == before
 
 
-def test_the_time_out_follows_the_reasoner() -> None:
+def test_the_time_out_follows_the_reasoner():
     def default(**options: object) -> float:
         return read_campaign(CampaignSpec.of("seams2023", managers=["none"], **options), None).spec.time_out_s
 

@@ -1,7 +1,5 @@
 """A campaign that is told to stop, by Ctrl-C or by kill, keeps what is done and leaves no empty folder."""
 
-from __future__ import annotations
-
 import _thread
 import csv
 import os
@@ -36,7 +34,7 @@ def wait_for(path: Path, size: int = 0) -> None:
 
 @pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(("number", "workers"), [*zip(STATUS, (1, 2), strict=True)])
-def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Path, tmp_path: Path) -> None:
+def test_what_is_done_is_kept(number, workers, scenario, tmp_path):
     asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
     process = chaos.start(asked, tmp_path)
     wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
@@ -59,7 +57,7 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
 @pytest.mark.parametrize(
     ("number", "after_s"), [(signal.SIGINT, 0.0), (signal.SIGTERM, 0.0), (signal.SIGINT, 0.3), (signal.SIGTERM, 0.3)]
 )
-def test_no_empty_folder_is_left(number: signal.Signals, after_s: float, scenario: Path, tmp_path: Path) -> None:
+def test_no_empty_folder_is_left(number, after_s, scenario, tmp_path):
     process = chaos.start([str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path)
     wait_for(tmp_path / "out" / STORE_FILE)
     time.sleep(after_s)
@@ -74,7 +72,7 @@ def test_no_empty_folder_is_left(number: signal.Signals, after_s: float, scenari
 
 
 @pytest.mark.usefixtures("quick_campaigns")
-def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) -> None:
+def test_workers_leave_ctrl_c_to_the_campaign(scenario, tmp_path):
     """A terminal sends it to all processes of a command; each would say so in many lines."""
     process = chaos.start(
         [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"], tmp_path
@@ -86,7 +84,7 @@ def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGTERM])
-def test_a_signal_to_all_its_processes_is_told_once(number: signal.Signals, scenario: Path, tmp_path: Path) -> None:
+def test_a_signal_to_all_its_processes_is_told_once(number, scenario, tmp_path):
     """As a terminal sends it that is closed, or a scheduler of jobs."""
     command = [sys.executable, "-m", "suave_des", "campaign", str(scenario), "--managers", "none", "--quiet"]
     process = subprocess.Popen(
@@ -106,7 +104,7 @@ def test_a_signal_to_all_its_processes_is_told_once(number: signal.Signals, scen
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
 
 
-def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeypatch):
     started: list[BaseProcess] = []
     real = SpawnProcess.start
 
@@ -139,17 +137,13 @@ class TestInterruptedAtAnAwkwardMoment:
             "suave_des.campaign.campaign.in_process",
         ],
     )
-    def test_before_the_first_mission_nothing_is_left(
-        self, moment: str, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_before_the_first_mission_nothing_is_left(self, moment, scenario, tmp_path, monkeypatch):
         monkeypatch.setattr(moment, ctrl_c)
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
-    def test_before_an_earlier_campaign_is_replaced_its_missions_stay(
-        self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_before_an_earlier_campaign_is_replaced_its_missions_stay(self, scenario, tmp_path, monkeypatch):
         out = tmp_path / "out"
         run_campaign(scenario, ["none"], 2, 1, out=out)
         before = {path.name: path.read_bytes() for path in out.iterdir()}
@@ -162,7 +156,7 @@ class TestInterruptedAtAnAwkwardMoment:
             name: content for name, content in before.items() if name.endswith(".csv")
         }
 
-    def test_between_two_transactions_what_comes_next_is_kept(self, tmp_path: Path) -> None:
+    def test_between_two_transactions_what_comes_next_is_kept(self, tmp_path):
         path = tmp_path / STORE_FILE
         store = Store(path)
         store.begin({})
@@ -173,9 +167,7 @@ class TestInterruptedAtAnAwkwardMoment:
         assert store.about("remarks") == ["mine"]
         store.close()
 
-    def test_while_files_are_written_it_says_how_to_have_them(
-        self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_while_files_are_written_it_says_how_to_have_them(self, scenario, tmp_path, monkeypatch):
         out = tmp_path / "out"
         with monkeypatch.context() as patch:
             patch.setattr("suave_des.campaign.results.write_campaign", ctrl_c)

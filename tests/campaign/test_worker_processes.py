@@ -1,8 +1,5 @@
 """How worker processes start, without the script that asked for them, and how they end."""
 
-from __future__ import annotations
-
-import os
 import subprocess
 import sys
 import time
@@ -10,28 +7,18 @@ from pathlib import Path
 
 import pytest
 
-import suave_des
 from benchmarks import chaos
 from suave_des import run_campaign
 from suave_des.campaign.spec import CampaignSpec
+from tests.helpers.command import python
 
-GUARD = 'if __name__ == "__main__":\n    '
 CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers=2).to_csv(index=False))\n"
 MINE = "from suave_des.managing.simple import RandomManager\nclass Mine(RandomManager):\n    pass\n"
 
 
 def run_script(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
     (folder / "script.py").write_text("from suave_des import run_campaign\n" + text)
-    path = os.pathsep.join([str(Path(suave_des.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "script.py"],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": path},
-        check=False,
-        timeout=240.0,
-    )
+    return python("script.py", cwd=folder)
 
 
 def call(scenario: Path, managers: list[str]) -> str:
@@ -43,22 +30,16 @@ def without_workers(scenario: Path, managers: list[str]) -> str:
     return run_campaign(str(scenario), managers, runs=12, seed=1, progress=False).to_csv(index=False)
 
 
-def test_a_script_needs_no_guard_nor_loads_the_compiler(scenario: Path, tmp_path: Path) -> None:
+def test_a_script_that_defines_a_manager_needs_no_guard_nor_loads_the_compiler(scenario, tmp_path):
     look = "import sys\nprint('numba' in sys.modules)\n"
-    done = run_script(call(scenario, ["random", "none"]) + look, tmp_path)
+    done = run_script(MINE + call(scenario, ["__main__:Mine", "none"]) + look, tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == without_workers(scenario, ["random", "none"]) + "\nFalse\n"
+    expected = without_workers(scenario, ["random", "none"]).replace(",random,", ",__main__:Mine,")
+    assert done.stdout == expected + "\nFalse\n"
     assert "numba" in sys.modules  # as the missions of this process need it
 
 
-@pytest.mark.parametrize("guard", ["", GUARD])
-def test_a_manager_that_the_script_defines_needs_no_guard_either(scenario: Path, tmp_path: Path, guard: str) -> None:
-    done = run_script(MINE + guard + call(scenario, ["__main__:Mine"]), tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == without_workers(scenario, ["random"]).replace(",random,", ",__main__:Mine,") + "\n"
-
-
-def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+def test_workers_end_with_the_process_that_started_them(tmp_path):
     """However that comes: a worker that nobody asks for anything would wait for ever."""
     process = chaos.start([*ASKED, "--runs", "100000", "--workers", "2", "--out", "out"], tmp_path)
     end_s = time.monotonic() + 60.0
@@ -86,9 +67,7 @@ class Writer(NoManager):
 """
 
 
-def test_what_a_manager_has_written_is_there_when_workers_have_ended(
-    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_manager_has_written_is_there_when_workers_have_ended(scenario, tmp_path, monkeypatch):
     (tmp_path / "writer.py").write_text(WRITER)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -121,9 +100,7 @@ class Cut(NoManager):
 
 
 @pytest.mark.usefixtures("quick_workers")
-def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(
-    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(scenario, tmp_path, monkeypatch, capfd):
     (tmp_path / "cut.py").write_text(CUT)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -1,7 +1,5 @@
 """Whatever stands in place of a file or number: one line that says where and what, status 2, nothing half-written."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -17,23 +15,13 @@ HUGE = "9" * 30
 Command = Callable[..., Any]
 
 
-def _ten_times(alias: int, name: int) -> bytes:
-    return b"%c: &%c [%s]\n" % (name, name, b",".join([b"*%c" % alias] * 10))
-
-
 @pytest.fixture(autouse=True)
 def _awkward_files(tmp_path: Path) -> None:
     contents = {
         "latin.txt": b"base: seams2023.yaml\ndescription: caf\xe9\n",
-        "utf16.txt": "base: seams2023.yaml\n".encode("utf-16"),
         "empty.txt": b"",
         "nul.txt": b"\0\0\0",
-        "list.txt": b"- a\n- b\n",
         "tab.txt": b"base: seams2023.yaml\n\tmission: 3\n",
-        "underscore.txt": b"base: seams2023.yaml\nmission: {time_limit_s: 1_000}\n",
-        "twice.txt": b"base: seams2023.yaml\r\nmission:\r\n  time_limit_s: 1e2\r\n  time_limit_s: 3\r\n",
-        "big.txt": b"#" * 2_000_000,
-        "bomb.txt": b"a: &a [x,x,x,x,x,x,x,x,x,x]\n" + b"".join(map(_ten_times, b"abcd", b"bcde")),
         "tag.txt": b'base: !!python/object/apply:os.system ["touch pwned"]\n',
         "file": b"",
     }
@@ -61,15 +49,9 @@ def assert_refused(command: Command, tmp_path: Path, arguments: tuple[str, ...],
     ("name", "words"),
     [
         ("latin.txt", ("latin.txt: line 2: is not UTF-8 text", "save it as UTF-8")),
-        ("utf16.txt", ("utf16.txt: line 1: is not UTF-8 text",)),
         ("empty.txt", ("empty.txt: line 1: is empty",)),
         ("nul.txt", ("nul.txt: line 1: holds ",)),
-        ("list.txt", ("list.txt: line 1: is not a mapping",)),
         ("tab.txt", ("tab.txt: line 2: is not valid YAML", "spaces, not tabs")),
-        ("underscore.txt", ("underscore.txt: line 2, mission.time_limit_s: '1_000' should be a number",)),
-        ("twice.txt", ("twice.txt: line 4, mission.time_limit_s: the key", "first in line 3")),
-        ("big.txt", ("big.txt: is larger than 1,000,000 bytes",)),
-        ("bomb.txt", ("bomb.txt: line 5, e: expands to more than 100,000 values",)),
         ("tag.txt", ("tag.txt: line 1, base: the tag", "is not allowed")),
         ("folder", ("folder: is a folder",)),
         ("loop", ("loop: ",)),
@@ -80,7 +62,7 @@ def assert_refused(command: Command, tmp_path: Path, arguments: tuple[str, ...],
         ("", ("is a folder",)),
     ],
 )
-def test_in_place_of_a_scenario(command: Command, tmp_path: Path, name: str, words: tuple[str, ...]) -> None:
+def test_in_place_of_a_scenario(command, tmp_path, name, words):
     assert_refused(command, tmp_path, ("run", name, "--manager", "none", "--out", "out"), *words)
     assert_refused(command, tmp_path, ("campaign", name, *CAMPAIGN[2:], "--out", "out"), *words)
 
@@ -101,7 +83,7 @@ def test_in_place_of_a_scenario(command: Command, tmp_path: Path, name: str, wor
     ],
     ids=" ".join,
 )
-def test_in_place_of_another_file(command: Command, tmp_path: Path, arguments: tuple[str, ...], name: str) -> None:
+def test_in_place_of_another_file(command, tmp_path, arguments, name):
     if "--rules" in arguments and name == "empty.txt":
         pytest.skip("a file without rules is one")
     assert_refused(command, tmp_path, (*arguments, name), name[:100])
@@ -126,15 +108,11 @@ def test_in_place_of_another_file(command: Command, tmp_path: Path, arguments: t
         ("", "not empty"),
     ],
 )
-def test_in_place_of_an_output_folder(
-    command: Command, tmp_path: Path, arguments: tuple[str, ...], out: str, words: str
-) -> None:
+def test_in_place_of_an_output_folder(command, tmp_path, arguments, out, words):
     assert_refused(command, tmp_path, (*arguments, "--out", out), words)
 
 
-def test_an_output_folder_that_may_not_be_written(
-    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_output_folder_that_may_not_be_written(command, tmp_path, monkeypatch):
     # A superuser may write everywhere.
     monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.W_OK)
     words = "folder: the output folder cannot be written"
@@ -146,24 +124,34 @@ def test_an_output_folder_that_may_not_be_written(
     ("arguments", "words"),
     [
         ((*RUN, "--seed", "-1"), "seed: -1 is out of range (give 0 to 9223372036854775807)"),
-        ((*RUN, "--seed", HUGE), "is out of range"),
         ((*RUN, "--run", HUGE), "run: "),
-        ((*RUN, "--run", "-3"), "run: -3 is out of range (give 1 to 1000000)"),
-        ((*CAMPAIGN, "--seed", "-1", "--out", "out"), "seed: -1 "),
-        ((*CAMPAIGN, "--runs", HUGE, "--out", "out"), "runs: "),
-        ((*CAMPAIGN, "--runs", "1e2", "--out", "out"), "--runs"),
-        ((*CAMPAIGN, "--time-out", "nan", "--out", "out"), "time_out_s: .nan "),
         ((*RUN, "--manager", ":"), "manager ':'"),
         ((*RUN, "--manager", "no.such.module:Class"), "no.such.module:Class"),
+        ((*RUN, "--manager", "rondom"), "did you mean random?"),
+        ((*RUN, "--manager", "os:path"), "os"),
+        ((*RUN, "--reasoner", "hermit"), "hermit"),
+        ((*RUN, "--mangager", "none"), "--mangager"),
+        ((*CAMPAIGN, "--runs", HUGE, "--out", "out"), "runs: "),
+        ((*CAMPAIGN, "--runs", "0", "--out", "out"), "runs: 0 "),
+        ((*CAMPAIGN, "--runs", "1e2", "--out", "out"), "--runs"),
+        ((*CAMPAIGN, "--workers", "0", "--out", "out"), "workers: 0 "),
+        ((*CAMPAIGN, "--time-out", "nan", "--out", "out"), "time_out_s: .nan "),
+        ((*CAMPAIGN, "--managers", "", "--out", "out"), "managers: "),
+        ((*CAMPAIGN, "--managers", "none,none", "--out", "out"), "twice"),
+        ((*CAMPAIGN, "--format", "excel", "--out", "out"), "--format"),
+        ((*CAMPAIGN,), "--out DIR is missing"),
+        (("campaign", "--out", "out"), "SCENARIO is missing"),
+        (("campaign", "--resume", "out", "--seed", "0"), "--seed cannot be used with --resume"),
+        (("campaign", "seams2023", "--resume", "out"), "SCENARIO cannot be used with --resume"),
+        (("campain",), "Did you mean 'campaign'?"),
+        (("figure", "nothing", "--out", "map.png"), "nothing: no such file"),
         (("campaign", "--resume", "folder"), "there is no campaign in it"),
         (("campaign", "--resume", "file"), "there is no campaign in it"),
         (("schema", "extra"), "extra"),
         (("figure", "file", "--out", "m.png"), "file: line 1: has no column 'manager'"),
     ],
 )
-def test_in_place_of_a_number_or_a_name(
-    command: Command, tmp_path: Path, arguments: tuple[str, ...], words: str
-) -> None:
+def test_in_place_of_a_number_or_a_name(command, tmp_path, arguments, words):
     assert_refused(command, tmp_path, arguments, words)
 
 
@@ -174,9 +162,7 @@ def test_in_place_of_a_number_or_a_name(
         b"\xef\xbb\xbfbase: seams2023.yaml\nmission: {time_limit_s: 1E1}\n",
     ],
 )
-def test_windows_line_ends_a_byte_order_mark_and_scientific_notation_are_fine(
-    command: Command, tmp_path: Path, text: bytes
-) -> None:
+def test_windows_line_ends_a_byte_order_mark_and_scientific_notation_are_fine(command, tmp_path, text):
     (tmp_path / "fine.yaml").write_bytes(text)
     status, out, error = command("run", "fine.yaml", "--manager", "none")
     assert (status, error) == (0, "")
@@ -190,31 +176,14 @@ class TestFigure:
         assert command(*CAMPAIGN, "--out", "campaign")[0] == 0
         return tmp_path
 
-    def test_damaged_files_are_named_with_line(self, command: Command, results: Path) -> None:
+    def test_damaged_files_are_named_with_line(self, command, results):
         mission, runs = results / "mission", results / "campaign" / "runs.csv"
         damages: list[tuple[Path, Callable[[str], str], str]] = [
             (mission / "trajectory.csv", lambda text: "", "trajectory.csv: cannot be read"),
-            (
-                mission / "trajectory.csv",
-                lambda text: text.replace("\n0.2,", "\nsoon,"),
-                "line 3: t_s: expected a finite number, got 'soon'",
-            ),
-            (
-                mission / "trajectory.csv",
-                lambda text: text.replace("\n0.2,", "\ninf,"),
-                "line 3: t_s: expected a finite number, got 'inf'",
-            ),
-            (
-                mission / "events.csv",
-                lambda text: text.replace("\n0.0,", "\nsoon,", 1),
-                "line 2: t_s: expected a finite number, got 'soon'",
-            ),
+            (mission / "trajectory.csv", lambda text: text.replace("\n0.2,", "\ninf,"), "line 3: t_s: expected a"),
+            (mission / "events.csv", lambda text: text.replace("\n0.0,", "\nsoon,", 1), "line 2: t_s: expected a"),
             (mission / "mission.json", lambda text: "{", "mission.json: is not JSON"),
-            (
-                mission / "mission.json",
-                lambda text: '{"metrics": {}, "scenario": {}}',
-                "mission.json: is not the record",
-            ),
+            (mission / "mission.json", lambda text: '{"metrics": {}, "scenario": {}}', "is not the record"),
             (mission / "mission.json", lambda text: text.replace('"seed"', '"sed"', 1), "seed is missing"),
             (runs, lambda text: "", "runs.csv: line 1: has no column"),
             (runs, lambda text: text.splitlines()[0] + "\n", "has no missions"),
@@ -228,10 +197,6 @@ class TestFigure:
             path.write_text(whole)
 
     @pytest.mark.parametrize("out", ["no/where.png", "file/m.png", "/proc/m.png", f"{LONG[:300]}.png", "folder.png"])
-    def test_a_picture_that_cannot_be_written(self, command: Command, results: Path, out: str) -> None:
+    def test_a_picture_that_cannot_be_written(self, command, results, out):
         (results / "folder.png").mkdir()
         assert_refused(command, results, ("figure", "campaign", "--out", out), "cannot be written: ")
-
-    @pytest.mark.parametrize("out", ["m", "m.xyz", ""])
-    def test_a_name_that_is_no_pictures(self, command: Command, results: Path, out: str) -> None:
-        assert_refused(command, results, ("figure", "campaign", "--out", out), "expected a picture")

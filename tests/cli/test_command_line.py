@@ -1,16 +1,20 @@
 """The command line: exit statuses, one line for an error, and what each command prints and writes."""
 
-from __future__ import annotations
-
+import csv
+import io
 import json
 import re
-import subprocess
-import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from suave_des.cli.console import PlainConsole, print_timeline
+from suave_des.cli.main import main
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
 from tests.helpers import rows_of
+from tests.helpers.command import python
 
 FILE = "campaign: 1\nscenario: seams2023\nmanagers: [none]\n"
 
@@ -31,17 +35,7 @@ class Raises(NoManager):
 
 
 class TestHelp:
-    def test_names_every_command(self, command) -> None:
-        ended = command("--help")
-        assert ended.status == 0
-        for name in ("run", "campaign", "reproduce", "figure", "scenarios", "schema"):
-            assert f"  {name} " in ended.out
-
-    @pytest.mark.parametrize("group", [(), ("kb",)])
-    def test_summaries_are_whole(self, command, group: tuple[str, ...]) -> None:
-        assert "..." not in command(*group, "--help").out.replace("[ARGS]...", "")
-
-    def test_imports_nothing_heavy(self) -> None:
+    def test_imports_nothing_heavy(self):
         code = (
             "import sys\n"
             "from suave_des.cli.main import main\n"
@@ -50,18 +44,7 @@ class TestHelp:
             " 'owlready2', 'rdflib', 'jpype', 'multiprocessing'}\n"
             "print(sorted(heavy & set(sys.modules)), file=sys.stderr)\n"
         )
-        ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        assert ended.stderr.strip() == "[]"
-
-    def test_without_arguments_it_prints_the_help(self, command) -> None:
-        ended = command()
-        assert (ended.status, ended.err) == (0, "")
-        assert ended.out.startswith("Usage: suave-des")
-
-    def test_version(self, command) -> None:
-        from suave_des import __version__
-
-        assert command("--version").out == f"suave-des {__version__}\n"
+        assert python("-c", code).stderr.strip() == "[]"
 
 
 @pytest.mark.parametrize(
@@ -72,35 +55,17 @@ class TestHelp:
         ("suave-des compare out --metrics search", "search_time_s"),
     ],
 )
-def test_a_shell_completes_names(command, monkeypatch: pytest.MonkeyPatch, begun: str, offered: str) -> None:
+def test_a_shell_completes_names(command, monkeypatch, begun, offered):
     monkeypatch.setenv("_SUAVE_DES_COMPLETE", "complete_bash")
     monkeypatch.setenv("COMP_WORDS", begun)
     monkeypatch.setenv("COMP_CWORD", str(len(begun.split()) - 1))
     assert command("").out.split() == [offered]
 
 
-def test_a_folder_with_brackets_is_named_as_it_is(command) -> None:
+def test_a_folder_with_brackets_is_named_as_it_is(command):
     folder = "new[b] :car:"
     ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", folder)
     assert ended.out.endswith(f"\n1 mission is in {folder}/runs.csv\n")
-
-
-class TestResume:
-    @pytest.mark.parametrize(
-        ("arguments", "words"),
-        [
-            (("--resume", "out", "--seed", "0"), "--seed cannot be used with --resume"),
-            (("seams2023", "--resume", "out"), "SCENARIO cannot be used with --resume"),
-            (("--resume", "nowhere"), "nowhere: there is no campaign in it"),
-            (("seams2023",), "--out DIR is missing"),
-            (("--out", "out"), "SCENARIO is missing"),
-        ],
-    )
-    def test_what_cannot_be_done_is_one_line(self, command, arguments: tuple[str, ...], words: str) -> None:
-        ended = command("campaign", *arguments)
-        assert (ended.status, ended.out) == (2, "")
-        assert words in ended.err
-        assert ended.err.count("\n") == 1
 
 
 class TestProgress:
@@ -114,9 +79,7 @@ class TestProgress:
         ],
         ids=lambda arguments: arguments[0],
     )
-    def test_is_on_stderr_unless_quiet(
-        self, arguments: tuple[str, ...], quiet: tuple[str, ...], command, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_is_on_stderr_unless_quiet(self, arguments, quiet, command, monkeypatch):
         monkeypatch.setattr("suave_des.campaign.progress._FIRST_LINE_S", 0.0)
         ended = command(*arguments, "--runs", "2", "--workers", "1", *quiet)
         assert ended.status == 0
@@ -125,7 +88,7 @@ class TestProgress:
 
 
 class TestRun:
-    def test_tells_the_mission_as_a_timeline(self, command) -> None:
+    def test_tells_the_mission_as_a_timeline(self, command):
         ended = command("run", "seams2023", "--manager", "none", "--seed", "1")
         assert ended.status == 0
         assert ended.err == ""
@@ -143,7 +106,7 @@ class TestRun:
         assert "\x1b" not in ended.out  # plain text, as this is no terminal
         assert all(line == line.rstrip() for line in ended.out.splitlines())
 
-    def test_writes_mission_events_and_trajectory(self, command, tmp_path: Path) -> None:
+    def test_writes_mission_events_and_trajectory(self, command, tmp_path):
         assert command("run", "seams2023", "--manager", "random", "--seed", "7", "--out", "out").status == 0
         out = tmp_path / "out"
         assert sorted(path.name for path in out.iterdir()) == ["events.csv", "mission.json", "trajectory.csv"]
@@ -163,27 +126,20 @@ class TestRun:
         assert mission["scenario"]["mission"]["time_limit_s"] == 300.0
         assert mission["command"][:3] == ["suave-des", "run", "seams2023"]
 
-    def test_is_the_campaigns_mission_of_that_run_and_seed(self, command, tmp_path: Path) -> None:
+    def test_is_the_campaigns_mission_of_that_run_and_seed(self, command, tmp_path):
         command("campaign", "seams2023", "--managers", "random", "--runs", "3", "--seed", "5", "--workers", "1", *OUT)
         command("run", "seams2023", "--manager", "random", "--seed", "5", "--run", "3", "--out", "mission")
         row = rows_of(tmp_path / "out" / "runs.csv")[2]
         metrics = json.loads((tmp_path / "mission" / "mission.json").read_text())["metrics"]
         assert {name: "" if value is None else str(value) for name, value in metrics.items()} == row
 
-    def test_refuses_a_folder_with_results(self, command, tmp_path: Path) -> None:
-        command("run", "seams2023", "--manager", "none", "--out", "out")
-        again = command("run", "seams2023", "--manager", "none", "--out", "out")
-        assert (again.status, again.out) == (2, "")
-        assert again.err.startswith("suave-des: out: the output folder is not empty")
-        assert command("run", "seams2023", "--manager", "none", "--out", "out", "--overwrite").status == 0
-
-    def test_a_manager_of_ones_own_from_the_current_folder(self, command, tmp_path: Path) -> None:
+    def test_a_manager_of_ones_own_from_the_current_folder(self, command, tmp_path):
         (tmp_path / "my_manager.py").write_text(MANAGER)
         ended = command("run", "seams2023", "--manager", "my_manager:Mine")
         assert ended.status == 0
         assert "about search_pipeline" in ended.out
 
-    def test_a_manager_that_raises_ends_with_status_3_and_one_line(self, command, tmp_path: Path) -> None:
+    def test_a_manager_that_raises_ends_with_status_3_and_one_line(self, command, tmp_path):
         (tmp_path / "clumsy.py").write_text(MANAGER)
         ended = command("run", "seams2023", "--manager", "clumsy:Raises", "--out", "out")
         assert ended.status == 3
@@ -200,55 +156,8 @@ def _matches(text: str, pattern: str) -> bool:
     return re.match(pattern, text) is not None
 
 
-class TestBadInput:
-    """Each is one line on the error stream, exit status 2, and no folder."""
-
-    @pytest.mark.parametrize(
-        ("arguments", "words"),
-        [
-            (["run", "nowhere.yaml", *OUT], "nowhere.yaml: no such file"),
-            (["run", "seams2023", "--manager", "rondom", *OUT], "did you mean random?"),
-            (["run", "seams2023", "--manager", "os:path", *OUT], "os"),
-            (["run", "seams2023", "--reasoner", "hermit", *OUT], "hermit"),
-            (["campaign", "seams2023", "--managers", "", *OUT], "managers: "),
-            (["campaign", "seams2023", "--managers", "none,nome", *OUT], "'nome' (did you mean none?"),
-            (["campaign", "seams2023", "--managers", "none,none", *OUT], "twice"),
-            (["campaign", "seams2023", "--workers", "0", *OUT], "workers: 0 "),
-            (["campaign", "seams2023", "--runs", "0", *OUT], "runs: 0 "),
-            (["campaign", "seams2023", "--runs", "many", *OUT], "--runs"),
-            (["campaign", "seams2023", "--format", "excel", *OUT], "--format"),
-            (["figure", "nothing", "--out", "map.png"], "nothing: no such file"),
-            (["figure", ".", "--out", "map.xyz"], "map.xyz: expected a picture, got .xyz"),
-            (["campain"], "Did you mean 'campaign'?"),
-            (["run", "seams2023", "--mangager", "none"], "--mangager"),
-        ],
-    )
-    def test_is_told_in_one_line(self, arguments: list[str], words: str, command, tmp_path: Path) -> None:
-        ended = command(*arguments)
-        assert ended.status == 2
-        assert ended.err.startswith("suave-des: ")
-        assert ended.err.count("\n") == 1
-        assert words in ended.err
-        assert ended.out == ""
-        assert list(tmp_path.iterdir()) == []
-
-    def test_in_a_scenario_it_names_the_file_and_the_line(self, command, tmp_path: Path) -> None:
-        (tmp_path / "mine.yaml").write_text("base: seams2023.yaml\nmission:\n  time_limit_m: 300\n")
-        ended = command("run", "mine.yaml", *OUT)
-        assert ended.status == 2
-        assert _matches(ended.err, r"suave-des: mine\.yaml: line 3, .*time_limit_m.*did you mean '?time_limit_s")
-        assert not (tmp_path / "out").exists()
-
-
 class TestCampaign:
-    def test_prints_a_summary_and_no_progress_bar(self, command, tmp_path: Path) -> None:
-        ended = command("campaign", "seams2023", "--managers", "none,random", "--runs", "2", "--workers", "1", *OUT)
-        assert (ended.status, ended.err) == (0, "")
-        assert "\x1b" not in ended.out
-        assert "4 missions are in out/runs.csv" in ended.out
-        assert len(rows_of(tmp_path / "out" / "runs.csv")) == 4
-
-    def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, command, tmp_path: Path) -> None:
+    def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, command, tmp_path):
         (tmp_path / "clumsier.py").write_text(MANAGER)
         managers = "clumsier:Raises,none"
         arguments = ("--managers", managers, "--runs", "2", "--workers", "1", "--quiet", *OUT)
@@ -263,31 +172,66 @@ class TestCampaign:
         assert len(rows) == 2
 
 
-class TestReproduce:
-    def test_prints_the_papers_table_beside_ours_and_writes_it(self, command, tmp_path: Path) -> None:
-        ended = command("reproduce", "--runs", "2", "--seed", "1", "--workers", "1", "--quiet", *OUT)
-        assert (ended.status, ended.err) == (0, "")
-        for figure in ("187.85", "42.40", "31.40", "13.00", "180.15", "82.05", "3.88", "3.19"):
-            assert figure in ended.out
-        for figure in ("106.95", "39.46", "51.15", "12.01"):
-            assert figure in ended.out
-        assert "Paper: 20 missions for each manager. Here: 2 missions for each manager." in ended.out
-        assert max(map(len, ended.out.splitlines())) <= 100
-        rows = rows_of(tmp_path / "out" / "runs.csv")
-        assert [row["manager"] for row in rows] == ["none"] * 2 + ["random"] * 2 + ["metacontrol"] * 2
-        table = (tmp_path / "out" / "paper_table.md").read_text(encoding="utf-8")
-        mean = sum(float(row["search_time_s"]) for row in rows[:2]) / 2
-        assert f"| {mean:.2f} |" in table and f"| {mean - 187.85:+.2f} |" in table
+@pytest.mark.parametrize("terminal", [False, True])
+def test_each_event_is_one_line_whatever_its_detail_has(terminal):
+    result = Simulator(load_scenario("seams2023")).run("metacontrol", 1, 8, record=True)
+    first = replace(result.events[0], detail="first\nsecond\r\nthird")
+    file = io.StringIO()
+    console = PlainConsole(file=file, width=80, force_terminal=terminal, color_system=None)
+    print_timeline(console, replace(result, events=(first, *result.events[1:])))
+    lines = file.getvalue().splitlines()
+    details = ["first second third", *(event.detail for event in result.events[1:])]
+    assert all(line.endswith(detail) for line, detail in zip(lines[3 : 3 + len(details)], details, strict=True))
+    assert lines[-1].split()[-2:] == ["300.1", "s"]
 
 
-def test_scenarios_lists_what_is_shipped(command) -> None:
-    ended = command("scenarios")
-    assert ended.status == 0
-    for name in ("seams2023", "release15", "paper_table_values", "suave_modes.yaml", "suave.owl"):
-        assert name in ended.out
+HEAD = "campaign: 1\nscenario: short.yaml\nmanagers: [none]\nruns: 1\n"
+SHORT = "base: seams2023.yaml\nmission: {time_limit_s: 2}\n"
+PERIODS = "sweep:\n  visibility.period_s: [{}]\n"
+SAMPLE = """\
+sample:
+  method: sobol
+  points: 8
+  ranges:
+    visibility.period_s: [40, 160]
+    signals.water_visibility.minimum: [1.25, 1.75]
+    start.x_m: [-18, -16]
+"""
 
 
-def test_schema_is_the_json_schema_of_scenarios(command) -> None:
-    from suave_des.scenario.schema import scenario_schema
+def printed(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """Run a campaign file's missions; return the lines from the table's heading on."""
+    (folder / "short.yaml").write_text(SHORT)
+    (folder / "sweep.yaml").write_text(HEAD + text)
+    with pytest.raises(SystemExit, match="0"):
+        main(["campaign", str(folder / "sweep.yaml"), "--out", str(folder / "out"), "--workers", "1", "--quiet"])
+    return capsys.readouterr().out.splitlines()
 
-    assert json.loads(command("schema").out) == scenario_schema() == json.loads(command("schema", "scenario").out)
+
+@pytest.mark.parametrize(("points", "shown"), [(40, 40), (41, 39), (57, 39)])
+def test_a_long_sweep_has_its_first_rows_and_where_the_others_are(points, shown, tmp_path, capsys):
+    lines = printed(PERIODS.format(", ".join(str(40 + number) for number in range(points))), tmp_path, capsys)
+    rows = [line.split()[0] for line in lines if line.split()[1:2] == ["none"]]
+    assert rows == [str(40 + number) for number in range(shown)]
+    more = [line for line in lines if "rows more" in line]
+    if shown == points:
+        assert more == []
+    else:
+        assert more == [f"... and {points - shown} rows more, all in {tmp_path}/out/summary.csv"]
+    with (tmp_path / "out" / "summary.csv").open() as file:
+        assert sum(1 for _ in csv.DictReader(file)) == points
+
+
+@pytest.mark.parametrize(("width", "digits"), [(80, 4), (200, 6)])
+def test_drawn_values_are_rounded_and_names_broken_to_fit_the_terminal(width, digits, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    lines = printed("sweep:\n" + "".join(f"  {line}\n" for line in SAMPLE.splitlines()), tmp_path, capsys)
+    table = lines[: next(number for number, line in enumerate(lines) if "missions are in" in line)]
+    assert max(map(len, table)) <= width
+    assert not any("…" in line for line in table)
+    rows = [line.split()[:3] for line in table if "none" in line.split()]
+    with (tmp_path / "out" / "summary.csv").open() as file:
+        parameters = ("visibility.period_s", "signals.water_visibility.minimum", "start.x_m")
+        exact = [[float(row[parameter]) for parameter in parameters] for row in csv.DictReader(file)]
+    assert rows == [[f"{value:.{digits}g}" for value in values] for values in exact]
+    assert any(len(repr(value)) > 8 for values in exact for value in values)  # or nothing was rounded

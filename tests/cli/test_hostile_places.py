@@ -1,6 +1,4 @@
-"""Commands where something of the system is missing, damaged, closed, or made by somebody else."""
-
-from __future__ import annotations
+"""Commands where something of the system is missing, damaged, closed, made by somebody else, or asks to stop."""
 
 import os
 import signal
@@ -15,7 +13,9 @@ from suave_des import caches
 from suave_des.cli.console import plain
 from suave_des.cli.main import main
 from suave_des.errors import InputError
+from suave_des.interrupts import Stopped, exit_status, signals_raised
 from suave_des.knowledge.pellet import TimeLimit
+from tests.helpers.command import python
 
 COMMAND = [sys.executable, "-P", "-m", "suave_des"]
 CHECKOUT = Path(caches.__file__).parent.parent
@@ -44,9 +44,7 @@ def small_loop(tmp_path: Path) -> list[str]:
 
 
 class TestCacheFolder:
-    def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(
-        self, tmp_path: Path, small_loop: list[str]
-    ) -> None:
+    def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(self, tmp_path, small_loop):
         kept = {
             name: value for name, value in os.environ.items() if name not in ("SUAVE_DES_CACHE_DIR", "NUMBA_CACHE_DIR")
         }
@@ -61,7 +59,7 @@ class TestCacheFolder:
     @pytest.mark.parametrize(
         "damage", ["flip", *(pytest.param(each, marks=pytest.mark.slow) for each in ("cut", "text"))]
     )
-    def test_with_damaged_machine_code_is_mended(self, tmp_path: Path, damage: str, small_loop: list[str]) -> None:
+    def test_with_damaged_machine_code_is_mended(self, tmp_path, damage, small_loop):
         cache = tmp_path / "cache"
         environment = {**os.environ, "SUAVE_DES_CACHE_DIR": str(cache)}
         environment.pop("NUMBA_CACHE_DIR", None)
@@ -88,9 +86,7 @@ class TestCacheFolder:
         assert {path.read_bytes() for path in files} != {b"hello"}
         assert result() == "55.0\n"
 
-    def test_of_somebody_else_or_behind_a_link_is_not_used(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_of_somebody_else_or_behind_a_link_is_not_used(self, tmp_path, monkeypatch, capsys):
         monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path / "cache"))
         (tmp_path / "theirs").mkdir()
         (tmp_path / "cache").mkdir()
@@ -101,7 +97,7 @@ class TestCacheFolder:
         assert "is used instead" in capsys.readouterr().err
         assert not list((tmp_path / "theirs").iterdir())
 
-    def test_that_others_may_enter_is_closed_to_them(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_that_others_may_enter_is_closed_to_them(self, tmp_path, monkeypatch):
         monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path))
         (tmp_path / "java").mkdir(mode=0o755)
         assert caches.private_cache("java") == tmp_path / "java"
@@ -109,7 +105,7 @@ class TestCacheFolder:
 
 
 class TestCurrentFolder:
-    def test_files_named_like_python_s_own_modules_are_not_run_by_workers(self, tmp_path: Path) -> None:
+    def test_files_named_like_python_s_own_modules_are_not_run_by_workers(self, tmp_path):
         for name in ("signal", "types", "re", "random", "numpy", "suave_des"):
             (tmp_path / f"{name}.py").write_text(f"open('ran-{name}', 'w')\nraise RuntimeError\n")
         (tmp_path / "mine.py").write_text(
@@ -124,7 +120,7 @@ class TestCurrentFolder:
 class TestStopped:
     @pytest.mark.parametrize(("number", "status"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
     @pytest.mark.parametrize("after_s", [0.1, pytest.param(0.5, marks=pytest.mark.slow)])
-    def test_as_it_starts_it_ends_in_one_line(self, tmp_path: Path, number: str, status: int, after_s: float) -> None:
+    def test_as_it_starts_it_ends_in_one_line(self, tmp_path, number, status, after_s):
         program = (
             "import os, signal, sys, threading, time\n"
             "from suave_des.entry import main\n"
@@ -134,24 +130,23 @@ class TestStopped:
             "main()\n"
             "time.sleep(5)\n"
         )
-        command = [sys.executable, "-c", program, "x", "campaign", "seams2023", "--runs", "300", "--out", "out"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        done = python("-c", program, "x", "campaign", "seams2023", "--runs", "300", "--out", "out", cwd=tmp_path)
         assert done.returncode == status
         assert "Traceback" not in done.stderr
         assert len(done.stderr.splitlines()) == 1
 
     @pytest.mark.parametrize(("number", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
-    def test_while_arguments_are_read_it_ends_in_one_line(self, tmp_path: Path, number: str, status: int) -> None:
+    def test_while_arguments_are_read_it_ends_in_one_line(self, tmp_path, number, status):
         program = (
             "import os, signal\n"
             "from suave_des.cli import main\n"
             f"main._Commands.parse_args = lambda *_: os.kill(os.getpid(), signal.{number})\n"
             "main.main(['scenarios'])\n"
         )
-        done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        done = python("-c", program, cwd=tmp_path)
         assert (done.returncode, done.stderr) == (status, "suave-des: interrupted\n")
 
-    def test_what_the_signal_left_half_made_says_nothing(self) -> None:
+    def test_what_the_signal_left_half_made_says_nothing(self):
         program = (
             "import os, signal\n"
             "from suave_des.interrupts import Stopped, signals_raised\n"
@@ -168,11 +163,11 @@ class TestStopped:
             "except Stopped:\n"
             "    del second\n"
         )
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+        done = python("-c", program)
         assert (done.returncode, done.stderr) == (0, "")
 
     @pytest.mark.slow
-    def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path: Path) -> None:
+    def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path):
         for place in range(60):
             process = subprocess.Popen(
                 [*COMMAND, *ONE_MISSION], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -187,12 +182,12 @@ class TestStopped:
 
 
 class TestOutput:
-    def test_in_ascii_has_other_characters(self, tmp_path: Path) -> None:
+    def test_in_ascii_has_other_characters(self, tmp_path):
         done = run(*CAMPAIGN, cwd=tmp_path, PYTHONIOENCODING="ascii")
         assert done.returncode == 0
         assert "+-" in done.stdout and done.stdout.isascii()
 
-    def test_that_nobody_reads_is_no_error_and_results_are_kept(self, tmp_path: Path) -> None:
+    def test_that_nobody_reads_is_no_error_and_results_are_kept(self, tmp_path):
         arguments = [*COMMAND, *CAMPAIGN, "--quiet"]
         process = subprocess.Popen(arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         process.stdout.close()
@@ -201,51 +196,35 @@ class TestOutput:
         assert told == b""
         assert (tmp_path / "out" / "runs.csv").is_file()
 
-    def test_has_no_control_characters_of_others(self, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_has_no_control_characters_of_others(self, capsys):
         with pytest.raises(SystemExit):
             main(["run", "\x1b]0;owned\x07\x1b[31mred.yaml"])
         assert "\x1b" not in capsys.readouterr().err
         assert plain("a\x1b[31m\u202eb ± é\n") == "a\\x1b[31m\\u202eb ± é\n"
 
 
-@pytest.fixture(scope="module")
-def temporary(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("temporary")
-
-
-@pytest.fixture(scope="module")
-def reasoned(temporary: Path) -> subprocess.CompletedProcess[str]:
-    """A command that asks Pellet, where variables have options for every Java that it must not get."""
+def test_java_takes_no_options_from_the_environment_and_leaves_nothing_in_the_temporary_folder(tmp_path):
     options = {"JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption", "_JAVA_OPTIONS": "-XX:+NoSuchOption"}
     arguments = ["kb", "infer", "--reasoner", "pellet", "--at", "water_visibility=1"]
-    return run(*arguments, cwd=temporary, TMPDIR=str(temporary), **options)
-
-
-class TestJava:
-    def test_takes_no_options_from_the_environment(self, reasoned: subprocess.CompletedProcess[str]) -> None:
-        assert (reasoned.returncode, reasoned.stderr) == (0, "")
-
-    def test_leaves_nothing_in_the_temporary_folder(
-        self, reasoned: subprocess.CompletedProcess[str], temporary: Path
-    ) -> None:
-        assert reasoned.returncode == 0
-        assert not list(temporary.glob(".java_pid*"))
+    done = run(*arguments, cwd=tmp_path, TMPDIR=str(tmp_path), **options)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not list(tmp_path.glob(".java_pid*"))
 
 
 class TestLimits:
     @pytest.mark.parametrize("seconds", [float("inf"), float("nan"), 0.0, -1.0, 1e300])
-    def test_that_cannot_be_waited_for_are_refused(self, seconds: float) -> None:
+    def test_that_cannot_be_waited_for_are_refused(self, seconds):
         with pytest.raises(InputError, match=r"--time-limit: .* is out of range"):
             TimeLimit(seconds, "--time-limit")
 
     CATASTROPHIC = 'SELECT ?x WHERE { ?x a ?c . FILTER(REGEX("' + "a" * 44 + '", "(a+)+b")) }'
 
-    def test_of_a_query_holds_within_a_regular_expression(self, tmp_path: Path) -> None:
+    def test_of_a_query_holds_within_a_regular_expression(self, tmp_path):
         done = run("kb", "query", "--time-limit", "1", self.CATASTROPHIC, cwd=tmp_path)
         assert done.returncode == 2
         assert done.stderr == "suave-des: answering the query: not done after 1 s (allow more with --time-limit)\n"
 
-    def test_sigterm_ends_such_a_query(self, tmp_path: Path) -> None:
+    def test_sigterm_ends_such_a_query(self, tmp_path):
         process = subprocess.Popen(
             [*COMMAND, "kb", "query", self.CATASTROPHIC], cwd=tmp_path, stderr=subprocess.PIPE, text=True
         )
@@ -254,7 +233,7 @@ class TestLimits:
         assert process.communicate(timeout=30)[1] == "suave-des: interrupted\n"
         assert process.returncode == 143
 
-    def test_of_open_files_is_reported(self, tmp_path: Path) -> None:
+    def test_of_open_files_is_reported(self, tmp_path):
         import resource
 
         arguments = ["campaign", "seams2023", "--managers", "none", "--runs", "9", "--workers", "2", "--out", "out"]
@@ -270,9 +249,7 @@ class TestLimits:
         assert "Traceback" not in done.stderr and "Too many open files" in done.stderr
 
     @pytest.mark.parametrize("option", ["--rules", "--ontology"])
-    def test_a_pipe_in_place_of_a_file_is_not_waited_for(
-        self, tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_a_pipe_in_place_of_a_file_is_not_waited_for(self, tmp_path, option, capsys):
         os.mkfifo(tmp_path / "pipe")
         with pytest.raises(SystemExit) as ended:
             main(["kb", "check", option, str(tmp_path / "pipe")])
@@ -282,14 +259,14 @@ class TestLimits:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which Linux has")
 @pytest.mark.parametrize("command", [["--help"], ["kb", "rules"], ONE_MISSION])
-def test_output_to_a_full_disk_is_told_in_one_line(command: list[str], tmp_path: Path) -> None:
+def test_output_to_a_full_disk_is_told_in_one_line(command, tmp_path):
     with Path("/dev/full").open("w") as full:
         done = subprocess.run([*COMMAND, *command], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "the output cannot be written: No space left on device" in done.stderr
 
 
-def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path: Path) -> None:
+def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path):
     out = tmp_path / os.fsdecode(b"L\xe4ufe")
     try:
         out.mkdir()
@@ -302,3 +279,59 @@ def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path: Pat
         )  # says the name: bytes
         assert done.returncode == 0, done.stderr
     assert (out / "report.html").is_file()
+
+
+class Deaf:
+    """What is raised as it is forgotten, nobody hears; nor in Python code that compiled code calls."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __del__(self) -> None:
+        signal.raise_signal(self.number)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_where_an_exception_is_lost_it_is_asked_again(number, capsys):
+    with signals_raised():
+        with pytest.raises(Stopped):
+            Deaf(number)
+            time.sleep(20.0)
+        assert exit_status() == 128 + number
+    assert capsys.readouterr().err == ""
+
+
+def test_what_else_is_lost_is_told_as_ever(monkeypatch):
+    class Clumsy:
+        def __del__(self) -> None:
+            raise ValueError
+
+    told = []
+    monkeypatch.setattr("sys.unraisablehook", lambda lost: told.append(lost.exc_type))
+    with signals_raised():
+        Clumsy()
+    assert told == [ValueError]
+
+
+def test_when_the_command_has_ended_nothing_is_asked_any_more(monkeypatch):
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: heard.append(number))
+    try:
+        with signals_raised():
+            Deaf(signal.SIGTERM)
+        time.sleep(0.3)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert heard == []
+
+
+def test_what_the_process_was_started_to_ignore_does_not_end_a_query():
+    code = (
+        "import signal\n"
+        "from suave_des.interrupts import ends_at_once\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "with ends_at_once(10.0, 'late'):\n    signal.raise_signal(signal.SIGHUP)\n"
+        "print('done')\n"
+    )
+    ended = python("-c", code)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done\n", "")

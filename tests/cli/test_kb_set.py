@@ -1,35 +1,18 @@
 """`--set KEY=VALUE` of the kb commands: values of the scenario, and measured values where a state is described."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
 
-from suave_des.cli.main import main
 from suave_des.kb import KnowledgeBase
 
 IMPROVES = "revision.metacontrol.improve_when_exceeded"
 STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibility=4")
 
 
-@pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Runs the command line in this process; returns status, output and errors."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> tuple[object, str, str]:
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        captured = capsys.readouterr()
-        return ended.value.code, captured.out, captured.err
-
-    return run
-
-
 @pytest.mark.parametrize(("improves", "functions"), [("true", ["f_generate_search_path"]), ("false", [])])
-def test_infer_decides_with_the_values_that_are_set(command, improves: str, functions: list[str]) -> None:
+def test_infer_decides_with_the_values_that_are_set(command, improves, functions):
     _, out, _ = command("kb", "infer", "--format", "json", *STATE, "--set", f"{IMPROVES}={improves}")
     assert [each["function"] for each in json.loads(out)["plan"]] == functions
 
@@ -48,13 +31,13 @@ def test_infer_decides_with_the_values_that_are_set(command, improves: str, func
         ("test",),
     ],
 )
-def test_every_command_that_takes_a_scenario_refuses_an_unknown_key(command, arguments: tuple[str, ...]) -> None:
+def test_every_command_that_takes_a_scenario_refuses_an_unknown_key(command, arguments):
     status, out, err = command("kb", *arguments, "--set", "mission.time_limt_s=9")
     assert (status, out) == (2, "")
     assert "--set" in err and "did you mean 'time_limit_s'" in err
 
 
-def test_missions_that_diff_runs_have_the_values_that_are_set(command) -> None:
+def test_missions_that_diff_runs_have_the_values_that_are_set(command):
     options = ("--missions", "1", "--quiet", "--max-failed", "0")
     means = []
     for limit_s in (20, 60):
@@ -66,12 +49,12 @@ def test_missions_that_diff_runs_have_the_values_that_are_set(command) -> None:
     assert means[0] <= 21.0 < means[1]
 
 
-def test_tests_that_are_written_cannot_have_values_that_are_set(command) -> None:
+def test_tests_that_are_written_cannot_have_values_that_are_set(command):
     status, _, err = command("kb", "test", "--coverage", "--write", "new.yaml", "--set", "knowledge.reasoner=pellet")
     assert status == 2 and "name it with --scenario" in err
     assert not Path("new.yaml").exists()
 
 
-def test_from_python_values_are_an_argument() -> None:
+def test_from_python_values_are_an_argument():
     base = KnowledgeBase.load(values={IMPROVES: False})
     assert KnowledgeBase.load().settings.improves_exceeded and not base.settings.improves_exceeded

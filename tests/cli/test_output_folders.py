@@ -1,7 +1,5 @@
 """--overwrite replaces results of the same kind only: a folder never holds a mission beside a campaign."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -27,7 +25,7 @@ def files() -> dict[str, bytes]:
         (RUN, VALIDATE, "a mission's results in it (events.csv)"),
     ],
 )
-def test_results_of_another_kind_are_left_alone(command, first, second, found) -> None:
+def test_results_of_another_kind_are_left_alone(command, first, second, found):
     assert command(*first)[0] == 0
     before = files()
     status, _, error = command(*second, "--overwrite")
@@ -39,14 +37,14 @@ def test_results_of_another_kind_are_left_alone(command, first, second, found) -
 
 
 @pytest.mark.parametrize("first", [REPRODUCE, VALIDATE])
-def test_a_new_campaign_takes_away_the_tables_of_the_one_that_it_replaces(command, first) -> None:
+def test_a_new_campaign_takes_away_the_tables_of_the_one_that_it_replaces(command, first):
     assert command(*first)[0] == 0
     Path("out/notes.txt").write_text("mine")
     assert command(*CAMPAIGN, "--overwrite")[0] == 0
     assert set(files()) == {"campaign.sqlite", "runs.csv", "summary.csv", "manifest.json", "notes.txt"}
 
 
-def test_every_file_that_a_command_writes_is_known(command) -> None:
+def test_every_file_that_a_command_writes_is_known(command):
     for arguments, family in (
         (RUN, "mission"),
         (CAMPAIGN, "campaign"),
@@ -56,13 +54,3 @@ def test_every_file_that_a_command_writes_is_known(command) -> None:
         here = (*arguments[:-1], f"{arguments[0]}-out")
         assert command(*here)[0] == 0
         assert {path.name for path in Path(here[-1]).iterdir()} <= set(FAMILIES[family])
-
-
-def test_the_known_files_are_those_of_the_modules_that_write_them() -> None:
-    from suave_des.records import knowledge, mission_folder, store
-    from suave_des.results import validation
-
-    assert {store.STORE_FILE, *store.FILES, *validation.FILES} <= set(FAMILIES["campaign"])
-    mission = {mission_folder.MISSION_FILE, mission_folder.EVENTS_FILE, mission_folder.TRAJECTORY_FILE}
-    mission |= {knowledge.KNOWLEDGE_FILE}
-    assert set(FAMILIES["mission"]) == mission

@@ -1,14 +1,23 @@
-"""Every command and code block of README and docs is run, and does what the page says."""
+"""Every command, code block and notebook of README and docs is run, and does what the page says."""
 
+import os
 import re
+import time
 import tomllib
 from difflib import unified_diff
+from pathlib import Path
 
+import nbformat
 import pytest
 from doc_blocks import IMAGES, PAGES, ROOT, Block, blocks_of, differs, run_page
+from jupyter_client.manager import KernelManager
 from make_screenshots import PICTURES
+from mkdocs_hooks import notebook_markdown
+from refresh_notebooks import NOTEBOOKS, executed, shown
 
-REFRESH = "if the new output is right, run python docs/refresh_outputs.py"
+from tests.helpers.command import python
+
+REFRESH = "if the new output is right, run python docs/refresh_outputs.py, of a notebook docs/refresh_notebooks.py"
 RUN_ALL = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/suave-des reproduce"
 TEST_ALL = "python3 -m venv .venv && .venv/bin/pip install '.[test]' && .venv/bin/pytest"
 README = ROOT / "README.md"
@@ -50,18 +59,18 @@ class TestDiffering:
     def block(self, text, **marks):
         return Block(README, 1, "console", marks, text)
 
-    def test_a_word_counts(self):
-        assert differs(self.block("fd_spiral_low\n"), "fd_spiral_high\n", quick=False)
-
-    def test_a_whole_number_counts(self):
-        assert differs(self.block("62 missions\n"), "63 missions\n", quick=False)
-
-    def test_a_decimal_may_be_a_hundredth_off(self):
-        assert not differs(self.block("mean 187.85\n"), "mean 187.91\n", quick=False)
-        assert differs(self.block("mean 187.85\n"), "mean 197.91\n", quick=False)
-
-    def test_a_missing_line_counts(self):
-        assert differs(self.block("one\ntwo\n"), "one\n", quick=False)
+    @pytest.mark.parametrize(
+        ("shown", "real", "counts"),
+        [
+            ("fd_spiral_low\n", "fd_spiral_high\n", True),
+            ("62 missions\n", "63 missions\n", True),
+            ("mean 187.85\n", "mean 187.91\n", False),
+            ("mean 187.85\n", "mean 197.91\n", True),
+            ("one\ntwo\n", "one\n", True),
+        ],
+    )
+    def test_a_word_a_whole_number_and_a_line_count_and_a_decimal_by_more_than_a_hundredth(self, shown, real, counts):
+        assert differs(self.block(shown), real, quick=False) is counts
 
     def test_shorter_runs_keep_their_rows(self):
         long = self.block("none 187.85 1 2\nrandom 180.15 3 4\n", test="--runs 3")
@@ -99,3 +108,60 @@ def test_every_picture_is_drawn_by_a_block_or_taken_by_the_script():
 def test_pictures_are_small_pngs(picture):
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert picture.stat().st_size < 300_000
+
+
+# Keeps the script, as Slurm does: dask-jobqueue removes it as soon as it is submitted.
+SBATCH = "#!/bin/sh\ncp $1 job.sh\nbash job.sh > job.log 2>&1 &\necho $! >> jobs\necho Submitted batch job $!\n"
+SCANCEL = "#!/bin/sh\nkill $@\n"
+
+
+def test_the_slurm_script_runs(tmp_path):
+    (script,) = [block.text for block in blocks_of(ROOT / "docs" / "guides" / "cluster.md") if "title" in block.marks]
+    for long, short in (("cores=32", "cores=1"), ("jobs=4", "jobs=1"), ("runs=100_000", "runs=2")):
+        assert long in script
+        script = script.replace(long, short)
+    (tmp_path / "on_slurm.py").write_text(script, encoding="utf-8")
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (commands / name).write_text(text)
+        (commands / name).chmod(0o755)
+    done = python("on_slurm.py", cwd=tmp_path, PATH=f"{commands}{os.pathsep}{os.environ['PATH']}")
+    assert done.stdout == "6 missions are in on_slurm/runs.csv\n", done.stderr
+    assert len((tmp_path / "on_slurm" / "runs.csv").read_text().splitlines()) == 1 + 6
+    (job,) = (tmp_path / "jobs").read_text().split()
+    end_s = time.monotonic() + 60.0
+    while Path(f"/proc/{job}").exists():  # which closing the cluster has cancelled
+        assert time.monotonic() < end_s
+        time.sleep(0.1)
+
+
+def test_there_are_four():
+    assert [path.stem for path in NOTEBOOKS] == ["first-campaign", "own-manager", "rules", "sweep-with-salib"]
+
+
+@pytest.fixture(scope="module")
+def kernel():
+    """Runs all notebooks: each imports the same modules and starts Java."""
+    manager = KernelManager()
+    yield manager
+    if manager.has_kernel:
+        manager.shutdown_kernel(now=True)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_runs_and_shows_what_it_showed(path, kernel, tmp_path):
+    kept = list(shown(nbformat.read(path, as_version=4)))
+    assert kept, "it was never run"
+    for text, now in zip(kept, shown(executed(path, tmp_path, kernel)), strict=True):
+        assert not differs(Block(path, 1, "text", {}, text), now, quick=False), f"{text}{now}{REFRESH}"
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_page_on_the_site_has_every_cell_and_output(path):
+    notebook = nbformat.read(path, as_version=4)
+    page = notebook_markdown(notebook)
+    for cell in notebook.cells:
+        assert cell.source in page
+    assert page.count("data:image/png") == sum(text == "a picture\n" for text in shown(notebook))
+    assert "<style" not in page

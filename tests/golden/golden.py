@@ -4,8 +4,6 @@
 CHANGELOG.md then names.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

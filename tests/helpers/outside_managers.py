@@ -44,11 +44,6 @@ class HandlesFailures(Deliberate):
             self.system.log("handles", str(error))
 
 
-class IgnoresFailures(Deliberate):
-    def adapt(self):
-        yield self.system.env.event().fail(LookupError("lost"))
-
-
 class Observer(ManagingSubsystem):
     """Records the diagnostics that it gets."""
 
@@ -83,62 +78,6 @@ class Lingering(Counted):
         Lingering.latest = self
 
 
-class FailsAtLaunch(ManagingSubsystem):
-    def __init__(self, system: System) -> None:
-        raise RuntimeError("at launch")
-
-
-class FailsOnRequest(ManagingSubsystem):
-    def task_requested(self, task: Task) -> None:
-        raise KeyError("no such task")
-
-
-class FailsOnCancellation(ManagingSubsystem):
-    def task_cancelled(self, task: Task) -> None:
-        raise ValueError("cannot stop")
-
-
-class FailsOnDiagnostic(ManagingSubsystem):
-    def diagnostic(self, diagnostic: Diagnostic) -> None:
-        if diagnostic.value == "FALSE":
-            raise ValueError("a thruster, too")
-
-
-class FailsInAdapt(ManagingSubsystem):
-    def __init__(self, system: System) -> None:
-        super().__init__(system)
-        self.period_s = self.starts_s = 12.0
-
-    def adapt(self) -> None:
-        raise ZeroDivisionError("division by zero")
-
-
-class FailsAfterAWhile(FailsInAdapt):
-    def adapt(self):
-        yield self.system.env.timeout(2.5)
-        raise ValueError("changed its mind")
-
-
-class YieldsANumber(FailsInAdapt):
-    def adapt(self):
-        yield 1.0
-
-
-class FailsInItsOwnProcess(ManagingSubsystem):
-    def task_requested(self, task: Task) -> None:
-        self.system.env.process(self._go())
-
-    def _go(self):
-        yield self.system.env.timeout(7.0)
-        raise ValueError("by itself")
-
-
-class NeverAdvances(ManagingSubsystem):
-    def __init__(self, system: System) -> None:
-        super().__init__(system)
-        self.period_s = 0.0
-
-
 class EventTriggered(ManagingSubsystem):
     """Depends on how the visibility compares with 2 and 3 m, and notes the times of its calls."""
 
@@ -166,16 +105,6 @@ class EventTriggeredByProperty(EventTriggered):
         return {"water_visibility": tuple(self.system.settings.get("thresholds_m", (2.0, 3.0)))}
 
 
-class DependsOnAList(EventTriggered):
-    """In no order, and as numbers of another type."""
-
-    depends_on: ClassVar = {"water_visibility": [3, 2]}
-
-
-class DependsOnAWord(EventTriggered):
-    depends_on: ClassVar = {"water_visibility": ("low",)}
-
-
 class DependsOnTheBattery(EventTriggered):
     depends_on: ClassVar = {"battery_level": (0.5,)}
 
@@ -192,10 +121,6 @@ class MayDependOnAnything(EventTriggered):
 
 class DoesNotDeclare(EventTriggered):
     """Derived from an event-triggered manager: what it does in adapt may depend on anything."""
-
-
-class DeclaresAgain(EventTriggered):
-    depends_on: ClassVar = EventTriggered.depends_on
 
 
 class NeverIdle(EventTriggered):
@@ -299,12 +224,6 @@ class ChangesModesInHooks(SearchesAsHighAsItCanSee):
         self.system.change_mode("f_generate_search_path", "fd_spiral_high")
 
 
-class AsksForTheRecord(ManagingSubsystem):
-    def __init__(self, system: System) -> None:
-        super().__init__(system)
-        RECORDED.append(system.recorded)
-
-
 class BlindInTheDark(Metacontrol):
     """Takes a visibility below 2 m for not a number."""
 
@@ -372,7 +291,6 @@ class DoesMore(Metacontrol):
         CALLED_S.append(self.system.now_s)
 
 
-RECORDED: list[bool] = []
 """Whether missions were recorded, as managers saw it."""
 
 CALLED_S: list[float] = []

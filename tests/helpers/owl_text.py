@@ -3,12 +3,33 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+import pytest
+
+from suave_des.resources import shipped_folder
+
 MakeOntology = Callable[..., Path]
 """Makes a changed copy of suave.owl: the fixture `suave_copy`."""
+
+
+@pytest.fixture
+def suave_copy(tmp_path: Path) -> MakeOntology:
+    """A copy of the shipped suave.owl in a folder of its own, with text replaced and individuals added."""
+
+    def make(extra: str = "", replace: Mapping[str, str] | None = None, name: str = "suave.owl") -> Path:
+        text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+        for old, new in (replace or {}).items():
+            assert old in text, f"{old!r} is not in the shipped suave.owl"
+            text = text.replace(old, new)
+        path = tmp_path / name
+        path.write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
+        return path
+
+    return make
+
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"

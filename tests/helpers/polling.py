@@ -8,10 +8,13 @@ That managers are called at each of their times is the product's own: in a missi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Final
+from itertools import product
+from typing import Any, Final
 from unittest import mock
+
+import pytest
 
 from suave_des.knowledge.state import Reasoning
 from suave_des.managed.mode_manager import ModeManager
@@ -96,3 +99,19 @@ def effects(simulator: Simulator, manager: str, run: int, *, record: bool) -> tu
 
     with mock.patch.object(ModeManager, "_take_effect", noted):
         return simulator.run(manager, run, 1, record=record).metrics, found
+
+
+def each_pair(fewest: Iterable[Any], second: Iterable[Any], third: Iterable[Any]) -> list[Any]:
+    """Return all cells as parameters of a test, of which those are quick that have each pair of levels among them.
+
+    Args:
+        fewest: levels of the factor with fewest; its pairs with the others are all there, as its levels take turns.
+        second: levels of another factor; all its pairs with the third are there.
+        third: levels of the last.
+    """
+    rotated = list(fewest)
+    cells = []
+    for (i, one), (j, two), (k, three) in product(enumerate(rotated), enumerate(second), enumerate(third)):
+        is_quick = i == (j + k) % len(rotated)
+        cells.append(pytest.param(one, two, three, marks=() if is_quick else pytest.mark.slow))
+    return cells

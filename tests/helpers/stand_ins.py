@@ -1,4 +1,4 @@
-"""Stand-ins for what a function of the managed subsystem needs around it, so that each moment can be worked out."""
+"""Stand-ins for what a function of the managed subsystem needs around it, and the shipped vehicle."""
 
 import random
 from collections.abc import Callable
@@ -11,7 +11,10 @@ from suave_des.managed.node import SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import Revision
-from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener
+from suave_des.simulation.prepared import vehicle_model
+from suave_des.vehicle import kernel
+from suave_des.vehicle.model import GRAVITY_M_PER_S2
+from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener, Vehicle, row_at
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -119,3 +122,16 @@ INACTIVE = Mode("fd_unground", False, {})
 
 def silent(source: str, event: str, detail: str) -> None:
     """A log that keeps nothing."""
+
+
+VEHICLE = load_scenario("seams2023").scenario.vehicle
+BLUEROV2 = vehicle_model(VEHICLE)
+DISPLACED_KG = BLUEROV2.water_density_kg_per_m3 * BLUEROV2.displaced_volume_m3
+NET_BUOYANCY_N = (DISPLACED_KG - BLUEROV2.mass_kg) * GRAVITY_M_PER_S2
+VIEW_TANGENT = VEHICLE.camera.tangent
+
+
+def nu(vehicle: Vehicle, t_s: float) -> tuple[float, ...]:
+    """The velocity nu at time t: body frame, six components in m/s and rad/s."""
+    vehicle.position(t_s)
+    return tuple(vehicle.track[row_at(t_s), kernel.VELOCITY].tolist())

@@ -1,5 +1,7 @@
 """Managers that are programs of their own, in whatever language."""
 
+import dataclasses
+import json
 import re
 import shutil
 import signal
@@ -7,11 +9,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
+import jsonschema
 import pytest
 
 from suave_des import InputError, run_campaign, run_mission
 from suave_des.interfaces import exec as programs
+from suave_des.metrics.result import MissionMetrics
 from tests.helpers.command import EXAMPLES, example_program
 
 HEAD = "import json, os, sys, time\nfor number, line in enumerate(sys.stdin):\n    message = json.loads(line)\n"
@@ -48,7 +53,7 @@ print(json.dumps(answer), flush=True)
 
 
 @pytest.mark.parametrize("language", EXAMPLES)
-def test_the_examples_carry_out_the_same_missions(language: str, tmp_path: Path) -> None:
+def test_the_examples_carry_out_the_same_missions(language, tmp_path):
     (tmp_path / "same.py").write_text(SAME)
     frame = run_campaign("seams2023", ["same:Same", f"exec:{example_program(language)}"], runs=5)
     one, other = (part.reset_index(drop=True) for _, part in frame.groupby("manager", observed=True))
@@ -73,12 +78,12 @@ class Same(Threshold):
 '''
 
 
-def test_what_it_says_stands_in_the_timeline() -> None:
+def test_what_it_says_stands_in_the_timeline():
     events = run_mission("seams2023", program(EVERY_PERIOD), 1, 1).events
     assert next(each.detail for each in events if each.event == "says") == "higher"
 
 
-def test_it_is_told_what_happens() -> None:
+def test_it_is_told_what_happens():
     note = "open('messages', 'a').write(line)\n"
     run_mission("seams2023", program(note + EVERY_PERIOD), 1, 1)
     import json
@@ -113,14 +118,14 @@ def test_it_is_told_what_happens() -> None:
         ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
     ],
 )
-def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body: str, words: str) -> None:
+def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body, words):
     manager = program(body)
     told = re.search(r"within (\S+) s", words)
     time_out_s = float(told[1]) if told else 60.0  # a busy machine takes its time to start a program
     assert words in failure(manager, manager_options={manager: {"time_out_s": time_out_s}})
 
 
-def test_after_a_failure_the_next_mission_begins_with_a_new_program() -> None:
+def test_after_a_failure_the_next_mission_begins_with_a_new_program():
     once = "if not os.path.exists('once'):\n    open('once', 'w'); sys.exit(1)\n"
     with pytest.warns(UserWarning, match="1 of 3 missions failed"):
         frame = run_campaign("seams2023", [program(once + EVERY_PERIOD)], runs=3)
@@ -146,18 +151,18 @@ def assert_all_ended() -> None:
 
 
 @pytest.mark.usefixtures("quick_workers")
-def test_programs_and_their_children_end_with_the_campaign() -> None:
+def test_programs_and_their_children_end_with_the_campaign():
     run_campaign("seams2023", [program(WITH_A_CHILD + EVERY_PERIOD)], runs=2, workers=2)
     assert_all_ended()
 
 
-def test_the_children_of_a_program_that_fails_end_with_its_mission() -> None:
+def test_the_children_of_a_program_that_fails_end_with_its_mission():
     failure(program(WITH_A_CHILD + "sys.exit(1)\n"))
     assert_all_ended()
 
 
 @pytest.mark.parametrize(("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (1, signal.SIGKILL)])
-def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers: int, number: int) -> None:
+def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers, number):
     manager = program(WITH_A_CHILD + "time.sleep(600)\n")
     options = ("--manager-option", "time_out_s=600", "--workers", str(workers), "--runs", "9", "--out", "out")
     command = (sys.executable, "-m", "suave_des", "campaign", "seams2023", "--managers", manager, *options)
@@ -176,17 +181,17 @@ def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers: i
         ("exec:'unclosed", "close the quotes"),
     ],
 )
-def test_a_command_that_cannot_be_run_is_bad_input(name: str, words: str) -> None:
+def test_a_command_that_cannot_be_run_is_bad_input(name, words):
     with pytest.raises(InputError, match=words):
         run_campaign("seams2023", [name], runs=1)
 
 
-def test_the_programs_files_are_hashed(tmp_path: Path) -> None:
+def test_the_programs_files_are_hashed(tmp_path):
     run_campaign("seams2023", [program(EVERY_PERIOD)], runs=1, out=tmp_path / "out")
     assert '"program.py"' in (tmp_path / "out" / "manifest.json").read_text()
 
 
-def test_a_resumed_campaign_runs_no_program_unasked(tmp_path: Path) -> None:
+def test_a_resumed_campaign_runs_no_program_unasked(tmp_path):
     from suave_des import resume_campaign
 
     manager = program(EVERY_PERIOD)
@@ -195,3 +200,95 @@ def test_a_resumed_campaign_runs_no_program_unasked(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="would run the code of exec:"):
         resume_campaign(received, runs=2)
     assert len(resume_campaign(received, runs=2, managers=[manager])) == 2
+
+
+RELAY = """
+import subprocess, sys
+program = subprocess.Popen(sys.argv[1:], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+with open("lines", "a", buffering=1) as record:
+    for message in sys.stdin:
+        program.stdin.write(message)
+        answer = program.stdout.readline()
+        record.write(message + answer)
+        print(answer, end="", flush=True)
+"""
+
+SUBSCRIBES_TO_ALL = """
+import json, sys
+for line in sys.stdin:
+    answer = {"log": ["taken"], "modes": {}}
+    if '"mission_started"' in line:
+        answer |= {"protocol": 1, "period_s": 5, "starts_s": 0.5, "depends_on": None,
+                   "subscribes_to": ["measured", "component_status", "pose", "distance"]}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    return programs.messages_schema()
+
+
+def validator(schema: dict[str, Any], definition: str) -> jsonschema.Draft202012Validator:
+    return jsonschema.Draft202012Validator({"$ref": f"#/$defs/{definition}", "$defs": schema["$defs"]})
+
+
+def assert_exchange_fits(command: str, scenario: str, schema: dict[str, Any]) -> list[dict[str, Any]]:
+    """Run a mission with a program; each message and each answer fits. Return the messages."""
+    Path("relay.py").write_text(RELAY)
+    run_mission(scenario, f"exec:{sys.executable} relay.py {command}", 1, 8)
+    lines = [json.loads(line) for line in Path("lines").read_text().splitlines()]
+    messages, answers = lines[::2], lines[1::2]
+    whole = jsonschema.Draft202012Validator(schema)
+    of = {name: validator(schema, name) for name in ("message", "first_answer", "answer")}
+    kinds: set[tuple[str, str | None]] = set()
+    for message, answer in zip(messages, answers, strict=True):
+        of["message"].validate(message)
+        is_first = message["type"] == "mission_started"
+        of["first_answer" if is_first else "answer"].validate(answer)
+        kind = (message["type"], message.get("kind"))
+        if kind not in kinds:  # the whole is any of these definitions
+            whole.validate(message)
+            whole.validate(answer)
+            kinds.add(kind)
+    assert messages[0]["type"] == "mission_started" and messages[-1]["type"] == "mission_ended"
+    return messages
+
+
+@pytest.mark.parametrize("language", EXAMPLES)
+def test_every_line_of_a_mission_of_the_examples_fits(language, schema):
+    messages = assert_exchange_fits(example_program(language), "seams2023", schema)
+    assert {"task_requested", "task_cancelled", "adapt"} <= {each["type"] for each in messages}
+
+
+def test_every_diagnostic_fits(schema):
+    Path("all.py").write_text(SUBSCRIBES_TO_ALL)
+    messages = assert_exchange_fits(f"{sys.executable} all.py", "extended", schema)
+    kinds = {each["kind"] for each in messages if each["type"] == "diagnostic"}
+    assert kinds == set(programs.KINDS)
+
+
+def test_the_schema_is_one_of_this_version_of_the_protocol_with_the_metrics_and_kinds_that_there_are(schema):
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["$id"].endswith(f":{programs.PROTOCOL}")
+    for name in ("mission_started", "first_answer"):
+        assert schema["$defs"][name]["properties"]["protocol"] == {"const": programs.PROTOCOL}
+    metrics = schema["$defs"]["mission_ended"]["properties"]["metrics"]
+    assert metrics["required"] == [each.name for each in dataclasses.fields(MissionMetrics)]
+    assert schema["$defs"]["diagnostic"]["properties"]["kind"]["enum"] == list(programs.KINDS)
+
+
+@pytest.mark.parametrize(
+    ("definition", "line"),
+    [
+        ("message", {"type": "adapt", "time_s": 1.0}),
+        ("message", {"type": "adapt", "time_s": -1.0, "measured": {}}),
+        ("message", {"type": "diagnostic", "time_s": 1.0, "kind": "pose", "key": "pose", "value": 1.0}),
+        ("answer", {"mode": {}}),
+        ("answer", {"modes": {"f_maintain_motion": 1}}),
+        ("first_answer", {"period_s": 0.0}),
+        ("first_answer", {"protocol": 2}),
+    ],
+)
+def test_a_line_that_is_none_of_the_protocol_does_not_fit(definition, line, schema):
+    assert not validator(schema, definition).is_valid(line)

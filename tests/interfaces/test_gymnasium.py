@@ -1,7 +1,5 @@
 """The Gymnasium environment."""
 
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -12,6 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 from suave_des import InputError, PipelineInspection, load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
+from tests.helpers.command import python
 
 NAME = "suave_des/PipelineInspection-v0"
 
@@ -32,7 +31,7 @@ def play(environment: gymnasium.Env, action: object, seed: int) -> tuple[list, f
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "release15"])
-def test_it_passes_gymnasiums_own_checker_without_a_warning(scenario: str) -> None:
+def test_it_passes_gymnasiums_own_checker_without_a_warning(scenario):
     environment = gymnasium.make(NAME, scenario=scenario).unwrapped
     assert isinstance(environment, PipelineInspection)
     with warnings.catch_warnings():
@@ -40,14 +39,14 @@ def test_it_passes_gymnasiums_own_checker_without_a_warning(scenario: str) -> No
         check_env(environment)
 
 
-def test_the_snippet_of_the_guide_works_when_it_is_copied_alone() -> None:
+def test_the_snippet_of_the_guide_works_when_it_is_copied_alone():
     page = Path(__file__).parents[2] / "docs" / "guides" / "other-programs.md"
     snippet = page.read_text().partition("## Gymnasium")[2].partition("```python\n")[2].partition("```")[0]
-    done = subprocess.run([sys.executable, "-c", snippet], capture_output=True, text=True)
+    done = python("-c", snippet)
     assert done.returncode == 0 and done.stdout.splitlines()[-1] == "47.4 87.0", done.stderr
 
 
-def test_an_episode_is_the_mission_of_its_seed(simulator: Simulator) -> None:
+def test_an_episode_is_the_mission_of_its_seed(simulator):
     environment = gymnasium.make(NAME, scenario=simulator)
     _, _, info = play(environment, [0, 0], seed=7)
     expected = simulator.run("none", 1, 7).metrics
@@ -55,13 +54,13 @@ def test_an_episode_is_the_mission_of_its_seed(simulator: Simulator) -> None:
     assert (found.search_time_s, found.distance_inspected_m) == (expected.search_time_s, expected.distance_inspected_m)
 
 
-def test_a_step_lasts_one_period(simulator: Simulator) -> None:
+def test_a_step_lasts_one_period(simulator):
     environment = gymnasium.make(NAME, scenario=simulator, period_s=7.5)
     environment.reset(seed=1)
     assert [environment.step([0, 0])[4]["time_s"] for _ in range(3)] == [7.5, 15.0, 22.5]
 
 
-def test_an_observation_has_what_monitors_measured(simulator: Simulator) -> None:
+def test_an_observation_has_what_monitors_measured(simulator):
     environment = gymnasium.make(NAME, scenario=simulator)
     names = environment.unwrapped.observation_names
     seen, _, info = play(environment, [2, 0], seed=3)
@@ -74,7 +73,7 @@ def test_an_observation_has_what_monitors_measured(simulator: Simulator) -> None
     assert set(high) == {2.0}
 
 
-def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simulator: Simulator) -> None:
+def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simulator):
     made = Simulator(load_scenario("release15"))  # there maintain_motion ends and begins with each task
     environment = gymnasium.make(NAME, scenario=made)
     names = environment.unwrapped.observation_names
@@ -84,7 +83,7 @@ def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simu
     assert {named["f_maintain_motion"] for named in inspecting[1:]} == {1.0}
 
 
-def test_the_reward_adds_up_to_what_it_weighs(simulator: Simulator) -> None:
+def test_the_reward_adds_up_to_what_it_weighs(simulator):
     weights = {"inspected_per_m": 2.0, "searched_per_s": -0.5, "found": 10.0, "adaptation": -3.0}
     environment = gymnasium.make(NAME, scenario=simulator, reward=weights)
     actions = np.random.default_rng(1).integers(0, [3, 2], (200, 2))
@@ -102,7 +101,7 @@ def test_the_reward_adds_up_to_what_it_weighs(simulator: Simulator) -> None:
 
 
 @pytest.mark.parametrize("action", [[3, 0], [0, 2], [-1, 0], [0], [0, 0, 0], 1, [0.5, 0], "no", None])
-def test_actions_out_of_range_are_refused(simulator: Simulator, action: object) -> None:
+def test_actions_out_of_range_are_refused(simulator, action):
     environment = gymnasium.make(NAME, scenario=simulator).unwrapped
     environment.reset(seed=1)
     with pytest.raises(InputError, match="action"):
@@ -118,26 +117,12 @@ def test_actions_out_of_range_are_refused(simulator: Simulator, action: object) 
         ({"scenario": "no_such_scenario"}, "no such file"),
     ],
 )
-def test_bad_options_are_refused(options: dict, words: str) -> None:
+def test_bad_options_are_refused(options, words):
     with pytest.raises(InputError, match=words):
         gymnasium.make(NAME, **options)
 
 
-def test_many_missions_side_by_side_are_those_of_single_environments(simulator: Simulator) -> None:
-    vector = gymnasium.make_vec(NAME, num_envs=3, scenario=simulator, period_s=10.0)
-    single = [gymnasium.make(NAME, scenario=simulator, period_s=10.0) for _ in range(3)]
-    observations, _ = vector.reset(seed=5)
-    for n, one in enumerate(single):
-        assert (one.reset(seed=5 + n)[0] == observations[n]).all()
-    actions = np.random.default_rng(3).integers(0, [3, 2], (25, 3, 2))
-    for step in actions:
-        observations, rewards, *_ = vector.step(step)
-        for n, one in enumerate(single):
-            observation, reward, *_ = one.step(step[n])
-            assert (observation == observations[n]).all() and reward == rewards[n]
-
-
-def test_observations_are_within_the_bounds_of_the_scenario(simulator: Simulator) -> None:
+def test_observations_are_within_the_bounds_of_the_scenario(simulator):
     environment = gymnasium.make(NAME, scenario=simulator)
     names = environment.unwrapped.observation_names
     space = environment.observation_space
@@ -158,13 +143,13 @@ def test_observations_are_within_the_bounds_of_the_scenario(simulator: Simulator
         ({"kind": "constant", "value": 0.0, "noise": {"distribution": "exponential", "mean": 0.1}}, -1.0, 3.6),
     ],
 )
-def test_bounds_follow_from_what_the_scenario_says_of_a_signal(signal: dict, low: float, high: float) -> None:
+def test_bounds_follow_from_what_the_scenario_says_of_a_signal(signal, low, high):
     made = Simulator(with_values(load_scenario("seams2023"), {"signals.water_visibility": signal}))
     space = gymnasium.make(NAME, scenario=made).observation_space
     assert (space.low[0], space.high[0]) == pytest.approx((low, high))
 
 
-def test_it_draws_the_way_so_far(simulator: Simulator) -> None:
+def test_it_draws_the_way_so_far(simulator):
     environment = gymnasium.make(NAME, scenario=simulator, render_mode="rgb_array").unwrapped
     environment.reset(seed=1)
     before = environment.render()

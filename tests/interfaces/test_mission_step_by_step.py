@@ -1,14 +1,12 @@
 """A mission that its caller advances: the same as any other, whatever the steps."""
 
-import subprocess
-import sys
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des import InputError, Mission, load_scenario
 from suave_des.simulation.simulator import Simulator
+from tests.helpers.command import python
 
 SEARCH = "f_generate_search_path"
 
@@ -20,14 +18,14 @@ def simulator() -> Simulator:
 
 @given(steps_s=st.lists(st.floats(0.0, 40.0), min_size=1, max_size=30))
 @settings(max_examples=30)
-def test_how_a_mission_is_cut_into_steps_changes_nothing(simulator: Simulator, steps_s: list[float]) -> None:
+def test_how_a_mission_is_cut_into_steps_changes_nothing(simulator, steps_s):
     mission = Mission(simulator, "metacontrol", run=2, seed=1)
     for step_s in steps_s:
         mission.advance(mission.now_s + step_s)
     assert mission.result().metrics == simulator.run("metacontrol", 2, 1).metrics
 
 
-def test_a_requested_mode_takes_effect_after_the_latency() -> None:
+def test_a_requested_mode_takes_effect_after_the_latency():
     mission = Mission("seams2023", run=1, record=True)
     mission.advance(10.0)
     mission.change_mode(SEARCH, "fd_spiral_high")
@@ -37,7 +35,7 @@ def test_a_requested_mode_takes_effect_after_the_latency() -> None:
     assert times_s == [pytest.approx(10.5, abs=0.5)]
 
 
-def test_it_shows_what_a_manager_would_see(simulator: Simulator) -> None:
+def test_it_shows_what_a_manager_would_see(simulator):
     mission = Mission(simulator, run=1)
     assert mission.measured("water_visibility") is None and mission.measured("water_visibility", 0.0) == 0.0
     mission.advance(60.0)
@@ -48,28 +46,19 @@ def test_it_shows_what_a_manager_would_see(simulator: Simulator) -> None:
     assert mission.distance_inspected_m == 0.0
 
 
-def test_it_stops_at_its_end(simulator: Simulator) -> None:
+def test_it_stops_at_its_end(simulator):
     mission = Mission(simulator, run=1)
     mission.advance(1e6)
     assert mission.is_over and mission.now_s == simulator.run("none", 1, 1).metrics.mission_duration_s
     assert mission.task is None
 
 
-def test_reading_the_metrics_on_the_way_changes_nothing(simulator: Simulator) -> None:
+def test_reading_the_metrics_on_the_way_changes_nothing(simulator):
     mission = Mission(simulator, run=5)
     while not mission.is_over:
         mission.advance(mission.now_s + 10.0)
         assert mission.metrics().mission_duration_s == mission.now_s
     assert mission.metrics().distance_inspected_m == simulator.run("none", 5, 1).metrics.distance_inspected_m
-
-
-def test_many_missions_of_one_simulator_may_go_on_at_once(simulator: Simulator) -> None:
-    missions = [Mission(simulator, run=run) for run in range(1, 4)]
-    while not all(mission.is_over for mission in missions):
-        for mission in missions:
-            mission.advance(mission.now_s + 25.0)
-    found = [mission.result().metrics.search_time_s for mission in missions]
-    assert found == [simulator.run("none", run, 1).metrics.search_time_s for run in range(1, 4)]
 
 
 @pytest.mark.parametrize(
@@ -80,32 +69,29 @@ def test_many_missions_of_one_simulator_may_go_on_at_once(simulator: Simulator) 
         ("generate_recharge_path", "normal", "there is no function 'generate_recharge_path'"),
     ],
 )
-def test_unknown_names_are_refused_with_what_is_known(
-    simulator: Simulator, function: str, mode: str, words: str
-) -> None:
+def test_unknown_names_are_refused_with_what_is_known(simulator, function, mode, words):
     with pytest.raises(InputError, match=words):
         Mission(simulator).change_mode(function, mode)
 
 
-def test_modes_are_the_managers_business_if_there_is_one(simulator: Simulator) -> None:
+def test_modes_are_the_managers_business_if_there_is_one(simulator):
     with pytest.raises(InputError, match="has a manager"):
         Mission(simulator, "none").change_mode(SEARCH, "fd_spiral_high")
 
 
 @pytest.mark.parametrize("until", [-1.0, 4.0, float("nan")])
-def test_it_does_not_go_back(simulator: Simulator, until: float) -> None:
+def test_it_does_not_go_back(simulator, until):
     mission = Mission(simulator)
     mission.advance(5.0)
     with pytest.raises(InputError, match="cannot go to"):
         mission.advance(until)
 
 
-def test_a_mission_loads_nothing_that_draws_learns_or_serves() -> None:
+def test_a_mission_loads_nothing_that_draws_learns_or_serves():
     program = (
         "import sys, suave_des\n"
         "suave_des.Mission('seams2023').advance(5.0)\n"
         "unused = {'matplotlib', 'plotly', 'gymnasium', 'http.server', 'distributed', 'pandas', 'owlready2', 'jpype'}\n"
         "print(sorted(unused & set(sys.modules)))"
     )
-    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert ended.stdout.strip() == "[]"
+    assert python("-c", program).stdout.strip() == "[]"

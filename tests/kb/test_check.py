@@ -1,14 +1,9 @@
 """kb check: good models pass, what Pellet finds, shapes, output and exit status."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re
-import subprocess
-import sys
 from decimal import Decimal
-from pathlib import Path
 
 import pytest
 
@@ -21,17 +16,18 @@ from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.resources import shipped_folder
 from tests.helpers.checks import SUAVE, errors, findings_of, found_by_pellet, only, subject
+from tests.helpers.command import suave_des_command
 from tests.helpers.owl_text import individual
 
 
-def test_the_shipped_ontology_has_one_note(tmp_path: Path) -> None:
+def test_the_shipped_ontology_has_one_note(tmp_path):
     (note,) = check(Subject())
     assert (note.level, note.rule) == (Level.INFO, None)
     assert note.message.startswith("rules for other models, which never fire in this one: QAenergy, ")
     assert [each.level for each in found_by_pellet(tmp_path)] == [Level.INFO] * 2  # and a file without rules
 
 
-def test_pellet_is_not_asked_again_about_what_did_not_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pellet_is_not_asked_again_about_what_did_not_change(tmp_path, monkeypatch):
     rules = "A: hasValue(?q, ?v) ^ lessThan(?v, 1) -> Role(?q)\n"
     findings = found_by_pellet(tmp_path, rules)
     monkeypatch.setattr(InProcessPellet, "__init__", lambda *_: pytest.fail("Java was asked"))
@@ -40,7 +36,7 @@ def test_pellet_is_not_asked_again_about_what_did_not_change(tmp_path: Path, mon
         found_by_pellet(tmp_path, rules.replace("1", "1.1"))
 
 
-def test_shapes_are_checked_once_for_the_same_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shapes_are_checked_once_for_the_same_files(tmp_path, monkeypatch):
     def shaped(name: str) -> list[str]:
         extra = f'<tomasys:QAvalue rdf:about="{SUAVE}{name}"/><tomasys:QAvalue rdf:about="{SUAVE}one" rdfs:label=""/>'
         return [each.message for each in errors(findings_of(subject(tmp_path, extra=extra)))]
@@ -53,7 +49,7 @@ def test_shapes_are_checked_once_for_the_same_files(tmp_path: Path, monkeypatch:
         shaped("other")
 
 
-def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report_and_range() -> None:
+def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report_and_range():
     base = Ontology.load()
     states = list(states_to_ask(base))
     assert len(states) < 100
@@ -64,19 +60,19 @@ def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report
         assert {(state.grounded(function), *state.measured("water_visibility")) for state in states} > wanted
 
 
-def test_an_attribute_that_is_declared_again_with_the_same_operator_is_no_error(edited) -> None:
+def test_an_attribute_that_is_declared_again_with_the_same_operator_is_no_error(suave_copy):
     again = individual("water_visibility", "QualityAttributeType", ("qa_comparison_operator", "<"))
-    assert not errors(check(Subject([edited(again)])))
+    assert not errors(check(Subject([suave_copy(again)])))
 
 
-def test_contradictions_come_from_pellet(tmp_path: Path) -> None:
+def test_contradictions_come_from_pellet(tmp_path):
     rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
     (error,) = errors(found_by_pellet(tmp_path, rules))
     assert "contradiction" in error.message
     assert "by the rule A (mine.swrl, line 1)" in error.message
 
 
-def test_exact_values_are_reported(tmp_path: Path) -> None:
+def test_exact_values_are_reported(tmp_path):
     rules = "A: hasValue(?q, ?v) ^ add(?s, ?v, 1) ^ lessThan(?s, 2) -> Role(?q)"
     assert only(found_by_pellet(tmp_path, rules), "rule A computes with add").level is Level.INFO
 
@@ -87,7 +83,7 @@ def command(*arguments: str) -> int:
     return int(str(caught.value.code or 0))
 
 
-def test_formats_and_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_formats_and_exit_status(tmp_path, capsys):
     rules = tmp_path / "mine.swrl"
     rules.write_text("A: requiresO(?g, ?o) -> Role(?g)", encoding="utf-8")
     assert command("--rules", str(rules)) == 0
@@ -100,13 +96,7 @@ def test_formats_and_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "| ERROR | " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("option", "name"), [("--rules", "none.swrl"), ("--ontology", "n.owl")])
-def test_missing_files_exit_with_2(option: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert command(option, name) == 2
-    assert "Traceback" not in capsys.readouterr().err
-
-
-def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(tmp_path: Path) -> None:
+def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(tmp_path):
     high = "fd_spiral_high"
     rules = f"""
 one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 2.2) -> fg_status(?fg, "IN_ERROR_FR")
@@ -117,7 +107,7 @@ one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v,
     assert re.search(rules_in_it, error.message)
 
 
-def test_values_of_the_scenario_are_used(tmp_path: Path) -> None:
+def test_values_of_the_scenario_are_used(tmp_path):
     body = "typeFD(?fg, fd_spiral_low) ^ hasValue(qa_water_visibility_low, ?v) ^ lessThan(?v, 0.2)"
     rules = "".join(f'{name}: {body} -> fg_status(?fg, "IN_ERROR_{name}")\n' for name in ("FR", "NFR"))
     assert errors(found_by_pellet(tmp_path, rules)) == []
@@ -127,14 +117,14 @@ def test_values_of_the_scenario_are_used(tmp_path: Path) -> None:
         found_by_pellet(tmp_path, values={"qa_water_visibility_lo": Decimal(1)})
 
 
-def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path: Path) -> None:
+def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path):
     # A rule that nobody has asked about before.
     findings = found_by_pellet(tmp_path, "slow: Role(?r) -> Role(?r)\n", time_limit_s=1e-6)
     assert "not done after" in errors(findings)[0].message
 
 
 class TestBeforeItRuns:
-    def test_pellet_is_asked_after_an_error_that_does_not_stop_loading(self, tmp_path: Path) -> None:
+    def test_pellet_is_asked_after_an_error_that_does_not_stop_loading(self, tmp_path):
         kind = f'<rdf:type rdf:resource="{SUAVE}Nowhere"/>'
         misspelt = f'<owl:NamedIndividual rdf:about="{SUAVE}x">{kind}</owl:NamedIndividual>'
         rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
@@ -142,12 +132,12 @@ class TestBeforeItRuns:
         assert any("class Nowhere is not defined" in message for message in messages)
         assert any("contradiction" in message for message in messages)
 
-    def test_what_was_skipped_is_said(self, tmp_path: Path) -> None:
+    def test_what_was_skipped_is_said(self, tmp_path):
         findings = found_by_pellet(tmp_path, "A: Role(?x) -> Role(?y)")
         assert only(findings, "not checked with Pellet").level is Level.INFO
 
 
-def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:
+def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path):
     """In a process of its own: Java goes on until that ends."""
     rules = "ever: fd_efficacy(?d, ?v) ^ add(?w, ?v, 1) -> fd_efficacy(?d, ?w)\n"
     start = (
@@ -157,8 +147,8 @@ def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", start + "</rdf:RDF>"), encoding="utf-8")
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
-    command = [sys.executable, "-m", "suave_des", "kb", "infer", "--ontology", "suave.owl", "--rules", "mine.swrl"]
-    ended = subprocess.run([*command, "--time-limit", "2"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    files = ("--ontology", "suave.owl", "--rules", "mine.swrl")
+    ended = suave_des_command("kb", "infer", *files, "--time-limit", "2", cwd=tmp_path)
     assert ended.returncode == 2
     assert "mine.swrl: line 1: " in ended.stderr
     assert "rule ever computes ever new values from what it concludes itself" in ended.stderr
@@ -171,13 +161,13 @@ def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:
         'A: c_status(?c, "FALSE") ^ Objective(?o) -> o_status(?o, "IN_ERROR_COMPONENT")',  # if visibility is low, too
     ],
 )
-def test_rules_that_clash_once_a_component_fails(tmp_path: Path, rule: str) -> None:
+def test_rules_that_clash_once_a_component_fails(tmp_path, rule):
     (error,) = errors(found_by_pellet(tmp_path, rule))
     assert "more than one value" in error.message
     assert "c_status(c_thruster_1, FALSE)" in error.message
 
 
-def test_contradictions_are_not_looked_for_in_values_that_missions_do_not_measure(tmp_path: Path) -> None:
+def test_contradictions_are_not_looked_for_in_values_that_missions_do_not_measure(tmp_path):
     rule = 'A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> fg_status(?g, "IN_ERROR_FR")'
     assert errors(found_by_pellet(tmp_path, rule))
     assert not errors(found_by_pellet(tmp_path, rule, measured={"water_visibility"}))

@@ -1,32 +1,24 @@
-"""kb infer: states as people write them, what follows, and the time limit."""
+"""kb infer and kb query: states as people write them, what follows, the time limit, and SPARQL over all of it."""
 
+import csv
+import io
 import json
-import os
-import subprocess
-import sys
 import threading
 from concurrent.futures import Future
-from pathlib import Path
 
 import pytest
 
-import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import ObjectiveState
+from tests.helpers.command import python
 
 HIGH = {"groundings": {"f_generate_search_path": "fd_spiral_high"}, "measurements": {"water_visibility": 1.8}}
 _BODY = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
 EXPLOSION = f"explosion: {_BODY} -> o_updatable(o_generate_search_path, true)\n"
-
-
-def _python(*arguments):
-    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
-    command = [sys.executable, *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
 
 
 def test_infers_the_error_and_plans_the_lower_spiral(knowledge):
@@ -71,10 +63,7 @@ def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
         ("measurements: {water_visibilty: 1}\n", "line 1, measurements.water_visibilty: there is no quality attribute"),
         ("measurements:\n  water_visibility: deep\n", "line 2, measurements.water_visibility: 'deep' is not a number"),
         ("groundings: {f_maintain_motion: fd_spiral_low}\n", "f_maintain_motion has no function design"),
-        (
-            "components: {c_thruster_1: recoverd}\n",
-            "no rule mentions the c_status 'recoverd' (did you mean 'REC",
-        ),
+        ("components: {c_thruster_1: recoverd}\n", "no rule mentions the c_status 'recoverd' (did you mean 'REC"),
         ("component: {}\n", "did you mean 'components'"),
         ("components: 3\n", "line 1, components: "),
         ("", "is empty"),
@@ -87,22 +76,6 @@ def test_a_wrong_file_is_told_with_its_place(knowledge, tmp_path, text, said):
         knowledge.state(file)
     assert said in str(error.value)
     assert str(file) in str(error.value)
-
-
-def test_the_command_prints_what_the_library_gives(knowledge, command):
-    words = ("--at", "f_generate_search_path=fd_spiral_high", "--at", "water_visibility=1.8")
-    status, text, _ = command("infer", *words)
-    assert status == 0
-    assert "  fg_status(fg_spiral_high, IN_ERROR_NFR)\n" in text
-    assert "    not fd_spiral_medium: water_visibility 1.80 measured < 2.25 expected\n" in text
-    status, printed, _ = command("infer", *words, "--format", "json")
-    assert json.loads(printed)["inferred"] == sorted(map(str, knowledge.infer(knowledge.state(**HIGH)).inference.facts))
-
-
-def test_a_rule_switched_off_infers_nothing(command):
-    words = ("--at", "f_generate_search_path=fd_spiral_high", "--at", "water_visibility=1.8")
-    _, text, _ = command("infer", *words, "--disable-rule", "QAWaterVisibility")
-    assert "inferred\n  nothing\nplan\n  nothing to adapt\n" in text
 
 
 @pytest.mark.parametrize(
@@ -122,14 +95,6 @@ def test_what_cannot_be_used_ends_in_one_line(command, words, said):
     assert (status, text) == (2, "")
     assert said in error
     assert error.count("\n") == 1
-
-
-def test_statuses_of_ones_own_are_taken(knowledge):
-    state = knowledge.state(
-        components={"c_thruster_1": "HOT"}, objectives={"f_maintain_motion": "UPDATABLE", "f_follow_pipeline": "DONE"}
-    )
-    assert state.components == (("c_thruster_1", "HOT"),)
-    assert [each.status for each in state.objectives] == ["DONE", "UPDATABLE"]
 
 
 def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
@@ -175,18 +140,9 @@ if {reasoner == "owlready2"}:  # its own limit, without the check by the Pellet 
 from suave_des.cli.main import main
 main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}])
 """
-        done = _python("-c", program)
+        done = python("-c", program)
         assert (done.returncode, done.stdout) == (2, "")
         assert "reasoning on the state" in done.stderr
-        assert "not done after 1 s" in done.stderr
-        assert done.stderr.count("\n") == 1
-
-    def test_a_rule_that_explodes_ends_in_a_message_and_the_process_ends_too(self, tmp_path):
-        rules = tmp_path / "explosion.swrl"
-        rules.write_text(EXPLOSION)
-        command = ["-m", "suave_des", "kb", "infer", "--reasoner", "pellet", "--time-limit", "1"]
-        done = _python(*command, "--rules", str(rules))
-        assert done.returncode == 2
         assert "not done after 1 s" in done.stderr
         assert done.stderr.count("\n") == 1
 
@@ -221,7 +177,7 @@ except KnowledgeError:
     pass
 sys.exit(5)
 """
-        done = _python("-c", program)
+        done = python("-c", program)
         assert (done.returncode, done.stderr) == (5, "")
 
     def test_a_reasoner_that_starts_while_the_process_ends_does_nothing(self, monkeypatch):
@@ -252,5 +208,91 @@ try:
 except KnowledgeError:
     sys.exit(5)
 """
-        done = _python("-c", program)
+        done = python("-c", program)
         assert (done.returncode, done.stdout, done.stderr) == (5, "[]\n", "")
+
+
+SEARCH = "f_generate_search_path"
+
+
+def test_asks_the_ontologies(knowledge):
+    found = knowledge.query(f"SELECT ?d WHERE {{ ?d tomasys:solvesF suave:{SEARCH} }}")
+    assert found.columns == ("d",)
+    assert found.rows == (("suave:fd_spiral_high",), ("suave:fd_spiral_low",), ("suave:fd_spiral_medium",))
+
+
+def test_inferred_facts_are_there_when_asked_for(knowledge):
+    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
+    query = "SELECT ?g ?s WHERE { ?g tomasys:fg_status ?s }"
+    assert knowledge.query(query, state).rows == ()
+    assert knowledge.query(query, state, inferred=True).rows == (("suave:fg_spiral_high", "IN_ERROR_NFR"),)
+    assert knowledge.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }", state).rows == (("true",),)
+    assert knowledge.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }").rows == (("false",),)
+
+
+def test_answers_are_the_same_each_time():
+    queries = ("SELECT ?s ?o WHERE { ?s ?p ?o } LIMIT 9", "SELECT ?s ?o WHERE { ?s owl:unionOf ?o }")
+    first, second = ([KnowledgeBase.load().query(query).rows for query in queries] for _ in range(2))
+    assert first == second
+    assert all(first)
+
+
+def test_columns_of_all_variables_are_by_name(knowledge):
+    found = knowledge.query("SELECT  * WHERE { ?zone suave:on ?a ; suave:to ?m . ?b suave:of ?z1, ?c, [] }")
+    assert found.columns == ("a", "b", "c", "m", "z1", "zone")
+
+
+@pytest.mark.parametrize(
+    ("query", "notes"),
+    [
+        ("SELECT ?d WHERE { ?d tomasys:solvsF ?f }", ["tomasys:solvsF (did you mean tomasys:solvesF?)"]),
+        ("ASK { ?d a tomasys:FunctionDesing }", ["tomasys:FunctionDesing (did you mean tomasys:FunctionDesign?)"]),
+        ("ASK { ?g suave:fg_status 1 FILTER NOT EXISTS { suave:f_x a ?c } }", ["suave:f_x", "suave:fg_status"]),
+        (
+            "SELECT ?d WHERE { ?d tomasys:solvesF/tomasys:fg_stat ?f }",
+            ["tomasys:fg_stat (did you mean tomasys:fg_status?)"],
+        ),
+        ("SELECT ?d WHERE { ?d a tomasys:Wrench }", ["tomasys:Wrench"]),
+        ("SELECT ?d WHERE { ?d tomasys:solvesF ?f . ?d rdfs:seeAlso 2 . ?f a suave:fd_spiral_low. }", []),
+    ],
+)
+def test_names_that_the_knowledge_base_does_not_have_are_noted(knowledge, query, notes):
+    noted = knowledge.query(query).unknown
+    assert len(noted) == len(notes)
+    assert all(one.startswith(begin) for one, begin in zip(noted, notes, strict=True))
+
+
+def test_the_command_notes_unknown_names_on_its_error_stream(command):
+    status, answer, noted = command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")
+    assert (status, answer) == (0, "d\nno rows\n")
+    assert noted == "suave-des: the knowledge base does not have tomasys:solvsF (did you mean tomasys:solvesF?)\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("SELECT WHERE", "not a SPARQL query"),
+        ("", "not a SPARQL query"),
+        ("SELECT ?s WHERE { ?s nowhere:is ?o }", "not a SPARQL query: Unknown namespace prefix : nowhere"),
+        ("DELETE WHERE { ?s ?p ?o }", "not a SPARQL query"),
+        ("SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }", "SERVICE and FROM read from other sources"),
+        ("SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }", "SERVICE and FROM read from other sources"),
+    ],
+)
+def test_what_is_no_query_of_the_knowledge_base_is_refused(knowledge, text, said):
+    with pytest.raises(InputError) as error:
+        knowledge.query(text)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_the_command_prints_tables(command):
+    words = ("query", "SELECT ?g ?s WHERE { ?g tomasys:fg_status ?s }", "--inferred")
+    state = ("--at", f"{SEARCH}=fd_spiral_high", "--at", "water_visibility=1.8")
+    status, text, _ = command(*words, *state)
+    assert status == 0
+    assert text.splitlines()[1].split() == ["suave:fg_spiral_high", "IN_ERROR_NFR"]
+    _, text, _ = command(*words, *state, "--format", "csv")
+    assert list(csv.DictReader(io.StringIO(text))) == [{"g": "suave:fg_spiral_high", "s": "IN_ERROR_NFR"}]
+    _, text, _ = command(*words, "--format", "json")
+    assert json.loads(text) == []

@@ -1,7 +1,5 @@
 """kb test --mutate and --coverage: which mistakes tests notice, what they cover, and the least that covers the rest."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from decimal import Decimal
@@ -11,18 +9,8 @@ import pytest
 
 from suave_des import run_mission
 from suave_des.kb import KnowledgeBase
-from suave_des.kb.coverage import FIRES, FIRES_NOT, Goal, least_cover, measure_coverage
-from suave_des.kb.mutation import (
-    EQUIVALENT,
-    KILLED,
-    OPERATORS,
-    SURVIVED,
-    Mutant,
-    is_horn,
-    mutants_of,
-    mutate,
-    sample,
-)
+from suave_des.kb.coverage import FIRES, FIRES_NOT, Goal, measure_coverage
+from suave_des.kb.mutation import EQUIVALENT, KILLED, OPERATORS, SURVIVED, Mutant, is_horn, mutants_of, mutate, sample
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
 from suave_des.kb.space import PolicySpace, Situation, States, difference, interchangeable_components
 from suave_des.knowledge.ontology import Ontology
@@ -66,9 +54,9 @@ LOW_AND_HIGH = f"""{NOTHING_WRONG}
 """
 
 
-def test_a_mutant_may_depend_on_an_attribute_on_which_the_rule_does_not(tmp_path: Path, edited) -> None:
+def test_a_mutant_may_depend_on_an_attribute_on_which_the_rule_does_not(tmp_path, suave_copy):
     """Without isQAtype the rule is about the current, too, which the original does not depend on."""
-    ontology = edited(individual("water_current", "QualityAttributeType", ("qa_comparison_operator", ">")))
+    ontology = suave_copy(individual("water_current", "QualityAttributeType", ("qa_comparison_operator", ">")))
     file(tmp_path, "base: seams2023\nsignals:\n  water_current: {kind: constant, value: 0.05}", "both.yaml")
     rule = "isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.1)"
     rules = file(tmp_path, f"own: {rule} -> fd_realisability(fd_spiral_high, false)")
@@ -83,14 +71,14 @@ def test_a_mutant_may_depend_on_an_attribute_on_which_the_rule_does_not(tmp_path
     assert measured["water_current"] < Decimal("0.1") <= measured.get("water_visibility", Decimal(1))
 
 
-def test_where_an_axiom_leaves_a_choice_rules_matter_that_never_fire(tmp_path: Path, edited) -> None:
+def test_where_an_axiom_leaves_a_choice_rules_matter_that_never_fire(tmp_path, suave_copy):
     """Thruster 1 is Warm or Cold, nobody knows which: what follows from both follows."""
     rules = file(
         tmp_path,
         'warm: Warm(?c) ^ c_status(?c, "FALSE") -> fd_realisability(fd_spiral_high, false)\n'
         'cold: Cold(?c) ^ c_status(?c, "FALSE") -> fd_realisability(fd_spiral_high, false)',
     )
-    knowledge = KnowledgeBase.load([edited(OWL_CLASSES)], rules=rules, values=FEWER_NUMBERS)
+    knowledge = KnowledgeBase.load([suave_copy(OWL_CLASSES)], rules=rules, values=FEWER_NUMBERS)
     assert not is_horn(knowledge.base) and is_horn(KnowledgeBase.load().base)
     removed = mutant(knowledge, "warm", "the rule is removed")
     follows = f"""
@@ -116,16 +104,14 @@ tests:
     ],
     ids=["a fact", "a rule", "an axiom"],
 )
-def test_components_of_which_more_is_said_are_not_exchangeable(
-    tmp_path: Path, edited, ontology: str, rule: str
-) -> None:
+def test_components_of_which_more_is_said_are_not_exchangeable(tmp_path, suave_copy, ontology, rule):
     rules = [file(tmp_path, rule)] if rule else []
-    knowledge = KnowledgeBase.load([edited(ontology)], rules=rules, values=FEWER_NUMBERS)
+    knowledge = KnowledgeBase.load([suave_copy(ontology)], rules=rules, values=FEWER_NUMBERS)
     others = tuple(f"c_thruster_{number}" for number in (1, 2, 4, 5, 6))
     assert interchangeable_components(knowledge.base) == (others, ("c_thruster_3",))
 
 
-def test_a_threshold_of_0_is_moved_to_either_side(tmp_path: Path) -> None:
+def test_a_threshold_of_0_is_moved_to_either_side(tmp_path):
     rules = file(tmp_path, "own: hasValue(?q, ?v) ^ lessThan(?v, 0) -> fd_realisability(fd_spiral_high, false)")
     knowledge = KnowledgeBase.load(rules=rules)
     moved = {
@@ -144,9 +130,7 @@ EQUIVALENT_ONES = {
 }
 
 
-def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_random_states(
-    tmp_path: Path, small: KnowledgeBase
-) -> None:
+def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_random_states(tmp_path, small):
     knowledge = small
     of_rule = [each for each in mutants_of(knowledge.base) if each.name == "QAWaterVisibility"]
     results, _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), of_rule, max_failed=1)
@@ -166,9 +150,7 @@ def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_ra
             assert (one.inferred, one.changes) == (other.inferred, other.changes), f"{each}: {state}"
 
 
-def test_stays_is_not_any_design_and_a_fact_that_follows_is_not_absent(
-    tmp_path: Path, knowledge: KnowledgeBase
-) -> None:
+def test_stays_is_not_any_design_and_a_fact_that_follows_is_not_absent(tmp_path, knowledge):
     given = f"given: {{groundings: {{{SEARCH}: fd_spiral_low}}, measurements: {{water_visibility: 2.0}}}}"
     text = "tests:\n" + "".join(
         f"- name: {wanted}\n  {given}\n  decides: {{{SEARCH}: {wanted}}}\n"
@@ -193,17 +175,17 @@ def test_stays_is_not_any_design_and_a_fact_that_follows_is_not_absent(
     }
 
 
-def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path: Path) -> None:
+def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path):
     rules = file(tmp_path, 'clash: fg_status(?g, "IN_ERROR_NFR") -> fg_status(?g, "IN_ERROR_FR")')
     knowledge = KnowledgeBase.load(rules=rules, values=FEWER_NUMBERS)
     (found,), _ = mutate(knowledge, [], [mutant(knowledge, "clash", "the rule is removed")], max_failed=0)
     assert (found.result, found.reason) == (SURVIVED, "it no longer contradicts itself")
 
 
-def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_path: Path, edited) -> None:
+def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_path, suave_copy):
     rule = 'own: Component(?c) ^ c_status(?c, "FALSE") ^ requiredBy(?c, ?fd) -> fd_realisability(?fd, false)'
     disabled = [each.name for each in KnowledgeBase.load().base.rules]
-    lamp = edited(individual("c_lamp", "Component"))
+    lamp = suave_copy(individual("c_lamp", "Component"))
     knowledge = KnowledgeBase.load(lamp, rules=file(tmp_path, rule), disabled_rules=disabled, values=FEWER_NUMBERS)
 
     def covered(**components: str) -> set[Goal]:
@@ -223,7 +205,7 @@ def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_p
     }
 
 
-def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge: KnowledgeBase) -> None:
+def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge):
     found = mutants_of(knowledge.base)
     assert {mutant.operator for mutant in found} == set(OPERATORS) - {"threshold moved"}  # they have no numbers
     assert len(sample(found, 10)) == 10
@@ -231,7 +213,7 @@ def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge: KnowledgeBa
 
 
 @pytest.mark.parametrize("operator", [each for each in OPERATORS if each != "threshold moved"])
-def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge: KnowledgeBase, operator: str) -> None:
+def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge, operator):
     mutant = next(each for each in mutants_of(knowledge.base) if each.operator == operator)
     state = knowledge.state(
         groundings={"f_generate_search_path": "fd_spiral_high"}, measurements={"water_visibility": 2}
@@ -239,9 +221,7 @@ def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge: KnowledgeBase
     assert knowledge.changed(mutant.applied(knowledge.base)).outcome(Situation(state)).reasoning is not None
 
 
-def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells_them_apart(
-    tmp_path: Path, small: KnowledgeBase
-) -> None:
+def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells_them_apart(tmp_path, small):
     chosen = {
         "lessThan(?measured, ?expected) becomes greaterThan(?measured, ?expected)": KILLED,
         "lessThan(?measured, ?expected) becomes lessThanOrEqual(?measured, ?expected)": SURVIVED,
@@ -258,9 +238,7 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
 
 
 @pytest.mark.parametrize("all_rules", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_coverage_names_what_is_missing_and_the_least_set_of_states_for_it(
-    tmp_path: Path, knowledge: KnowledgeBase, all_rules: bool
-) -> None:
+def test_coverage_names_what_is_missing_and_the_least_set_of_states_for_it(tmp_path, knowledge, all_rules):
     tests = read_tests(tmp_path, knowledge, LOW_AND_HIGH)
     if not all_rules:  # what fires depends on these two alone
         others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
@@ -275,13 +253,7 @@ def test_coverage_names_what_is_missing_and_the_least_set_of_states_for_it(
     assert not measure_coverage(knowledge, [*situations, *proposed], max_failed=0).missing
 
 
-def test_the_set_that_covers_all_is_the_least() -> None:
-    one, two, three = (Goal("r", number, "holds") for number in range(3))
-    sets = {"a": {one, two}, "b": {two, three}, "c": {three}, "d": {one}}
-    assert len(least_cover({name: frozenset(goals) for name, goals in sets.items()})) == 2
-
-
-def test_decisions_of_a_recorded_mission_become_tests_that_pass(tmp_path: Path, command, monkeypatch) -> None:
+def test_decisions_of_a_recorded_mission_become_tests_that_pass(tmp_path, command, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "flown")
     status, out, _ = command("test", "--from-mission", tmp_path / "flown", "--write", tmp_path / "flown.yaml")
@@ -295,7 +267,7 @@ def test_decisions_of_a_recorded_mission_become_tests_that_pass(tmp_path: Path, 
 
 
 @pytest.mark.slow
-def test_the_shipped_tests_kill_the_mutants_of_the_shipped_rules(knowledge: KnowledgeBase) -> None:
+def test_the_shipped_tests_kill_the_mutants_of_the_shipped_rules(knowledge):
     tests = [test for file in shipped_tests() for test in TestFile.read(file).tests(knowledge)]
     assert all(run_test(knowledge, test).passed for test in tests)
     results, _ = mutate(knowledge, tests, sample(mutants_of(knowledge.base), 100), max_failed=1)

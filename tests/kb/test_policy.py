@@ -12,8 +12,7 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.kb import KnowledgeBase
 from suave_des.kb.policy import Policy, function_table, make_policy
-from suave_des.kb.policy_figure import draw_policy
-from suave_des.kb.space import Dependence, PolicySpace, Scale, Situation, component_reports, interchangeable_components
+from suave_des.kb.space import Dependence, PolicySpace, Scale, Situation, component_reports
 from suave_des.kb.states import ManagingSettings
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
@@ -63,15 +62,6 @@ class TestScale:
 
 
 class TestInterchangeableComponents:
-    def test_thrusters_are_alike(self, knowledge):
-        assert interchangeable_components(knowledge.base) == (tuple(f"c_thruster_{n}" for n in range(1, 7)),)
-
-    def test_a_rule_that_names_one_sets_it_apart(self, tmp_path):
-        file = rules_file(tmp_path, 'one: c_status(c_thruster_3, "FALSE") -> fd_realisability(fd_spiral_high, false)\n')
-        groups = interchangeable_components(KnowledgeBase.load(rules=[file]).base)
-        assert ("c_thruster_3",) in groups
-        assert len(groups) == 2
-
     def test_combinations_count_what_they_stand_for(self):
         found = list(component_reports([["a", "b", "c"], ["d"]], ["FALSE", "RECOVERED"], 2))
         # of 4 components none, one or two report one of two words
@@ -109,11 +99,6 @@ class TestPolicy:
         assert table.headings == ["now", "components", *ranges]
         (from_high,) = {tuple(row[2:]) for row in table.rows if row[0] == "fd_spiral_high" and "no report" in row[1]}
         assert from_high == ("stays", "none left", "fd_spiral_low", "fd_spiral_medium", "stays")
-
-    def test_motion_does_not_depend_on_visibility(self, policy):
-        table = function_table(policy, MOTION).table(policy.space)
-        assert table.headings == ["now", "components", "then"]
-        assert ["fd_all_thrusters", "1 FALSE", "fd_recover_thrusters"] in table.rows
 
     def test_a_contradiction_is_marked_where_it_is(self, tmp_path):
         file = rules_file(tmp_path, f'clash: {VISIBLE} ^ lessThan(?v, 1.5) -> fg_status(?fg, "IN_ERROR_FR")\n')
@@ -164,14 +149,6 @@ class TestPolicy:
             make_policy(knowledge.base, ManagingSettings(), knowledge.outcome, 9, many)
 
 
-def test_it_says_how_far_it_is(knowledge):
-    counts: list[tuple[int, int]] = []
-    found = knowledge.policy(max_failed=0, on_count=lambda done, total: counts.append((done, total)))
-    assert counts == sorted(counts)
-    assert {total for _, total in counts} == {counts[-1][0]}
-    assert counts[0][0] == 0 < counts[-1][0] <= len(found.cases)
-
-
 class TestFiles:
     @pytest.mark.parametrize(
         ("words", "said"),
@@ -197,24 +174,6 @@ class TestFiles:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert f"{policy.states} states in {len(policy.cases)} equivalence classes" in text
         assert not list(tmp_path.glob(".*"))
-
-    def test_a_picture_over_two_attributes(self, tmp_path):
-        file = rules_file(
-            tmp_path,
-            "flat: isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 1) -> "
-            "fd_realisability(fd_spiral_high, false)\n",
-        )
-        two = KnowledgeBase.load(rules=[file])
-        settings = ManagingSettings(measured=("battery_level", "water_visibility"))
-        space = PolicySpace(settings.measured, (Decimal(1),), (), ())
-        found = make_policy(two.base, settings, two.outcome, 0, space)
-        draw_policy(found, tmp_path / "two.svg")
-        assert "battery level" in (tmp_path / "two.svg").read_text()
-        assert list(function_table(found, SEARCH).spans) == ["battery_level", "water_visibility"]
-
-    def test_a_picture_of_another_kind_is_refused(self, policy, tmp_path):
-        with pytest.raises(InputError, match=r"one of \.png"):
-            draw_policy(policy, tmp_path / "policy.gif")
 
 
 OF_TWO = "isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ isQAtype(?p, battery_level) ^ hasValue(?p, ?w)"
@@ -252,7 +211,7 @@ def check_like_deciding_each(knowledge: KnowledgeBase, policy: Policy, most: int
 
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
-def test_the_policy_of_two_attributes_is_that_of_deciding_each_state(tmp_path: Path, rule: str) -> None:
+def test_the_policy_of_two_attributes_is_that_of_deciding_each_state(tmp_path, rule):
     knowledge = extended(tmp_path, rule)
     space = PolicySpace.of(knowledge.base, knowledge.settings)
     assert space.attributes == ("battery_level", "water_visibility")
@@ -262,12 +221,12 @@ def test_the_policy_of_two_attributes_is_that_of_deciding_each_state(tmp_path: P
     check_like_deciding_each(knowledge, policy, 80)
 
 
-def test_the_policy_of_one_attribute_is_that_of_deciding_each_state(small: KnowledgeBase) -> None:
+def test_the_policy_of_one_attribute_is_that_of_deciding_each_state(small):
     policy = small.policy(max_failed=1)
     check_like_deciding_each(small, policy, len(policy.cases))
 
 
-def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_path: Path) -> None:
+def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_path):
     for rule, are_independent in (("", True), (RULES["two attributes are compared"], False)):
         knowledge = extended(tmp_path, rule)
         depends = Dependence.of(knowledge.base, knowledge.space)
@@ -277,14 +236,14 @@ def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_pa
 
 
 @pytest.mark.slow
-def test_all_states_of_the_extended_mission_are_decided_in_a_minute() -> None:
+def test_all_states_of_the_extended_mission_are_decided_in_a_minute():
     counts: list[tuple[int, int]] = []
     policy = KnowledgeBase.load(scenario="extended").policy(2, on_count=lambda *count: counts.append(count))
     assert len(policy.cases) > 90_000
     assert counts[0][0] == 0 < counts[0][1] < len(policy.cases) / 10
 
 
-def test_long_work_is_announced_before_it_begins(command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_work_is_announced_before_it_begins(command, monkeypatch):
     from suave_des.cli.kb import options
 
     monkeypatch.setattr(options, "_LONG_S", 0.0)

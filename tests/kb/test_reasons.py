@@ -1,18 +1,11 @@
 """kb explain: derivations hold in Pellet step by step, decisions name the filter, contradictions name the rules."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb import KnowledgeBase
-from suave_des.kb.matching import Facts, nearest_match
-from suave_des.knowledge.rdf import C_STATUS, RDF_TYPE, Lit
-from suave_des.knowledge.rules.files import read_rule
-from suave_des.resources import shipped_folder
-from tests.helpers.owl_text import MROS, SUAVE, TOMASYS, XSD
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 CLASH = (
@@ -71,11 +64,11 @@ def test_a_chain_of_rules_is_told_with_its_bindings(knowledge, in_error):
     assert {("expected", "3.25"), ("measured", "1.8")} <= {(name, str(value)) for name, value in error.bindings}
 
 
-def test_a_fact_that_the_schema_adds_names_it(edited):
+def test_a_fact_that_the_schema_adds_names_it(suave_copy):
     # Nothing says that c_new is a Component but the domain of requiredBy.
     knowledge = KnowledgeBase.load(
         [
-            edited(
+            suave_copy(
                 '<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_new">'
                 '<mros:requiredBy rdf:resource="http://www.metacontrol.org/suave#fd_spiral_low"/></rdf:Description>'
             )
@@ -215,11 +208,8 @@ SCHEMA = """
 """
 
 
-def test_what_axioms_conclude_is_explained_inferred_and_queried(tmp_path):
-    shipped = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    owl = tmp_path / "suave.owl"
-    owl.write_text(shipped.replace("</rdf:RDF>", SCHEMA + "</rdf:RDF>"), encoding="utf-8")
-    knowledge = KnowledgeBase.load(owl)
+def test_what_axioms_conclude_is_explained_inferred_and_queried(suave_copy):
+    knowledge = KnowledgeBase.load(suave_copy(SCHEMA))
     state = knowledge.state(components={"c_thruster_3": "FALSE"})
     inferred = {str(fact) for fact in knowledge.infer(state).inference.facts}
     wanted = ["FailedComponent(c_thruster_3)", "partOf(motor, hull)", "hasPart(hull, motor)"]
@@ -253,9 +243,7 @@ def test_what_axioms_conclude_is_explained_inferred_and_queried(tmp_path):
         ),
     ],
 )
-def test_a_reason_does_not_rest_on_what_it_explains(
-    tmp_path: Path, circular: str, told: list[str], untold: list[str]
-) -> None:
+def test_a_reason_does_not_rest_on_what_it_explains(tmp_path, circular, told, untold):
     """The first two rules alone conclude each other's bodies; only the third starts from a fact."""
     (tmp_path / "own.swrl").write_text(circular + "\n", encoding="utf-8")
     knowledge = KnowledgeBase.load(rules=tmp_path / "own.swrl")
@@ -263,45 +251,3 @@ def test_a_reason_does_not_rest_on_what_it_explains(
     text = str(knowledge.explain(state, "fd_realisability(fd_spiral_high, false)"))
     places = [text.index(name) for name in told]
     assert places == sorted(places) and not any(name in text for name in untold)
-
-
-def test_the_nearest_binding_is_the_one_whose_value_differs_not_the_one_of_which_nothing_is_known(
-    knowledge: KnowledgeBase,
-) -> None:
-    """Thruster 1 has failed, but nothing requires it; thruster 2 is required, but has recovered."""
-    text = 'own: c_status(?c, "FALSE") ^ requiredBy(?c, ?fd) ^ typeFD(?fg, ?fd) -> fd_realisability(?fd, false)'
-    rule = read_rule(text, knowledge.base.vocabulary, Path("own.swrl"))
-    known = (
-        (SUAVE + "c_thruster_1", C_STATUS, Lit("FALSE", XSD + "string")),
-        (SUAVE + "c_thruster_2", C_STATUS, Lit("RECOVERED", XSD + "string")),
-        (SUAVE + "c_thruster_2", MROS + "requiredBy", SUAVE + "fd_all_thrusters"),
-        (SUAVE + "fg", TOMASYS + "typeFD", SUAVE + "fd_all_thrusters"),
-    )
-    facts = Facts(known)
-    found = nearest_match(rule, facts)
-    assert found[1] == (0,)
-    assert found[0]["c"] == SUAVE + "c_thruster_2"
-    alone = nearest_match(rule, Facts(known[:1]))
-    assert alone == ({"c": SUAVE + "c_thruster_1"}, (1, 2))
-
-
-@pytest.mark.parametrize(
-    ("body", "failing", "binding"),
-    [
-        ('c_status(?x, "FALSE") ^ Binding(?x)', (0,), "b"),  # a class comes last, wherever it is written
-        ("Binding(?x) ^ Role(?x)", (1,), "b"),  # of two alike, the one that is written later fails
-    ],
-)
-def test_of_bindings_as_near_the_one_of_the_class_that_the_rule_is_about_is_told(
-    knowledge: KnowledgeBase, body: str, failing: tuple[int, ...], binding: str
-) -> None:
-    rule = read_rule(f"own: {body} -> fd_realisability(fd_spiral_high, false)", knowledge.base.vocabulary, Path("own"))
-    facts = Facts(
-        (
-            (SUAVE + "b", RDF_TYPE, TOMASYS + "Binding"),
-            (SUAVE + "r", RDF_TYPE, TOMASYS + "Role"),
-            (SUAVE + "c", C_STATUS, Lit("FALSE", XSD + "string")),
-        )
-    )
-    found = nearest_match(rule, facts)
-    assert found == ({"x": SUAVE + binding}, failing)

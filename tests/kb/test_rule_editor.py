@@ -1,6 +1,4 @@
-"""Rules of OWL files are edited in place: the rest of the file stays as it was, byte for byte."""
-
-from __future__ import annotations
+"""Rules of OWL files are suave_copy in place: the rest of the file stays as it was, byte for byte."""
 
 import re
 import stat
@@ -57,7 +55,7 @@ STYLES = {"shipped": lambda path: None, "Protégé": as_protege_writes, "rdflib"
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_add_switch_and_remove(owl: Path, style: str) -> None:
+def test_add_switch_and_remove(owl, style):
     STYLES[style](owl)
     original, before = owl.read_bytes(), said(owl)
     add_rules(owl, BATTERY)
@@ -79,7 +77,7 @@ def test_add_switch_and_remove(owl: Path, style: str) -> None:
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_each_rule_declares_what_it_uses_so_that_others_can_go(owl: Path, style: str) -> None:
+def test_each_rule_declares_what_it_uses_so_that_others_can_go(owl, style):
     STYLES[style](owl)
     original = owl.read_bytes()
     add_rules(owl, "One: Objective(?o) ^ hasValue(?q, ?v) ^ greaterThan(?v, 1) -> Role(?o)")
@@ -101,7 +99,7 @@ def test_each_rule_declares_what_it_uses_so_that_others_can_go(owl: Path, style:
     assert owl.read_bytes() == original
 
 
-def test_a_file_of_rules_is_added_and_a_rule_alone_or_none(owl: Path, tmp_path: Path) -> None:
+def test_a_file_of_rules_is_added_and_a_rule_alone_or_none(owl, tmp_path):
     before, rules = said(owl), tmp_path / "mine.swrl"
     rules.write_text(f"{BATTERY}\n\ndisabled Second: Objective(?o) -> Role(?o)\n", encoding="utf-8")
     assert [rule.name for rule in add_rules(owl, str(rules))] == ["Battery", "Second"]
@@ -114,8 +112,8 @@ def test_a_file_of_rules_is_added_and_a_rule_alone_or_none(owl: Path, tmp_path: 
 
 
 def test_of_what_is_added_nothing_stays_in_a_file_whose_rules_are_marked_but_whose_terms_are_declared_elsewhere(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """As in the exemplar's mros.owl: neither the mark of its rules nor greaterThan is declared in it."""
     path = write_exemplar_files(shipped_folder("ontology"), tmp_path)["mros"]
     original = path.read_bytes()
@@ -125,7 +123,7 @@ def test_of_what_is_added_nothing_stays_in_a_file_whose_rules_are_marked_but_who
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_a_rule_of_the_file_itself(owl: Path, style: str) -> None:
+def test_a_rule_of_the_file_itself(owl, style):
     STYLES[style](owl)
     before = said(owl)
     assert set_enabled(owl, "QAWaterVisibility", enabled=False)
@@ -135,7 +133,7 @@ def test_a_rule_of_the_file_itself(owl: Path, style: str) -> None:
     assert b"IN_ERROR_NFR" not in owl.read_bytes()
 
 
-def test_only_the_mark_is_written_when_there_is_none(owl: Path) -> None:
+def test_only_the_mark_is_written_when_there_is_none(owl):
     text = owl.read_text(encoding="utf-8")
     mark = next(line for line in text.splitlines(keepends=True) if "<swrla:isRuleEnabled rdf" in line)
     owl.write_text(text.replace(mark, ""), encoding="utf-8")
@@ -147,7 +145,7 @@ def test_only_the_mark_is_written_when_there_is_none(owl: Path) -> None:
     assert written == text.replace(mark, "")
 
 
-def test_an_added_rule_infers_what_it_does_as_text(owl: Path, tmp_path: Path) -> None:
+def test_an_added_rule_infers_what_it_does_as_text(owl, tmp_path):
     (tmp_path / "mine.swrl").write_text(BATTERY, encoding="utf-8")
     state = KnowledgeState.of(
         [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 4}
@@ -161,7 +159,7 @@ def test_an_added_rule_infers_what_it_does_as_text(owl: Path, tmp_path: Path) ->
         assert not Reasoner(Ontology.load([owl]), backend).analyze(state).facts
 
 
-def test_rules_without_a_prefix_for_swrl_declare_it(tmp_path: Path) -> None:
+def test_rules_without_a_prefix_for_swrl_declare_it(tmp_path):
     path = tmp_path / "tiny.owl"
     path.write_text(
         '<r:RDF xmlns:r="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:o="http://www.w3.org/2002/07/owl#"'
@@ -189,7 +187,7 @@ def test_rules_without_a_prefix_for_swrl_declare_it(tmp_path: Path) -> None:
         (lambda path: set_enabled(path, "S1a", enabled=False), "there is no rule S1a"),
     ],
 )
-def test_what_cannot_be_done_leaves_the_file_alone(owl: Path, edit, words: str) -> None:
+def test_what_cannot_be_done_leaves_the_file_alone(owl, edit, words):
     original = owl.read_bytes()
     with pytest.raises(KnowledgeError) as caught:
         edit(owl)
@@ -204,10 +202,11 @@ def test_what_cannot_be_done_leaves_the_file_alone(owl: Path, edit, words: str) 
         lambda path: path.write_text("<html/>", encoding="utf-8"),
         lambda path: path.write_bytes(path.read_text(encoding="utf-8").encode("utf-16")),
         lambda path: path.unlink(),
+        lambda path: path.write_text("@prefix : <http://x.org/#> . :a :b :c .", encoding="utf-8"),
     ],
-    ids=["page", "utf-16", "missing"],
+    ids=["page", "utf-16", "missing", "another format"],
 )
-def test_files_that_cannot_be_edited(owl: Path, spoil) -> None:
+def test_files_that_cannot_be_edited(owl, spoil):
     spoil(owl)
     original = owl.read_bytes() if owl.exists() else None
     for edit in (
@@ -221,7 +220,7 @@ def test_files_that_cannot_be_edited(owl: Path, spoil) -> None:
     assert (owl.read_bytes() if owl.exists() else None) == original
 
 
-def test_links_and_permissions_stay(owl: Path) -> None:
+def test_links_and_permissions_stay(owl):
     owl.chmod(0o640)
     link = owl.parent / "link.owl"
     link.symlink_to(owl)
@@ -232,7 +231,7 @@ def test_links_and_permissions_stay(owl: Path) -> None:
 
 
 @pytest.mark.parametrize("atoms", [100, pytest.param(1000, marks=pytest.mark.slow)])
-def test_a_rule_of_many_atoms(owl: Path, atoms: int) -> None:
+def test_a_rule_of_many_atoms(owl, atoms):
     body = " ^ ".join(f"hasValue(?q, ?v{number})" for number in range(atoms))
     before = said(owl)
     add_rules(owl, f"Long: {body} -> Role(?q)")
@@ -240,10 +239,3 @@ def test_a_rule_of_many_atoms(owl: Path, atoms: int) -> None:
     assert new[1].count("hasValue") == atoms
     remove_rule(owl, "Long")
     assert said(owl) == before
-
-
-def test_other_formats_are_not_edited(owl: Path) -> None:
-    turtle = owl.with_suffix(".ttl")
-    turtle.write_text(Graph().parse(owl, format="xml").serialize(format="turtle"), encoding="utf-8")
-    with pytest.raises(InputError, match="only RDF/XML is edited in place"):
-        add_rules(turtle, BATTERY)

@@ -26,8 +26,8 @@ def probes(knowledge):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_recurring_questions_are_answered_in_one_line(name, edited, tmp_path):
-    found = answered(name, edited(CASES[name][2]), tmp_path)
+def test_recurring_questions_are_answered_in_one_line(name, suave_copy, tmp_path):
+    found = answered(name, suave_copy(CASES[name][2]), tmp_path)
     assert "\n" not in found
     assert CASES[name][3] in found
 
@@ -49,13 +49,13 @@ def test_numbers_match_where_they_do_in_pellet(tmp_path):
     assert answers == {(fact.subject, fact.value) for fact in found if fact.property == "is" and fact.value != "sum"}
 
 
-def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(knowledge, edited):
+def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(knowledge, suave_copy):
     from tests.helpers.owl_text import rule
 
     broken = rule(
         "broken", "QAvalue(?q) ^ hasValue(?q, ?v) ^ lessThn(?v, 3.0) -> fd_realisability(:fd_spiral_high, false)"
     )
-    questions = RuleQuestions(open_base(load_scenario("seams2023", ontologies=[edited(broken)])))
+    questions = RuleQuestions(open_base(load_scenario("seams2023", ontologies=[suave_copy(broken)])))
     assert "there is no builtin lessThn in Pellet" in str(questions.why_not("broken", knowledge.state()))
     assert "it fires" in str(questions.why_not("compRecov", knowledge.state(components={"c_thruster_2": "RECOVERED"})))
 

@@ -7,6 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from rdflib import RDF, RDFS, BNode, Graph, Literal, Namespace, URIRef
+from rdflib.collection import Collection
+from rdflib.namespace import OWL
+from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
@@ -14,9 +18,104 @@ from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, ObjectiveState
-from tests.helpers.generated_ontologies import write_ontology
 from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
 from tests.helpers.number_ontology import numbers_ontology
+from tests.helpers.owl_text import XSD
+
+NS = Namespace("http://example.org/generated#")
+_BODIES = ("related1(?x, ?y)", "related2(?x, ?y)", "Kind1(?x)", "Kind2(?x)", "size1(?x, ?s) ^ swrlb:greaterThan(?s, 2)")
+_HEADS = ("Kind3(?x)", "Kind4(?x)", "related3(?x, ?x)", "flag1(?x, true)", 'label1(?x, "seen")')
+
+
+def write_ontology(number: int, folder: Path) -> tuple[Path, Path]:
+    """Write ontology `number` and its rules; the same number gives the same files."""
+    draw = random.Random(number)
+    graph = Graph()
+    classes = [NS[f"Kind{n}"] for n in range(1, 7)]
+    objects = [NS[f"related{n}"] for n in range(1, 6)]
+    data = [NS["size1"], NS["size2"], NS["flag1"], NS["label1"]]
+    things = [NS[f"thing{n}"] for n in range(1, 6)]
+    graph.add((URIRef(str(NS)[:-1]), RDF.type, OWL.Ontology))
+    for kind, names in ((OWL.Class, classes), (OWL.ObjectProperty, objects), (OWL.DatatypeProperty, data)):
+        for name in names:
+            graph.add((name, RDF.type, kind))
+    for thing in things:
+        graph.add((thing, RDF.type, OWL.NamedIndividual))
+        graph.add((thing, RDF.type, draw.choice(classes)))
+        for name in draw.sample(objects, 2):
+            graph.add((thing, name, draw.choice(things)))
+        if draw.random() < 0.7:
+            graph.add((thing, NS.size1, Literal(str(draw.choice([1, 2, 3])), datatype=URIRef(XSD + "decimal"))))
+        if draw.random() < 0.4:
+            graph.add((thing, NS.label1, Literal(draw.choice(["one", "two"]), datatype=URIRef(XSD + "string"))))
+    for _ in range(draw.randint(4, 8)):
+        _add_axiom(graph, draw, classes, objects, things)
+    owl, rules = folder / f"generated{number}.owl", folder / f"generated{number}.swrl"
+    graph.serialize(owl, format="xml")
+    chosen = [f"rule{n}: {draw.choice(_BODIES)} -> {draw.choice(_HEADS)}\n" for n in range(draw.randint(0, 3))]
+    rules.write_text("".join(chosen))
+    return owl, rules
+
+
+def _add_axiom(
+    graph: Graph, draw: random.Random, classes: list[URIRef], objects: list[URIRef], things: list[URIRef]
+) -> None:
+    one, other = draw.sample(classes, 2)
+    name, second = draw.sample(objects, 2)
+    match draw.randrange(16):
+        case 0:
+            graph.add((one, RDFS.subClassOf, other))
+        case 1:
+            graph.add((name, RDFS.subPropertyOf, second))
+        case 2:
+            graph.add((name, OWL.inverseOf, second))
+        case 3:
+            graph.add((name, RDF.type, OWL.TransitiveProperty))
+        case 4:
+            graph.add((name, RDF.type, OWL.SymmetricProperty))
+        case 5:
+            graph.add((name, RDF.type, OWL.FunctionalProperty))  # two values are then the same individual
+        case 6:
+            graph.add((name, RDFS.domain, one))
+            graph.add((second, RDFS.range, other))
+        case 7:
+            first, same = draw.sample(things, 2)
+            graph.add((first, OWL.sameAs, same))
+        case 8:
+            value = Literal(draw.choice(["one", "two"]), datatype=URIRef(XSD + "string"))
+            graph.add((one, OWL.equivalentClass, _restriction(graph, NS.label1, OWL.hasValue, value)))
+        case 9:
+            restriction = _restriction(graph, name, OWL.hasValue, draw.choice(things))
+            graph.add((one, draw.choice([OWL.equivalentClass, RDFS.subClassOf]), restriction))
+        case 10:
+            graph.add((one, OWL.equivalentClass, _restriction(graph, name, OWL.someValuesFrom, other)))
+        case 11:
+            graph.add((one, RDFS.subClassOf, _restriction(graph, name, OWL.allValuesFrom, other)))
+        case 12:
+            node, parts = BNode(), BNode()
+            graph.add((node, RDF.type, OWL.Class))
+            graph.add((node, draw.choice([OWL.intersectionOf, OWL.unionOf]), parts))
+            Collection(graph, parts, draw.sample([kind for kind in classes if kind != one], 2))
+            graph.add((one, OWL.equivalentClass, node))
+        case 13:
+            graph.add((one, OWL.disjointWith, other))
+        case 14:
+            first, other_thing = draw.sample(things, 2)
+            graph.add((first, OWL.differentFrom, other_thing))
+        case _:
+            chain = BNode()
+            Collection(graph, chain, [name, second])
+            whole = draw.choice([each for each in objects if each not in (name, second)])
+            graph.add((whole, OWL.propertyChainAxiom, chain))
+
+
+def _restriction(graph: Graph, name: URIRef, kind: URIRef, value: Node) -> BNode:
+    node = BNode()
+    graph.add((node, RDF.type, OWL.Restriction))
+    graph.add((node, OWL.onProperty, name))
+    graph.add((node, kind, value))
+    return node
+
 
 THRESHOLDS = ("1.25", "2.25", "3.25")
 #: Just below, on and just above each threshold, and numbers that binary floats write with an exponent.
@@ -58,7 +157,7 @@ def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
 
 
 @pytest.mark.parametrize("count", [4, pytest.param(120, marks=pytest.mark.slow)])
-def test_both_backends_infer_the_same_on_random_states(kb: Ontology, pellet: Reasoner, count: int) -> None:
+def test_both_backends_infer_the_same_on_random_states(kb, pellet, count):
     draw = random.Random(20230515)
     states = [random_state(draw) for _ in range(count)]
     # A grounding in error cannot belong to an objective that is said to be ungrounded.
@@ -77,7 +176,7 @@ def test_both_backends_infer_the_same_on_random_states(kb: Ontology, pellet: Rea
             assert plan(kb, ours) == plan(kb, theirs)
 
 
-def test_an_inference_does_not_depend_on_those_before_it(kb: Ontology) -> None:
+def test_an_inference_does_not_depend_on_those_before_it(kb):
     draw = random.Random(7)
     states = [random_state(draw) for _ in range(40)]
     forth = Reasoner(kb, "pellet")
@@ -109,16 +208,16 @@ class TestSchemas:
         assert found == [everything("owlready2", number, folder) for number in numbers]
         return found
 
-    def test_all_that_axioms_conclude_is_read(self, tmp_path: Path) -> None:
+    def test_all_that_axioms_conclude_is_read(self, tmp_path):
         assert sum(map(len, self.compare(range(200, 204), tmp_path))) >= 50
 
     @pytest.mark.slow
-    def test_all_that_axioms_conclude_is_read_in_200_ontologies(self, tmp_path: Path) -> None:
+    def test_all_that_axioms_conclude_is_read_in_200_ontologies(self, tmp_path):
         found = self.compare(range(200), tmp_path)
         assert sum(isinstance(one, str) for one in found) >= 5  # contradictions are among them
 
 
-def test_numbers_that_a_rule_takes_for_the_same_are_those_of_stock_pellet(tmp_path: Path) -> None:
+def test_numbers_that_a_rule_takes_for_the_same_are_those_of_stock_pellet(tmp_path):
     numbers = numbers_ontology(tmp_path)
     terms = numbers.content.all_terms()
     found = Reasoner(numbers, "pellet", terms=terms).analyze(KnowledgeState()).facts

@@ -1,18 +1,19 @@
-"""Each way in which an ontology file can be unusable is one clear line with file and place."""
+"""Each way in which an ontology file can be unusable is one clear line with file and place; other formats are read."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from decimal import Decimal
-from pathlib import Path
 
 import pytest
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology_file import read_ontology
 from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.knowledge_states import FOLLOW, searching
-from tests.helpers.owl_text import MakeOntology, individual, rule
+from tests.helpers.owl_text import individual, rule
 
 HEAD = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">\n'
 NESTED = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10}">\n' for n in range(1, 10))
@@ -68,7 +69,7 @@ def problem_of(call: Callable[[], object]) -> str:
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
-def test_a_bad_file_is_told_with_its_place(tmp_path: Path, name: str) -> None:
+def test_a_bad_file_is_told_with_its_place(tmp_path, name):
     text, expected = BAD_FILES[name]
     path = tmp_path / "bad.owl"
     path.write_text(text, encoding="utf-8")
@@ -77,7 +78,7 @@ def test_a_bad_file_is_told_with_its_place(tmp_path: Path, name: str) -> None:
     assert expected in problem
 
 
-def test_a_missing_file_a_folder_and_bytes_are_reported(tmp_path: Path) -> None:
+def test_a_missing_file_a_folder_and_bytes_are_reported(tmp_path):
     assert "no such file" in problem_of(lambda: Ontology.load([tmp_path / "none.owl"]))
     assert "is a folder" in problem_of(lambda: Ontology.load([tmp_path]))
     path = tmp_path / "bytes.owl"
@@ -87,7 +88,7 @@ def test_a_missing_file_a_folder_and_bytes_are_reported(tmp_path: Path) -> None:
     assert "no such file" in problem_of(lambda: Ontology.load([locked]))
 
 
-def test_simple_entities_as_protege_writes_them_are_read(suave_copy: MakeOntology, kb: Ontology) -> None:
+def test_simple_entities_as_protege_writes_them_are_read(suave_copy, kb):
     entities = (
         '<?xml version="1.0"?>\n<!DOCTYPE rdf:RDF [\n<!ENTITY suave "http://www.metacontrol.org/suave#" >\n'
         '<!ENTITY xsd "http://www.w3.org/2001/XMLSchema#" >\n]>'
@@ -104,7 +105,7 @@ def test_simple_entities_as_protege_writes_them_are_read(suave_copy: MakeOntolog
     assert [one.text for one in base.rules] == [one.text for one in kb.rules]
 
 
-def test_a_function_that_the_mission_needs_must_have_a_design(suave_copy: MakeOntology) -> None:
+def test_a_function_that_the_mission_needs_must_have_a_design(suave_copy):
     solves = '<tomasys:solvesF rdf:resource="http://www.metacontrol.org/suave#f_follow_pipeline"/>'
     base = Ontology.load([suave_copy(replace={solves: ""})])
     problem = problem_of(lambda: base.check([FOLLOW]))
@@ -117,7 +118,7 @@ def test_a_function_that_the_mission_needs_must_have_a_design(suave_copy: MakeOn
     ("value", "datatype"),
     [("deep", "decimal"), ("2.25", "double"), ("2.25", "string"), ("1e3", "decimal"), ("NaN", "decimal")],
 )
-def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy: MakeOntology, value: str, datatype: str) -> None:
+def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy, value, datatype):
     old = '#decimal">3.25<'
     path = suave_copy(replace={old: f'#{datatype}">{value}<'})
     problem = problem_of(lambda: Ontology.load([path]))
@@ -127,23 +128,23 @@ def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy: MakeOntology, 
     assert f"{path}: line {line}: qa_water_visibility_high: hasValue '{value}' is not an xsd:decimal" in problem
 
 
-def test_an_unknown_operator_is_reported(suave_copy: MakeOntology) -> None:
+def test_an_unknown_operator_is_reported(suave_copy):
     path = suave_copy(individual("noise", "QualityAttributeType", ("qa_comparison_operator", "=<")))
     assert "qa_comparison_operator '=<' is unknown (one of < <= > >=)" in problem_of(lambda: Ontology.load([path]))
 
 
-def test_two_things_of_one_kind_and_name_are_reported(suave_copy: MakeOntology) -> None:
+def test_two_things_of_one_kind_and_name_are_reported(suave_copy):
     path = suave_copy(individual("mros:fd_spiral_low", "FunctionDesign"))
     assert "two function designs have this name" in problem_of(lambda: Ontology.load([path]))
 
 
-def test_an_overridden_value_must_exist(suave_copy: MakeOntology) -> None:
+def test_an_overridden_value_must_exist(suave_copy):
     problem = problem_of(lambda: Ontology.load([suave_copy()], values={"qa_water_visibility_hihg": Decimal(2)}))
     assert "no individual qa_water_visibility_hihg with a hasValue" in problem
     assert "qa_water_visibility_high" in problem
 
 
-def test_two_values_of_a_functional_property_are_reported_with_line(suave_copy: MakeOntology) -> None:
+def test_two_values_of_a_functional_property_are_reported_with_line(suave_copy):
     path = suave_copy(individual("qa_water_visibility_high", "QAvalue", ("hasValue", "9")))
     problem = problem_of(lambda: Ontology.load([path]))
     assert problem.startswith(f"{path}: line ")
@@ -151,7 +152,7 @@ def test_two_values_of_a_functional_property_are_reported_with_line(suave_copy: 
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_an_ontology_whose_rules_contradict_it_is_reported(suave_copy: MakeOntology, name: str) -> None:
+def test_an_ontology_whose_rules_contradict_it_is_reported(suave_copy, name):
     text = "QAvalue(?q) ^ isQAtype(?q, :water_visibility) -> hasValue(?q, 3.25)"
     path = suave_copy(rule("levelling", text))
     base = Ontology.load([path])
@@ -165,9 +166,7 @@ def test_an_ontology_whose_rules_contradict_it_is_reported(suave_copy: MakeOntol
 
 
 @pytest.mark.parametrize("name", ["odd", "fd_spiral_high"])
-def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name_is(
-    suave_copy: MakeOntology, name: str
-) -> None:
+def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name_is(suave_copy, name):
     odd = '<owl:NamedIndividual rdf:about="http://example.org/#odd"/>\n'
     path = suave_copy(odd + rule(name, "QAvalue(?q) ^ isQAtype(?q, :water_visibility) -> hasValue(?q, 3.25)"))
     problem = problem_of(lambda: Reasoner(Ontology.load([path]), "pellet").analyze(searching()))
@@ -176,7 +175,7 @@ def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_a_conclusion_outside_its_propertys_range_is_reported(suave_copy: MakeOntology, name: str) -> None:
+def test_a_conclusion_outside_its_propertys_range_is_reported(suave_copy, name):
     path = suave_copy(rule("odd", "FunctionGrounding(?g) -> fg_status(?g, 3.5)"))
     reasoner = Reasoner(Ontology.load([path]), name)
     problem = problem_of(lambda: reasoner.analyze(searching("fd_spiral_low")))
@@ -192,7 +191,7 @@ def test_a_conclusion_outside_its_propertys_range_is_reported(suave_copy: MakeOn
         ('Objective(?o) -> o_status(?p, "IN_ERROR_FR")', ""),
     ],
 )
-def test_a_rule_that_pellet_would_drop_is_an_error(suave_copy: MakeOntology, text: str, reason: str, name: str) -> None:
+def test_a_rule_that_pellet_would_drop_is_an_error(suave_copy, text, reason, name):
     path = suave_copy(rule("odd", text))
     base = Ontology.load([path])
     problem = problem_of(lambda: Reasoner(base, name).analyze(searching()))
@@ -201,8 +200,50 @@ def test_a_rule_that_pellet_would_drop_is_an_error(suave_copy: MakeOntology, tex
     assert "urn:suave-des" not in problem
 
 
-def test_a_rule_that_uses_an_object_property_for_data_is_an_error(suave_copy: MakeOntology) -> None:
+def test_a_rule_that_uses_an_object_property_for_data_is_an_error(suave_copy):
     text = 'FunctionGrounding(?g) ^ solvesO(?g, ?o) -> typeFD(?g, "x")'
     path = suave_copy(rule("odd", text, data={"typeFD"}))
     problem = problem_of(lambda: Ontology.load([path]))
     assert f"{path}: rule odd: typeFD is declared as object property, but used as data property" in problem
+
+
+@pytest.mark.parametrize(("ending", "form"), [("ttl", "turtle"), ("nt", "nt")])
+def test_the_format_goes_by_the_ending(ending, form, kb, shipped, tmp_path):
+    path = tmp_path / f"suave.{ending}"
+    path.write_text(read_ontology(shipped / "suave.owl").graph.serialize(format=form), encoding="utf-8")
+    base = Ontology.load([path])
+    assert base.facts == kb.facts
+    assert {rule.text for rule in base.rules} == {rule.text for rule in kb.rules}
+
+
+@pytest.mark.parametrize("encoding", ["UTF-16", "ISO-8859-1"])
+def test_xml_is_read_in_the_encoding_that_it_declares(encoding, shipped, tmp_path):
+    text = (shipped / "suave.owl").read_text(encoding="utf-8")
+    declared = re.sub(r"<\?xml[^>]*\?>", f'<?xml version="1.0" encoding="{encoding}"?>', text)
+    path = tmp_path / "suave.owl"
+    path.write_bytes(declared.replace("fd_spiral_low", "fd_spiral_bröd").encode(encoding))
+    assert "fd_spiral_bröd" in Ontology.load([path]).designs("f_generate_search_path")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("bad.ttl", "@prefix a: <http://x.org/#> .\na:b a:c .\n", "line 2: not Turtle: "),
+        ("bad.nt", "<http://x.org/a> .\n", "not N-Triples: "),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_reported_by_its_format(name, content, problem, tmp_path):
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(KnowledgeError) as caught:
+        read_ontology(tmp_path / name)
+    assert problem in str(caught.value)
+
+
+def test_a_datatype_as_owlready2_saves_it_is_that_of_xml_schema(shipped, tmp_path):
+    text = (shipped / "suave.owl").read_text(encoding="utf-8")
+    path = tmp_path / "suave.owl"
+    path.write_text(
+        text.replace("<tomasys:qa_comparison_operator>", '<tomasys:qa_comparison_operator rdf:datatype="xsd:string">'),
+        encoding="utf-8",
+    )
+    assert Ontology.load([path]).facts == Ontology.load().facts

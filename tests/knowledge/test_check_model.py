@@ -1,22 +1,37 @@
 """kb check: mistakes in the ontology: names, individuals, designs, kinds of things."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
 from suave_des.cli.main import main
 from suave_des.domain import THRUSTER_NAMES
+from suave_des.errors import KnowledgeError
 from suave_des.findings import Finding, Level
+from suave_des.kb.check import check
 from suave_des.knowledge.checks import Subject
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import shipped_folder
-from tests.helpers.checks import SUAVE, TOMASYS, errors, findings_of, found, individual, link, only, value, warnings
-from tests.helpers.exemplar_files import write_as_owlready2_saves_it
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario_knowledge import open_base, subject_of
+from tests.helpers.checks import (
+    OWL,
+    SUAVE,
+    TOMASYS,
+    errors,
+    findings_of,
+    found,
+    individual,
+    link,
+    only,
+    value,
+    warnings,
+)
+from tests.helpers.command import command_here
+from tests.helpers.exemplar_files import write_as_owlready2_saves_it, write_exemplar_files, write_files_of_2023
 
 
-def test_a_component_that_nothing_reports_is_noted(tmp_path: Path) -> None:
+def test_a_component_that_nothing_reports_is_noted(tmp_path):
     status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
     extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
     reported = dict.fromkeys(THRUSTER_NAMES, ("FALSE",))
@@ -28,10 +43,8 @@ def test_a_component_that_nothing_reports_is_noted(tmp_path: Path) -> None:
     assert not any("reports the status" in one.message for one in found(tmp_path, extra=extra))
 
 
-def test_a_measured_attribute_that_the_ontology_calls_something_else(tmp_path: Path) -> None:
-    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    path = tmp_path / "mine.owl"
-    path.write_text(text.replace('water_visibility"', 'water_visability"'), encoding="utf-8")
+def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy, tmp_path):
+    path = suave_copy(replace={'water_visibility"': 'water_visability"'}, name="mine.owl")
     findings = findings_of(Subject([path], measured=["water_visibility"]))
     unknown = only(findings, "missions measure water_visibility, but no ontology has")
     assert (unknown.level, unknown.file, unknown.remedy) == (Level.WARN, str(path), "did you mean water_visability?")
@@ -39,7 +52,7 @@ def test_a_measured_attribute_that_the_ontology_calls_something_else(tmp_path: P
     assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
 
 
-def test_the_model(tmp_path: Path) -> None:
+def test_the_model(tmp_path):
     extra = (
         individual("f_new", "Function")
         + individual("fd_new", "FunctionDesign", link("solvesF", "f_follow_pipeline"))
@@ -57,16 +70,14 @@ def test_the_model(tmp_path: Path) -> None:
     assert only(findings, "qa_empty: isQAtype: a QAvalue must be of exactly one").line is not None
 
 
-def test_a_number_of_another_datatype_is_an_error_each_but_a_whole_number_is_a_decimal(tmp_path: Path) -> None:
-    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    path = tmp_path / "mine.owl"
-    path.write_text(text.replace('#decimal">1.0<', '#double">1.0<').replace('#decimal">0.5<', '#integer">1<'))
-    assert [each.message.partition(": ")[2] for each in errors(findings_of(Subject([path])))] == [
-        "hasValue '1.0' is not an xsd:decimal but an xsd:double"
-    ] * text.count('#decimal">1.0<')
+def test_a_number_of_another_datatype_is_an_error_each_but_a_whole_number_is_a_decimal(suave_copy):
+    path = suave_copy(replace={'#decimal">1.0<': '#double">1.0<', '#decimal">0.5<': '#integer">1<'})
+    told = [each.message.partition(": ")[2] for each in errors(findings_of(Subject([path])))]
+    doubles = path.read_text().count('#double">1.0<')
+    assert told == ["hasValue '1.0' is not an xsd:decimal but an xsd:double"] * doubles
 
 
-def test_a_quality_attribute_that_is_not_declared(tmp_path: Path) -> None:
+def test_a_quality_attribute_that_is_not_declared(tmp_path):
     measured = individual("qa_current", "QAvalue", link("isQAtype", "water_current"))
     unknown = only(found(tmp_path, extra=measured), "isQAtype water_current is not defined")
     assert (unknown.level, unknown.remedy) == (Level.ERROR, "declare it, or correct the name")
@@ -91,7 +102,7 @@ UNDEFINED = {
 
 
 @pytest.mark.parametrize("case", UNDEFINED)
-def test_names_that_individuals_misspell_are_errors(case: str, tmp_path: Path) -> None:
+def test_names_that_individuals_misspell_are_errors(case, tmp_path):
     right, wrong, message, meant = UNDEFINED[case]
     path = tmp_path / "edited.owl"
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
@@ -102,13 +113,13 @@ def test_names_that_individuals_misspell_are_errors(case: str, tmp_path: Path) -
     assert f"#{name}" in text.splitlines()[(error.line or 0) - 1]
 
 
-def test_names_of_other_vocabularies_may_be_defined_elsewhere(tmp_path: Path) -> None:
+def test_names_of_other_vocabularies_may_be_defined_elsewhere(tmp_path):
     note = '<dc:creator xmlns:dc="http://purl.org/dc/elements/1.1/">me</dc:creator>'
     findings = found(tmp_path, extra=individual("f_new", "Function", note))
     assert [each.message for each in warnings(findings)] == ["function f_new has no function design"]
 
 
-def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path: Path) -> None:
+def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path):
     known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
     warning = only(found(tmp_path, **known), "fd_spiral_medium expects a visibility of 2.25 m")
     assert warning.level is Level.WARN
@@ -118,43 +129,31 @@ def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path: Path)
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"])
-def test_shipped_scenarios_have_no_warning(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_shipped_scenarios_have_no_warning(scenario, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["kb", "check", "--scenario", scenario, "--fail-on", "warn"])
     assert not ended.value.code, capsys.readouterr().out
 
 
 @pytest.mark.parametrize("kind", ["FunctionDesign", "QAvalue"])
-def test_a_file_as_owlready2_saves_it_with_a_placeholder_has_no_error(kind: str, tmp_path: Path) -> None:
+def test_a_file_as_owlready2_saves_it_with_a_placeholder_has_no_error(kind, tmp_path):
     assert errors(findings_of(Subject([write_as_owlready2_saves_it(tmp_path / "suave.owl", kind)]))) == []
 
 
 @pytest.mark.parametrize(
     ("body", "column", "message"),
     [
-        (
-            "hasQAvalue(?q, ?g) ^ hasValue(?q, 2.0)",
-            25,
-            "?q is a FunctionGrounding in hasQAvalue, but a QAvalue in hasValue",
-        ),
-        (
-            "FunctionDesign(?d) ^ hasQAvalue(?d, ?q)",
-            25,
-            "?d is a FunctionDesign, but a FunctionGrounding in hasQAvalue",
-        ),
-        (
-            'fg_status(fd_spiral_low, "IN_ERROR_NFR")',
-            4,
-            "fd_spiral_low is a FunctionDesign, but a FunctionGrounding in fg_status",
-        ),
+        ("hasQAvalue(?q, ?g) ^ hasValue(?q, 2.0)", 25, "?q is a FunctionGrounding in hasQAvalue, but a QAvalue in"),
+        ("FunctionDesign(?d) ^ hasQAvalue(?d, ?q)", 25, "?d is a FunctionDesign, but a FunctionGrounding in"),
+        ('fg_status(fd_spiral_low, "IN_ERROR_NFR")', 4, "fd_spiral_low is a FunctionDesign, but a FunctionGroun"),
     ],
 )
-def test_a_thing_of_two_kinds_in_a_rule(tmp_path: Path, body: str, column: int, message: str) -> None:
+def test_a_thing_of_two_kinds_in_a_rule(tmp_path, body, column, message):
     finding = only(found(tmp_path, f"A: {body} -> Role(fd_spiral_low)"), message)
     assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", column)
 
 
-def test_a_thing_may_be_of_two_kinds_if_the_ontology_or_a_rule_says_so(tmp_path: Path) -> None:
+def test_a_thing_may_be_of_two_kinds_if_the_ontology_or_a_rule_says_so(tmp_path):
     rule = "A: Component(?c) ^ fd_realisability(?c, false) -> Role(?c)\n"
     assert any("?c is a Component" in one.message for one in found(tmp_path, rule))
     both = individual("c_and_fd", "Component", f'<rdf:type rdf:resource="{TOMASYS}FunctionDesign"/>')
@@ -206,7 +205,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_an_edit_that_means_something_else(case: str, tmp_path: Path) -> None:
+def test_an_edit_that_means_something_else(case, tmp_path):
     extra, message = WRONG[case]
     findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"])
     finding = next(each for each in warnings(findings) if each.message.startswith(message))
@@ -227,16 +226,16 @@ def test_an_edit_that_means_something_else(case: str, tmp_path: Path) -> None:
         individual("obs_water_visibility", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5")),
     ],
 )
-def test_right_edits(extra: str, tmp_path: Path) -> None:
+def test_right_edits(extra, tmp_path):
     assert not warnings(found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]))
 
 
-def test_a_value_that_nothing_refers_to_is_noted(tmp_path: Path) -> None:
+def test_a_value_that_nothing_refers_to_is_noted(tmp_path):
     spare = individual("qa_spare", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5"))
     assert only(found(tmp_path, extra=spare), "qa_spare: nothing refers to it").level is Level.INFO
 
 
-def test_a_comparison_operator_with_and_without_its_datatype(tmp_path: Path) -> None:
+def test_a_comparison_operator_with_and_without_its_datatype(tmp_path):
     def problems(operator: str) -> list[Finding]:
         return errors(found(tmp_path, extra=individual("current", "QualityAttributeType", operator)))
 
@@ -245,7 +244,7 @@ def test_a_comparison_operator_with_and_without_its_datatype(tmp_path: Path) -> 
     assert problems(value("qa_comparison_operator", "==", "string"))
 
 
-def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note(tmp_path: Path) -> None:
+def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note(tmp_path):
     files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
     note = only(findings_of(Subject(files, operators={"water_visibility": "<"})), "comparison")
     line = next(n for n, text in enumerate(files[0].read_text().splitlines(), 1) if '#water_visibility">' in text)
@@ -253,3 +252,59 @@ def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note
     assert "water_visibility has no qa_comparison_operator in the ontologies: < is assumed" in note.message
     (warning,) = warnings(findings_of(Subject(files, measured=["water_visibility"])))
     assert "has no qa_comparison_operator" in warning.message
+
+
+MEASURED = individual("obs_water_visibility", "QAvalue", link("isQAtype", "water_visibility"))
+
+
+def exemplar_files(folder: Path, *, of_2023: bool = False) -> list[Path]:
+    """The exemplar's three files, with the individual of a measured value in them."""
+    files = (write_files_of_2023 if of_2023 else write_exemplar_files)(shipped_folder("ontology"), folder)
+    text = files["suave"].read_text(encoding="utf-8")
+    namespaces = f'<owl:NamedIndividual xmlns:tomasys="{TOMASYS}" xmlns:owl="{OWL}"'
+    measured = MEASURED.replace("<owl:NamedIndividual", namespaces)
+    files["suave"].write_text(text.replace("</rdf:RDF>", f"{measured}</rdf:RDF>"), encoding="utf-8")
+    return list(files.values())
+
+
+@pytest.mark.parametrize(("scenario", "of_2023"), [("seams2023", True), ("seams2023", False), ("release15", False)])
+def test_files_of_the_exemplar_have_notes_of_one_line_only(scenario, of_2023, tmp_path):
+    findings = check(subject_of(load_scenario(scenario, ontologies=exemplar_files(tmp_path, of_2023=of_2023))))
+    assert {each.level for each in findings} == {Level.INFO}, findings
+    messages = [each.message for each in findings]
+    assert sum("for other models" in each for each in messages) == 2  # tomasys.owl and mros.owl
+    assert "obs_water_visibility has no hasValue: missions give it the measured one" in messages
+    assert len(findings) <= 6
+
+
+def test_files_of_2023_under_another_revision_are_one_error_that_names_the_cause(tmp_path):
+    loaded = load_scenario("release15", ontologies=exemplar_files(tmp_path, of_2023=True))
+    (error,) = [each for each in check(subject_of(loaded)) if each.level is not Level.INFO]
+    assert (error.level, Path(error.file or "").name, error.remedy) == (
+        Level.ERROR,
+        "mros.owl",
+        'write revision: "2023" in the scenario, or use ontologies of revision 1.5',
+    )
+    assert error.message.startswith("these are ontologies of revision 2023")
+    assert "label>compRecov<" in (tmp_path / "mros.owl").read_text().splitlines()[(error.line or 0) - 1]
+    with pytest.raises(KnowledgeError, match="these are ontologies of revision 2023"):  # before a mission, too
+        open_base(loaded)
+
+
+def test_a_measured_attribute_without_operator_is_a_warning_before_missions(tmp_path, caplog):
+    """Without one the altitude is never adapted: each design counts as possible whatever is measured."""
+    write_as_owlready2_saves_it(tmp_path / "suave.owl")
+    options = ("--ontology", "suave.owl", "--set", "mission.time_limit_s=1")
+    for scenario, words in (("release15", "so what is measured never rules out"), ("seams2023", "< is assumed")):
+        caplog.clear()
+        assert command_here("run", scenario, *options, cwd=tmp_path).returncode == 0
+        message = next(each for each in caplog.messages if "qa_comparison_operator" in each)
+        assert words in message
+        assert message.startswith("WARN   suave.owl: line ") is (scenario == "release15")
+
+
+def test_a_function_that_the_scenario_adds_is_needed(tmp_path):
+    findings = check(subject_of(load_scenario("extended", ontologies=exemplar_files(tmp_path))))
+    assert [each.message for each in findings if each.level is not Level.INFO] == [
+        "there is no function generate_recharge_path, which the mission needs"
+    ]

@@ -1,13 +1,10 @@
 """kb check: every mistake in a rule that Pellet is silent about is a finding with its place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
 from suave_des.findings import Level, has_level
-from suave_des.knowledge.checks import are_near
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from tests.helpers.checks import OWL, SUAVE, SWRL, TOMASYS, errors, found, only
 
@@ -17,26 +14,15 @@ DECLARE = "declare it as {} property in the ontology"
 #: What Pellet drops or ignores (the table of its silent cases), each as a rule on one line.
 SILENT = {
     "unknown builtin": ("A: hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "did you mean lessThan?"),
-    "builtin variable": ("A: Role(?q) ^ lessThan(?v, 1) -> Role(?q)", 24, None),
     "undeclared class": ("A: <http://x.org/#Rol>(?q) -> Role(?q)", 4, "did you mean Role?"),
-    "undeclared individual": ("A: typeFD(?q, suave:fd_spiral) -> Role(?q)", 15, "did you mean fd_spiral_low?"),
-    "undeclared in the head": (
-        'A: Role(?q) -> <http://x.org/#p>(?q, "x")',
-        16,
-        DECLARE.format("data"),
-    ),
-    "literal of an object property": ('A: typeFD(?q, "fd") -> Role(?q)', 15, None),
+    "undeclared in the head": ('A: Role(?q) -> <http://x.org/#p>(?q, "x")', 16, DECLARE.format("data")),
     "head literal outside the range": ("A: Role(?q) -> fg_status(?q, 1)", 30, "a value of string"),
-    "individual of a data property": ("A: fg_status(?q, energy) -> Role(?q)", 18, 'a text needs quotes: "energy"'),
-    "class as property": ("A: Role(?q, ?r) -> Role(?q)", 4, "write Role(?x)"),
-    "integer for a decimal": ("A: hasValue(?q, 1) -> Role(?q)", 17, "write 1.0"),
-    "misspelt name": ("A: Objectve(?q) -> Role(?q)", 4, "did you mean Objective?"),
     "syntax": ("A: Role(?q -> Role(?q)", 12, "parentheses must balance"),
 }
 
 
 @pytest.mark.parametrize("case", SILENT)
-def test_silent_cases_are_errors_with_file_rule_and_column(case: str, tmp_path: Path) -> None:
+def test_silent_cases_are_errors_with_file_rule_and_column(case, tmp_path):
     rule, column, remedy = SILENT[case]
     (error,) = errors(found(tmp_path, f"# first line\n{rule}\n"))
     assert (error.file, error.line, error.column) == (str(tmp_path / "mine.swrl"), 2, column)
@@ -56,7 +42,7 @@ OWL_RULE = f"""
 """
 
 
-def test_rules_of_ontologies_are_checked_likewise(tmp_path: Path) -> None:
+def test_rules_of_ontologies_are_checked_likewise(tmp_path):
     findings = errors(found(tmp_path, extra=OWL_RULE))
     text = (tmp_path / "suave.owl").read_text(encoding="utf-8")
     line = text[: text.index("mine</rdfs:label>")].count("\n") + 1
@@ -68,7 +54,7 @@ def test_rules_of_ontologies_are_checked_likewise(tmp_path: Path) -> None:
     ]
 
 
-def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(tmp_path: Path) -> None:
+def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(tmp_path):
     decimal = "http://www.w3.org/2001/XMLSchema#decimal"
     atom = (
         f'<swrl:DatavaluedPropertyAtom><swrl:propertyPredicate rdf:resource="{TOMASYS}hasValue"/>'
@@ -80,7 +66,7 @@ def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(tmp_path: P
     assert (error.level, error.rule) == (Level.ERROR, "mine")
 
 
-def test_all_mistakes_of_a_file_are_reported_at_once(tmp_path: Path) -> None:
+def test_all_mistakes_of_a_file_are_reported_at_once(tmp_path):
     rules = "A: Rle(?x) -> Role(?x)\nB: Role(?x -> Role(?x)\ndisabled C: Role(?x) -> Role(?y)\n"
     assert [one.line for one in errors(found(tmp_path, rules))] == [1, 2]
 
@@ -88,7 +74,7 @@ def test_all_mistakes_of_a_file_are_reported_at_once(tmp_path: Path) -> None:
 TWO_FAILED = 'two: c_status(?a, "FALSE") ^ c_status(?b, "FALSE") ^ differentFrom(?a, ?b) -> Role(?a)\n'
 
 
-def test_different_names_alone_do_not_make_individuals_different(tmp_path: Path) -> None:
+def test_different_names_alone_do_not_make_individuals_different(tmp_path):
     warning = only(found(tmp_path, TWO_FAILED), "differentFrom(?a, ?b)")
     assert (warning.level, warning.rule, warning.column) == (Level.WARN, "two", 54)
     assert "owl:AllDifferent" in str(warning.remedy)
@@ -107,23 +93,23 @@ def test_different_names_alone_do_not_make_individuals_different(tmp_path: Path)
     ],
     ids=["all different", "different from", "disjoint classes"],
 )
-def test_individuals_that_are_declared_different(tmp_path: Path, axiom: str) -> None:
+def test_individuals_that_are_declared_different(tmp_path, axiom):
     assert not [each for each in found(tmp_path, TWO_FAILED, axiom) if "differentFrom" in each.message]
 
 
-def test_a_rule_may_conclude_that_individuals_are_different(tmp_path: Path) -> None:
+def test_a_rule_may_conclude_that_individuals_are_different(tmp_path):
     concluding = 'other: c_status(?a, "FALSE") ^ c_status(?b, "RECOVERED") -> differentFrom(?a, ?b)\n'
     assert not [each for each in found(tmp_path, TWO_FAILED + concluding) if "declare" in str(each.remedy)]
 
 
-def test_a_rule_that_never_fires(tmp_path: Path) -> None:
+def test_a_rule_that_never_fires(tmp_path):
     rules = "A: requiresO(?g, ?o) -> Role(?g)\nB: Role(?g) -> Binding(?g)\n"
     rules += 'C: c_status(?c, "ANYTHING") -> Binding(?c)\n'
     findings = [one for one in found(tmp_path, rules) if one.file and one.file.endswith("mine.swrl")]
     assert [(one.level, one.rule, one.column) for one in findings] == [(Level.WARN, "A", 4), (Level.WARN, "B", 4)]
 
 
-def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path: Path) -> None:
+def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path):
     rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
     finding = only(found(tmp_path, rule.format("battery_level")), "no function design has an estimate of battery_level")
     assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
@@ -143,14 +129,14 @@ def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path: Path)
         ("stuck", None, ""),  # a function of the user's may report it
     ],
 )
-def test_a_component_status_that_nothing_reports(tmp_path: Path, status: str, level: Level, remedy: str) -> None:
+def test_a_component_status_that_nothing_reports(tmp_path, status, level, remedy):
     rules = f'A: c_status(?c, "{status}") -> Role(?c)\nB: Role(?c) -> c_status(?c, "WORN")\n'
     findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
     named = [(one.level, one.rule, one.column, one.remedy) for one in findings if "reports c_status" in one.message]
     assert named == ([] if level is None else [(level, "A", 17, remedy)])
 
 
-def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path: Path) -> None:
+def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path):
     finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in")
     assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
     assert finding.message.endswith("tomasys.owl")
@@ -170,17 +156,9 @@ WITHOUT_FIRING = {
         'A: c_status(?c, "FALSE") ^ c_status(?c, "LEAK") -> Role(?c)',
         (28, 'c_status(?c, "LEAK"): nothing has two values of c_status, so the rule never fires'),
     ),
-    "two designs": (
-        "A: typeFD(?g, fd_spiral_low) ^ typeFD(?g, fd_spiral_high) -> Role(?g)",
-        (32, "typeFD(?g, fd_spiral_high): nothing has two values of typeFD, so the rule never fires"),
-    ),
     "value replaced": (
         "A: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 1.0) -> hasValue(?q, 1.0)",
         (77, "hasValue(?q, 1.0) contradicts hasValue in the body, which holds as well"),
-    ),
-    "status replaced": (
-        'A: o_status(?o, "UNGROUNDED") -> o_status(?o, "IN_ERROR_FR")',
-        (34, 'o_status(?o, "IN_ERROR_FR") contradicts o_status in the body, which holds as well'),
     ),
     "realisable": (
         "A: hasValue(?q, ?v) ^ greaterThan(?v, 3.5) -> fd_realisability(fd_spiral_high, true)",
@@ -206,10 +184,6 @@ WITHOUT_FIRING = {
         'A: o_status(?o, ?s) ^ equal(?s, "OK") -> Role(?o)',
         (23, '"OK" is not among the values of o_status: the comparison never holds'),
     ),
-    "always another status": (
-        'A: o_status(?o, ?s) ^ notEqual("OK", ?s) -> Role(?o)',
-        (23, '"OK" is not among the values of o_status: the comparison always holds'),
-    ),
     "text for a number": (
         'A: hasValue(?q, ?v) ^ greaterThan(?v, "3") -> QAvalue(?q)',
         (23, 'greaterThan compares ?v, a number, with the text "3": it never holds'),
@@ -217,10 +191,6 @@ WITHOUT_FIRING = {
     "no number": (
         "A: hasValue(?q, ?v) ^ lessThan(2, ?v) ^ lessThanOrEqual(?v, 2) -> QAvalue(?q)",
         (41, "no value of ?v is > 2 and <= 2: the rule never fires"),
-    ),
-    "no equal number": (
-        "A: hasValue(?q, ?v) ^ lessThan(?v, 2) ^ equal(?v, 2.0) -> QAvalue(?q)",
-        (41, "no value of ?v is < 2 and = 2.0: the rule never fires"),
     ),
     "excluded text": (
         'A: c_status(?c, ?s) ^ notEqual(?s, "False") -> Role(?c)',
@@ -230,7 +200,7 @@ WITHOUT_FIRING = {
 
 
 @pytest.mark.parametrize("case", WITHOUT_FIRING)
-def test_a_rule_that_cannot_do_what_it_should(case: str, tmp_path: Path) -> None:
+def test_a_rule_that_cannot_do_what_it_should(case, tmp_path):
     rule, finding = WITHOUT_FIRING[case]
     assert [one[:2] for one in warned(tmp_path, rule, measured=["water_visibility"])] == [finding]
 
@@ -259,28 +229,8 @@ def test_a_rule_that_cannot_do_what_it_should(case: str, tmp_path: Path) -> None
         "A: solvesO(?g, ?o) ^ typeFD(?g, fd_spiral_low) ^ solvesO(?h, ?p) ^ o_updatable(?p, true) -> Role(?h)",
     ],
 )
-def test_a_rule_that_can(rule: str, tmp_path: Path) -> None:
+def test_a_rule_that_can(rule, tmp_path):
     assert not warned(tmp_path, rule, measured=["water_visibility"])
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "are"),
-    [
-        ("design", "desing", True),
-        ("design", "desgn", True),
-        ("design", "dessign", True),
-        ("value", "valule", True),
-        ("speed1", "speed2", False),
-        ("xpos", "ypos", False),
-        ("goal_a", "goal_b", False),
-        ("value", "qvalue", False),
-        ("fg", "fd", False),
-        ("q", "qq", False),
-    ],
-)
-def test_names_that_are_misspelt_variants_of_each_other(one: str, other: str, are: bool) -> None:
-    assert are_near(one, other) is are
-    assert are_near(other, one) is are
 
 
 @pytest.mark.parametrize(
@@ -290,7 +240,7 @@ def test_names_that_are_misspelt_variants_of_each_other(one: str, other: str, ar
         ('A: o_status(?o, "IN_EROR_NFR") -> o_updatable(?o, true)', 17, "never matches"),
     ],
 )
-def test_a_status_outside_its_range_is_an_error(rule: str, column: int, consequence: str, tmp_path: Path) -> None:
+def test_a_status_outside_its_range_is_an_error(rule, column, consequence, tmp_path):
     (error,) = errors(found(tmp_path, rule))
     assert error.column == column
     assert error.message.endswith(consequence)

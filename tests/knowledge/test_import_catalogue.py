@@ -1,9 +1,6 @@
 """Imports resolve to local files, whichever files were given and in whichever order; nothing is fetched."""
 
-from __future__ import annotations
-
 import itertools
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +10,6 @@ from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
-from tests.helpers.owl_text import MakeOntology
 
 IMPORT = "https://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl"
 STORY = [
@@ -33,9 +29,7 @@ def decisions(base: Ontology, reasoner: Reasoner) -> list[dict[str, str | None]]
 
 
 @pytest.mark.parametrize("oldest", [False, True])
-def test_the_exemplars_three_files_decide_as_the_shipped_two(
-    kb: Ontology, pellet: Reasoner, shipped: Path, tmp_path: Path, oldest: bool
-) -> None:
+def test_the_exemplars_three_files_decide_as_the_shipped_two(kb, pellet, shipped, tmp_path, oldest):
     files = write_exemplar_files(shipped, tmp_path / "owl", oldest=oldest)
     base = Ontology.load(list(files.values()))
     assert set(base.files) == set(files.values())
@@ -46,7 +40,7 @@ def test_the_exemplars_three_files_decide_as_the_shipped_two(
     assert found[6] == {MOTION: "fd_all_thrusters", SEARCH: "fd_spiral_low"}
 
 
-def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped: Path, tmp_path: Path) -> None:
+def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped, tmp_path):
     files = write_exemplar_files(shipped, tmp_path / "owl")
     given = [*itertools.permutations(files.values()), (files["suave"],), (files["suave"], files["tomasys"])]
     bases = [Ontology.load(one) for one in given]
@@ -54,7 +48,7 @@ def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped: 
     assert len({base.content_hash for base in bases}) == 1
 
 
-def test_files_in_different_folders_and_under_other_names_are_matched_by_iri(shipped: Path, tmp_path: Path) -> None:
+def test_files_in_different_folders_and_under_other_names_are_matched_by_iri(shipped, tmp_path):
     files = write_exemplar_files(shipped, tmp_path / "owl")
     moved = []
     for number, file in enumerate(files.values()):
@@ -64,17 +58,7 @@ def test_files_in_different_folders_and_under_other_names_are_matched_by_iri(shi
     assert set(Ontology.load(moved).files) == set(moved)
 
 
-def test_a_file_beside_under_another_name_is_matched_by_its_iri(suave_copy: MakeOntology, shipped: Path) -> None:
-    path = suave_copy(replace={IMPORT: "http://metacontrol.org/tomasys#"})
-    beside = path.with_name("vocabulary.owl")
-    beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- mine -->")
-    path.with_name("broken.owl").write_text("tomasys, but no XML")
-    assert set(Ontology.load([path]).files) == {path, beside}
-
-
-def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
-    suave_copy: MakeOntology, shipped: Path, tmp_path: Path
-) -> None:
+def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(suave_copy, shipped, tmp_path):
     path = suave_copy()
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
     beside = path.with_name("tomasys.owl")
@@ -90,25 +74,12 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
     "iri",
     ["http://metacontrol.org/tomasys", "http://metacontrol.org/tomasys#", MROS_IMPORT, "http://ros/mros#"],
 )
-def test_known_iris_resolve_to_the_shipped_files(suave_copy: MakeOntology, shipped: Path, iri: str) -> None:
+def test_known_iris_resolve_to_the_shipped_files(suave_copy, shipped, iri):
     path = suave_copy(replace={IMPORT: iri})
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
 
 
-def test_an_edited_copy_of_the_shipped_tomasys_also_supplies_the_robots_terms(
-    suave_copy: MakeOntology, shipped: Path, kb: Ontology
-) -> None:
-    path = suave_copy(replace={IMPORT: MROS_IMPORT})
-    copy = path.with_name("tomasys_mine.owl")
-    copy.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- mine -->")
-    base = Ontology.load([path, copy])
-    assert set(base.files) == {path, copy}
-    assert len(base.rules) == len(kb.rules)
-
-
-def test_a_given_mros_file_stands_in_for_the_shipped_rules_of_that_part(
-    shipped: Path, tmp_path: Path, kb: Ontology
-) -> None:
+def test_a_given_mros_file_stands_in_for_the_shipped_rules_of_that_part(shipped, tmp_path, kb):
     files = write_exemplar_files(shipped, tmp_path / "owl")
     files["tomasys"].unlink()
     base = Ontology.load([files["mros"], files["suave"]])
@@ -116,23 +87,14 @@ def test_a_given_mros_file_stands_in_for_the_shipped_rules_of_that_part(
     assert sorted(rule.name for rule in base.rules) == sorted(rule.name for rule in kb.rules)
 
 
-def test_a_given_tomasys_is_not_mixed_with_the_shipped_one(shipped: Path, tmp_path: Path) -> None:
-    files = write_exemplar_files(shipped, tmp_path / "owl")
-    files["mros"].unlink()
-    with pytest.raises(KnowledgeError) as error:
-        Ontology.load([files["tomasys"], files["suave"]])
-    assert f"import {MROS_IMPORT} does not resolve" in str(error.value)
-    assert str(files["suave"]) in str(error.value)
-
-
-def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy: MakeOntology) -> None:
+def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy):
     path = suave_copy(replace={IMPORT: "http://example.org/wind.owl"})
     with pytest.raises(KnowledgeError) as error:
         Ontology.load([path])
     assert str(error.value).startswith(f"{path}: line 15: import http://example.org/wind.owl does not resolve")
 
 
-def test_import_cycles_end(suave_copy: MakeOntology, shipped: Path, kb: Ontology) -> None:
+def test_import_cycles_end(suave_copy, shipped, kb):
     path = suave_copy()
     text = (shipped / "tomasys.owl").read_text(encoding="utf-8")
     ontology = '<owl:Ontology rdf:about="http://metacontrol.org/tomasys">'
@@ -143,16 +105,14 @@ def test_import_cycles_end(suave_copy: MakeOntology, shipped: Path, kb: Ontology
         assert len(Ontology.load([path.with_name(name)]).rules) == len(kb.rules)
 
 
-def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(
-    suave_copy: MakeOntology, shipped: Path
-) -> None:
+def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(suave_copy, shipped):
     path = suave_copy("<!-- mine -->")
     assert set(Ontology.load([path, path, path.parent / "." / path.name]).files) >= {path}
     with pytest.raises(KnowledgeError, match="supplies the ontology"):
         Ontology.load([path, shipped / "suave.owl"])
 
 
-def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path: Path, shipped: Path) -> None:
+def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path, shipped):
     path = tmp_path / "mine.owl"
     path.write_text(
         '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" '

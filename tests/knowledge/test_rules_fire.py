@@ -1,7 +1,5 @@
 """Each rule of the shipped ontologies concludes what it says, and nothing where its condition does not hold."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -24,7 +22,7 @@ def with_files(*files: Path) -> Reasoner:
     return Reasoner(Ontology.load(files), "pellet")
 
 
-def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: Ontology) -> None:
+def test_all_rules_of_the_exemplar_are_there_and_enabled(kb):
     names = "QAWaterVisibility QAenergy QAsafety compErrFG compError compRecov mros_S4"
     numbered = "S1a S1b S1c S2 S3 S4 S5 S6a S6b S6c S9 S10 S11"
     assert {rule.name for rule in kb.rules if rule.enabled} == {*names.split(), *numbered.split()}
@@ -39,15 +37,13 @@ def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: Ontology) -> None:
         ("fd_spiral_low", 1.25, False),
     ],
 )
-def test_visibility_below_what_the_design_expects_is_an_error(
-    pellet: Reasoner, design: str, visibility: float, in_error: bool
-) -> None:
+def test_visibility_below_what_the_design_expects_is_an_error(pellet, design, visibility, in_error):
     inference = pellet.analyze(searching(design, visibility))
     assert inference.grounding_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
     assert inference.objective_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
 
 
-def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_error(pellet: Reasoner) -> None:
+def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_error(pellet):
     state = searching("fd_spiral_low", 2.0, motion="fd_all_thrusters", components={"c_thruster_3": "FALSE"})
     assert inferred(pellet, state) == {
         "fd_realisability(fd_all_thrusters, false)",
@@ -59,12 +55,12 @@ def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_er
     assert False not in inference.values("fd_recover_thrusters", "fd_realisability")
 
 
-def test_the_recovering_design_is_not_in_error_by_a_failed_thruster(pellet: Reasoner) -> None:
+def test_the_recovering_design_is_not_in_error_by_a_failed_thruster(pellet):
     state = searching("fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_3": "FALSE"})
     assert inferred(pellet, state) == {"fd_realisability(fd_all_thrusters, false)"}
 
 
-def test_a_recovered_component_makes_every_objective_updatable(pellet: Reasoner) -> None:
+def test_a_recovered_component_makes_every_objective_updatable(pellet):
     state = searching("fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_1": "RECOVERED"})
     assert inferred(pellet, state) == {
         "o_updatable(o_generate_search_path, true)",
@@ -75,9 +71,7 @@ def test_a_recovered_component_makes_every_objective_updatable(pellet: Reasoner)
 
 @pytest.mark.parametrize("attribute", ["energy", "safety"])
 @pytest.mark.parametrize(("measured", "in_error"), [(0.6, True), (0.5, False), (0.4, False)])
-def test_more_than_the_objective_requires_is_an_error_and_logged(
-    suave_copy: MakeOntology, attribute: str, measured: float, in_error: bool
-) -> None:
+def test_more_than_the_objective_requires_is_an_error_and_logged(suave_copy, attribute, measured, in_error):
     path = suave_copy(
         individual("nfr", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.5"))
         + individual("qa_low", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.9"))
@@ -93,17 +87,15 @@ def test_more_than_the_objective_requires_is_an_error_and_logged(
 
 
 @pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
-def test_an_error_of_a_grounding_becomes_its_objectives_error(suave_copy: MakeOntology, kind: str) -> None:
+def test_an_error_of_a_grounding_becomes_its_objectives_error(suave_copy, kind):
     path = suave_copy(rule("inject", f'FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_{kind}")'))
     inference = with_files(path).analyze(searching("fd_spiral_low"))
     assert inference.objective_status(SEARCH) == f"IN_ERROR_{kind}"
 
 
 @pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
-def test_an_objectives_error_reaches_the_grounding_that_requires_it(suave_copy: MakeOntology, kind: str) -> None:
-    path = suave_copy(
-        individual("fg_spiral_low", "FunctionGrounding", ("requiresO", ":o_maintain_motion")),
-    )
+def test_an_objectives_error_reaches_the_grounding_that_requires_it(suave_copy, kind):
+    path = suave_copy(individual("fg_spiral_low", "FunctionGrounding", ("requiresO", ":o_maintain_motion")))
     state = KnowledgeState.of(
         [ObjectiveState(SEARCH), ObjectiveState(MOTION, f"IN_ERROR_{kind}")], groundings={SEARCH: "fd_spiral_low"}
     )
@@ -125,7 +117,7 @@ def bound_thruster(status: str) -> str:
     )
 
 
-def test_the_boolean_status_of_older_models_puts_binding_and_grounding_in_error(suave_copy: MakeOntology) -> None:
+def test_the_boolean_status_of_older_models_puts_binding_and_grounding_in_error(suave_copy):
     reasoner = with_files(suave_copy(bound_thruster("false")))
     assert inferred(reasoner, searching("fd_spiral_low")) == {
         "b_status(b_camera, false)",  # S2
@@ -137,7 +129,7 @@ def test_the_boolean_status_of_older_models_puts_binding_and_grounding_in_error(
     }
 
 
-def test_the_reported_status_makes_the_class_unavailable_but_not_the_binding(suave_copy: MakeOntology) -> None:
+def test_the_reported_status_makes_the_class_unavailable_but_not_the_binding(suave_copy):
     reasoner = with_files(suave_copy(bound_thruster("")))
     state = searching("fd_spiral_low", components={"c_camera": "FALSE"})
     assert inferred(reasoner, state) == {
@@ -146,7 +138,7 @@ def test_the_reported_status_makes_the_class_unavailable_but_not_the_binding(sua
     }
 
 
-def test_an_unavailable_specification_makes_the_design_unrealisable(suave_copy: MakeOntology) -> None:
+def test_an_unavailable_specification_makes_the_design_unrealisable(suave_copy):
     path = suave_copy(
         individual("cs_camera", "ComponentSpecification", ("cspec_availability", "false"))
         + individual("r_camera", "Role", ("roleDef", ":cs_camera"))
@@ -155,14 +147,14 @@ def test_an_unavailable_specification_makes_the_design_unrealisable(suave_copy: 
     assert inferred(with_files(path), searching()) == {"fd_realisability(fd_spiral_low, false)"}
 
 
-def test_a_status_in_the_ontology_holds_until_diagnostics_report_another(suave_copy: MakeOntology) -> None:
+def test_a_status_in_the_ontology_holds_until_diagnostics_report_another(suave_copy):
     reasoner = with_files(suave_copy(individual("c_thruster_1", "Component", ("c_status", "FALSE"))))
     assert inferred(reasoner, searching()) == {"fd_realisability(fd_all_thrusters, false)"}
     assert inferred(reasoner, searching(components={"c_thruster_1": "OK"})) == set()
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_a_disabled_rule_does_not_fire(suave_copy: MakeOntology, name: str) -> None:
+def test_a_disabled_rule_does_not_fire(suave_copy, name):
     path = suave_copy(replace={'#boolean">true</swrla:isRuleEnabled>': '#boolean">false</swrla:isRuleEnabled>'})
     base = Ontology.load([path])
     assert [rule.name for rule in base.rules if not rule.enabled] == ["QAWaterVisibility"]
@@ -176,7 +168,7 @@ def _clash(suave_copy: MakeOntology) -> Path:
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy: MakeOntology, name: str) -> None:
+def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy, name):
     reasoner = Reasoner(Ontology.load([_clash(suave_copy)]), name)
     with pytest.raises(KnowledgeError) as error:
         reasoner.analyze(searching("fd_spiral_high", 3.0))
@@ -188,7 +180,7 @@ def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy: MakeOntolo
         assert reasoner.analyze(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "IN_ERROR_FR"
 
 
-def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntology) -> None:
+def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy):
     rules: Mapping[str, str] = {
         "number": "QAvalue(?q) ^ hasValue(?q, ?v) ^ isQAtype(?q, :water_visibility) ^ multiply(?w, ?v, 2.0)"
         " -> tomasys:doubled(?q, ?w)",

@@ -1,7 +1,5 @@
 """The shipped ontologies hold the exemplar's vocabulary and model under its names, as Protégé writes them."""
 
-from __future__ import annotations
-
 from decimal import Decimal
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,8 +7,6 @@ from xml.etree import ElementTree
 import pytest
 from rdflib import Graph, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
-
-from suave_des.knowledge.ontology import Ontology
 
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
@@ -49,7 +45,7 @@ def names(graph: Graph, kind: URIRef) -> set[str]:
     return {str(term).removeprefix(TOMASYS) for term in graph.subjects(RDF.type, kind)}
 
 
-def test_the_vocabulary_is_complete(tomasys: Graph) -> None:
+def test_the_vocabulary_is_complete(tomasys):
     assert names(tomasys, OWL.Class) == set(CLASSES.split())
     others = {"roles", "roleDef", "typeC", "hasBindings", "binding_role", "binding_component", MROS + "requiredBy"}
     assert names(tomasys, OWL.ObjectProperty) == others | set(OBJECT_PROPERTIES)
@@ -60,7 +56,7 @@ def test_the_vocabulary_is_complete(tomasys: Graph) -> None:
         assert tomasys.value(URIRef(TOMASYS + name), RDFS.range) == URIRef(TOMASYS + value_range)
 
 
-def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped: Path) -> None:
+def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped):
     for path in shipped.glob("*.owl"):
         graph = Graph().parse(path, format="xml")
         kinds = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.NamedIndividual, URIRef(SWRL + "Imp")]
@@ -71,7 +67,7 @@ def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped: Path) -> N
             assert graph.value(term, RDFS.comment), term
 
 
-def test_the_model_has_the_exemplars_names_and_deployed_values(kb: Ontology) -> None:
+def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
     assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
     assert kb.components == tuple(f"c_thruster_{n}" for n in range(1, 7))
     assert set(kb.quality_attributes) == {"water_visibility", "battery_level", "performance", "energy", "safety"}
@@ -93,14 +89,14 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb: Ontology) -> 
     kb.check(kb.functions)
 
 
-def test_each_rules_variables_are_declared(shipped: Path) -> None:
+def test_each_rules_variables_are_declared(shipped):
     for path in shipped.glob("*.owl"):
         graph = Graph().parse(path, format="xml")
         used = {term for triple in graph for term in triple if str(term).startswith("urn:swrl:var#")}
         assert used == set(graph.subjects(RDF.type, URIRef(SWRL + "Variable")))
 
 
-def test_proteges_catalogue_leads_each_import_to_a_shipped_file(shipped: Path) -> None:
+def test_proteges_catalogue_leads_each_import_to_a_shipped_file(shipped):
     catalogue = ElementTree.parse(shipped / "catalog-v001.xml").getroot()
     leads = {entry.attrib["name"]: entry.attrib["uri"] for entry in catalogue}
     for path in shipped.glob("*.owl"):

@@ -80,14 +80,12 @@ class Mission:
 
 
 @BOTH
-def test_search_is_requested_when_the_mission_starts(name: str) -> None:
+def test_search_is_requested_when_the_mission_starts(name):
     assert Mission(name, start_delay_s=2.5).run().calls[0] == ("request", 2.5, "search_pipeline")
 
 
 @pytest.mark.parametrize(("name", "poll_s"), [("2023", 74.35), ("1.5", 73.535)])
-def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_begins(
-    name: str, poll_s: float
-) -> None:
+def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_begins(name, poll_s):
     assert Mission(name, 73.45).run().calls[1:3] == [
         ("cancel", poll_s, "search_pipeline"),
         ("request", poll_s, "inspect_pipeline"),
@@ -105,22 +103,22 @@ def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_
         ("1.5", 74.0 - 1e-10, 74.0),
     ],
 )
-def test_search_time(name: str, detected_s: float, search_time_s: float) -> None:
+def test_search_time(name, detected_s, search_time_s):
     assert Mission(name, detected_s).run().coordinator.search_time_or_limit_s == search_time_s
 
 
 @BOTH
-def test_search_time_is_the_limit_when_nothing_was_found(name: str) -> None:
+def test_search_time_is_the_limit_when_nothing_was_found(name):
     mission = Mission(name, time_limit_s=100.0).run()
     assert mission.env.now > 100.0
     assert mission.coordinator.search_time_or_limit_s == 100.0
 
 
-def test_detection_before_the_search_was_requested_keeps_its_own_time() -> None:
+def test_detection_before_the_search_was_requested_keeps_its_own_time():
     assert Mission("1.5", 2.2, start_delay_s=5.0).run().coordinator.search_time_s == 2.0
 
 
-def test_tasks_and_the_missions_end_are_recorded() -> None:
+def test_tasks_and_the_missions_end_are_recorded():
     assert Mission("2023", 73.45).run().logged == [
         (0.0, "task_requested", "search_pipeline"),
         (74.35, "task_done", "search_pipeline"),
@@ -132,30 +130,30 @@ def test_tasks_and_the_missions_end_are_recorded() -> None:
 
 @pytest.mark.parametrize(("limit_s", "end_s"), [(300.0, 300.2), (100.21, 100.7), (100.7, 100.7)])
 @BOTH
-def test_the_limit_is_checked_every_half_second(name: str, limit_s: float, end_s: float) -> None:
+def test_the_limit_is_checked_every_half_second(name, limit_s, end_s):
     assert Mission(name, time_limit_s=limit_s).run().env.now == pytest.approx(end_s)
 
 
 @pytest.mark.parametrize(("detected_s", "task"), [(None, "search_pipeline"), (150.0, "inspect_pipeline")])
 @BOTH
-def test_at_the_limit_the_present_task_is_cancelled(name: str, detected_s: float | None, task: str) -> None:
+def test_at_the_limit_the_present_task_is_cancelled(name, detected_s, task):
     assert Mission(name, detected_s).run().calls[-1] == ("cancel", 300.2, task)
 
 
-def test_distance_is_the_one_published_before_the_cancellation_at_the_limit() -> None:
+def test_distance_is_the_one_published_before_the_cancellation_at_the_limit():
     mission = Mission("2023", 150.0)
     mission.on_cancel = lambda: setattr(mission.follow, "distance_m", 99.0)
     assert mission.run().coordinator.distance_inspected_m == 12.5
 
 
 @pytest.mark.parametrize(("name", "end_s"), [("2023", 201.35), ("1.5", 201.135)])
-def test_the_mission_ends_at_the_poll_after_the_end_of_the_path(name: str, end_s: float) -> None:
+def test_the_mission_ends_at_the_poll_after_the_end_of_the_path(name, end_s):
     mission = Mission(name, 50.0, 201.1).run()
     assert mission.env.now == pytest.approx(end_s)
     assert [task for what, _, task in mission.calls if what == "cancel"] == ["search_pipeline", "inspect_pipeline"]
 
 
-def test_a_detection_that_no_poll_saw_before_the_limit_is_none() -> None:
+def test_a_detection_that_no_poll_saw_before_the_limit_is_none():
     # Detected at 300.1 s, seen only at 300.35 s; the limit is noticed at 300.2 s.
     assert Mission("2023", 300.1).run().coordinator.search_time_s is None
 
@@ -163,7 +161,7 @@ def test_a_detection_that_no_poll_saw_before_the_limit_is_none() -> None:
 @pytest.mark.parametrize(
     ("name", "mission_wide", "per_task"), [("2023", ("f_maintain_motion",), ()), ("1.5", (), ("f_maintain_motion",))]
 )
-def test_functions_that_the_mission_and_each_task_need(name: str, mission_wide: tuple, per_task: tuple) -> None:
+def test_functions_that_the_mission_and_each_task_need(name, mission_wide, per_task):
     mission = Mission(name, 50.0)
     assert mission.coordinator.mission_wide_functions == mission_wide
     functions = [(*per_task, "f_generate_search_path"), (*per_task, "f_follow_pipeline")]

@@ -1,13 +1,16 @@
-"""Maintain motion: recovery of the thrusters."""
+"""Maintain motion, which recovers the thrusters; and generate recharge path: the way to the recharge station."""
 
 from types import SimpleNamespace
 
 import pytest
 import simpy
 
+from suave_des.managed.destinations import GenerateRechargePath
 from suave_des.managed.motion import MaintainMotion
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from tests.helpers.stand_ins import ACTIVE, INACTIVE, revision
+from suave_des.monitor.measurements import BatteryMeasurements, Timing
+from suave_des.scenario.physical import Battery
+from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, revision, sender
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 
@@ -35,7 +38,7 @@ class Motion:
 
 
 @BOTH
-def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s_and_published(name: str) -> None:
+def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s_and_published(name):
     motion = Motion(name)
     motion.node.apply(ACTIVE)
     motion.env.run()
@@ -46,7 +49,7 @@ def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s_and_publishe
 
 
 @BOTH
-def test_inactive_modes_recover_nothing(name: str) -> None:
+def test_inactive_modes_recover_nothing(name):
     motion = Motion(name)
     motion.node.apply(INACTIVE)
     motion.env.run()
@@ -64,20 +67,20 @@ def interrupted(name: str, at_s: float) -> Motion:
 @pytest.mark.parametrize(
     ("name", "at_s", "restored"), [("2023", 3.0, 6), ("2023", 10.3, 6), ("1.5", 3.0, 0), ("1.5", 10.3, 2)]
 )
-def test_recovery_goes_on_when_deactivated_in_2023_and_is_aborted_in_15(name: str, at_s: float, restored: int) -> None:
+def test_recovery_goes_on_when_deactivated_in_2023_and_is_aborted_in_15(name, at_s, restored):
     motion = interrupted(name, at_s)
     motion.env.run()
     assert len(motion.restored) == restored
 
 
-def test_recovery_begins_anew_after_an_abort() -> None:
+def test_recovery_begins_anew_after_an_abort():
     motion = interrupted("1.5", 3.0)
     motion.node.apply(ACTIVE)
     motion.env.run()
     assert motion.restored[0] == (13.0, 1) and len(motion.restored) == 6
 
 
-def test_activation_during_a_recovery_that_goes_on_starts_no_second_one() -> None:
+def test_activation_during_a_recovery_that_goes_on_starts_no_second_one():
     motion = interrupted("2023", 3.0)
     motion.node.apply(ACTIVE)
     motion.env.run()
@@ -85,7 +88,7 @@ def test_activation_during_a_recovery_that_goes_on_starts_no_second_one() -> Non
 
 
 @BOTH
-def test_a_second_recovery_can_follow_the_first(name: str) -> None:
+def test_a_second_recovery_can_follow_the_first(name):
     motion = Motion(name)
     motion.node.apply(ACTIVE)
     motion.env.run(until=20.0)
@@ -93,3 +96,35 @@ def test_a_second_recovery_can_follow_the_first(name: str) -> None:
     motion.node.apply(ACTIVE)
     motion.env.run()
     assert [t_s for t_s, thruster in motion.restored if thruster == 1] == [10.0, 30.0]
+
+
+def recharging() -> tuple[simpy.Environment, PlacedVehicle, GenerateRechargePath]:
+    env, vehicle = simpy.Environment(), PlacedVehicle()
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5))
+    node = GenerateRechargePath(env, sender(env, vehicle), Battery(), level, phase_s=0.5)
+    node.apply(ACTIVE)
+    return env, vehicle, node
+
+
+def test_active_it_sends_the_vehicle_to_the_station():
+    env, vehicle, _ = recharging()
+    env.run(until=11.0)
+    assert vehicle.commands == [(t_s, (-3.0, -2.0, -18.75)) for t_s in (0.5, 5.5, 10.5)]
+
+
+def test_docking_is_checked_when_the_station_is_sent():
+    env, vehicle, node = recharging()
+    env.run(until=151.0)
+    vehicle.place = (-3.4, -1.6, -18.75)
+    env.run(until=155.4)
+    assert node.level.recharges == 0
+    env.run(until=156.0)
+    assert (node.level.recharges, node.level.level(155.5), node.level.times_s[-1]) == (1, 1.0, 155.5)
+
+
+def test_inactive_it_leaves_the_autopilot_to_others():
+    env, vehicle, node = recharging()
+    env.run(until=1.0)
+    node.apply(INACTIVE)
+    env.run(until=100.0)
+    assert len(vehicle.commanded) == 1

@@ -1,16 +1,17 @@
-"""The mode manager: what it answers, and when modes take effect."""
+"""The mode manager: what it answers, and when modes take effect; and set-points on their way to the autopilot."""
 
 import itertools
+import random
 from collections.abc import Callable
 
 import pytest
 import simpy
 
 from suave_des.managed.mode_manager import ModeManager
-from suave_des.managed.node import FunctionNode
+from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
-from tests.helpers.stand_ins import silent
+from tests.helpers.stand_ins import Place, PlacedVehicle, silent
 
 SEARCH, FOLLOW = "f_generate_search_path", "f_follow_pipeline"
 TABLE = load_scenario("seams2023").modes
@@ -44,7 +45,7 @@ def managed() -> Managed:
 
 
 @pytest.mark.parametrize("mode", ["fd_spiral_low", "fd_unground", "__DEFAULT__"])
-def test_any_known_mode_is_answered_with_success_at_once(managed: Managed, mode: str) -> None:
+def test_any_known_mode_is_answered_with_success_at_once(managed, mode):
     assert managed.modes.change_mode(SEARCH, mode) is True and managed.env.now == 0.0
 
 
@@ -53,13 +54,11 @@ def test_any_known_mode_is_answered_with_success_at_once(managed: Managed, mode:
     [(SEARCH, "fd_spiral_very_high"), ("f_dock", "fd_spiral_low"), ("f_maintain_motion", "fd_all_thrusters")],
     ids=["unknown mode", "unknown function", "function without a node"],
 )
-def test_anything_else_is_refused(managed: Managed, function: str, mode: str) -> None:
+def test_anything_else_is_refused(managed, function, mode):
     assert managed.modes.change_mode(function, mode) is False
 
 
-def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_for_what_was_refused(
-    managed: Managed,
-) -> None:
+def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_for_what_was_refused(managed):
     effects: list[tuple[float, str, str]] = []
     managed.modes.listeners.append(lambda function, mode: effects.append((managed.env.now, function, mode.name)))
     managed.modes.change_mode(SEARCH, "fd_spiral_very_high")
@@ -69,7 +68,7 @@ def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_fo
     assert effects == [(0.5, SEARCH, "fd_spiral_low")]
 
 
-def test_the_mode_already_asked_for_succeeds_without_effect(managed: Managed) -> None:
+def test_the_mode_already_asked_for_succeeds_without_effect(managed):
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.env.run(until=3.0)
     assert managed.modes.change_mode(SEARCH, "fd_spiral_low") is True
@@ -77,7 +76,7 @@ def test_the_mode_already_asked_for_succeeds_without_effect(managed: Managed) ->
     assert len(managed.search.applied) == 1
 
 
-def test_effects_keep_the_order_of_requests_of_each_function() -> None:
+def test_effects_keep_the_order_of_requests_of_each_function():
     latencies = itertools.cycle([3.0, 1.0])
     managed = Managed(lambda: next(latencies))
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
@@ -90,19 +89,10 @@ def test_effects_keep_the_order_of_requests_of_each_function() -> None:
     assert managed.follow.applied == [(4.0, "fd_follow_pipeline")]
 
 
-def test_current_mode_is_the_one_requested_last(managed: Managed) -> None:
+def test_current_mode_is_the_one_requested_last_of_those_in_the_file(managed):
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     assert managed.modes.current_mode(SEARCH) == "fd_spiral_low" and managed.modes.current_mode(FOLLOW) is None
-
-
-def test_available_modes_are_those_of_the_file(managed: Managed) -> None:
-    assert set(managed.modes.available_modes(SEARCH)) == {
-        "__DEFAULT__",
-        "fd_unground",
-        "fd_spiral_low",
-        "fd_spiral_medium",
-        "fd_spiral_high",
-    }
+    assert managed.modes.available_modes(SEARCH) == TABLE.modes(SEARCH)
     assert managed.modes.available_modes("f_dock") == ()
 
 
@@ -117,13 +107,13 @@ def test_available_modes_are_those_of_the_file(managed: Managed) -> None:
     ],
     ids=["a first mode", "no change", "a change", "off and on", "off before the first"],
 )
-def test_adaptations_are_changes_of_functions_in_use(managed: Managed, requests: list[str], adaptations: int) -> None:
+def test_adaptations_are_changes_of_functions_in_use(managed, requests, adaptations):
     for mode in requests:
         managed.modes.change_mode(SEARCH, mode)
     assert managed.modes.adaptations == adaptations
 
 
-def test_the_end_of_a_task_is_no_adaptation(managed: Managed) -> None:
+def test_the_end_of_a_task_is_no_adaptation(managed):
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.modes.end_task([SEARCH])
     managed.modes.change_mode(SEARCH, "fd_unground")
@@ -170,5 +160,32 @@ LOW, HIGH, OFF = Mode("low", True, {}), Mode("high", True, {}), Mode("off", Fals
         ([LOW, OFF, HIGH], ["configure low", "activated", "deactivated", "configure high", "activated"]),
     ],
 )
-def test_hooks_that_modes_call(modes: list[Mode], calls: list[str]) -> None:
+def test_hooks_that_modes_call(modes, calls):
     assert calls_of(*modes) == calls
+
+
+def sent(count: int, loss_probability: float, frame_error_m: Place = (0.0, 0.0, 0.0)) -> list[Place]:
+    """What arrives of so many set-points."""
+    vehicle = PlacedVehicle()
+    sender = SetPointSender(vehicle, simpy.Environment(), frame_error_m, loss_probability, random.Random(1))
+    for n in range(count):
+        sender.send(float(n), 0.0, -18.0)
+    return vehicle.commanded
+
+
+def test_without_loss_every_set_point_arrives():
+    assert len(sent(100, 0.0)) == 100
+
+
+def test_a_lost_set_point_leaves_the_autopilot_with_the_one_before():
+    numbers = [int(x) for x, _, _ in sent(20, 0.5)]
+    assert numbers == sorted(set(numbers)) and 0 < len(numbers) < 20
+
+
+@pytest.mark.parametrize("probability", [0.1, 0.6])
+def test_share_of_lost_set_points(probability):
+    assert 1.0 - len(sent(4000, probability)) / 4000 == pytest.approx(probability, abs=0.03)
+
+
+def test_frame_error_shifts_every_set_point():
+    assert sent(1, 0.0, (0.1, -0.2, 0.3)) == [pytest.approx((0.1, -0.2, -17.7))]

@@ -4,14 +4,9 @@ import math
 
 import pytest
 import simpy
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from suave_des.managed.search import GenerateSearchPath
-from suave_des.vehicle.model import Autopilot, Pose
-from suave_des.vehicle.vehicle import Vehicle, row_at
-from tests.helpers.stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
-from tests.helpers.vehicles import BLUEROV2, VIEW_TANGENT
+from tests.helpers.stand_ins import INACTIVE, START, VIEW_TANGENT, PlacedVehicle, revision, sender, spiral_at
 
 ORIGIN = (-17.0, 2.3)
 PHASE_S = 0.25
@@ -56,14 +51,14 @@ def point(n_radius: float, n_angle: int, altitude_m: float = 1.0) -> tuple[float
 
 
 @pytest.mark.parametrize(("name", "centre"), [("2023", ORIGIN), ("1.5", START[:2])])
-def test_first_set_point_is_that_of_step_1_around_the_revisions_centre(name: str, centre: tuple[float, float]) -> None:
+def test_first_set_point_is_that_of_step_1_around_the_revisions_centre(name, centre):
     search = searching(name)
     search.ticks(1)
     assert search.spiral(centre) == [point(1, 1)]
 
 
 @BOTH
-def test_the_first_set_point_comes_some_time_after_the_first_activation_and_later_ones_at_once(name: str) -> None:
+def test_the_first_set_point_comes_some_time_after_the_first_activation_and_later_ones_at_once(name):
     search = Search(name, PlacedVehicle(obeys=True))
     search.node.start_latency_s = 4.5
     search.ticks(20)
@@ -82,21 +77,21 @@ def test_the_first_set_point_comes_some_time_after_the_first_activation_and_late
 
 @BOTH
 @pytest.mark.parametrize("altitude_m", [1.0, 2.0, 3.0])
-def test_set_points_are_at_the_modes_altitude_above_the_bed(name: str, altitude_m: float) -> None:
+def test_set_points_are_at_the_modes_altitude_above_the_bed(name, altitude_m):
     search = searching(name, altitude_m)
     search.ticks(1)
     assert search.last[2] == -20.0 + altitude_m
 
 
 @pytest.mark.parametrize("altitude_m", [1.0, 3.0])
-def test_a_reached_set_point_gives_the_next_one_each_tick_in_the_nodes_phase(altitude_m: float) -> None:
+def test_a_reached_set_point_gives_the_next_one_each_tick_in_the_nodes_phase(altitude_m):
     search = searching("2023", altitude_m, obeys=True)
     search.ticks(40)
     assert search.spiral(ORIGIN) == [point(n, n, altitude_m) for n in range(1, 41)]
     assert search.vehicle.times_s == [0.25 + n for n in range(40)]
 
 
-def test_a_change_of_altitude_skips_one_angle_step_but_no_radius() -> None:
+def test_a_change_of_altitude_skips_one_angle_step_but_no_radius():
     search = searching("2023", obeys=True)
     search.ticks(3)
     search.node.apply(spiral_at(2.0))
@@ -105,22 +100,12 @@ def test_a_change_of_altitude_skips_one_angle_step_but_no_radius() -> None:
 
 
 @BOTH
-def test_a_change_between_search_modes_is_no_new_activation(name: str) -> None:
-    search = searching(name, obeys=True)
-    search.ticks(5)
-    radius_before = search.spiral(ORIGIN if name == "2023" else START[:2])[-1][0]
-    search.node.apply(spiral_at(2.0))
-    search.ticks(1)
-    assert search.spiral(ORIGIN if name == "2023" else START[:2])[-1][0] > radius_before
-
-
-@BOTH
 @pytest.mark.parametrize(
     ("error_m", "goes_on"),
     [((0.39, 0.39, 0.39), True), ((0.41, 0.0, 0.0), False), ((0.0, -0.41, 0.0), False), ((0.0, 0.0, 0.41), False)],
     ids=["in the box", "x", "y", "z"],
 )
-def test_reached_means_within_0_4_m_in_x_y_and_z(name: str, error_m: tuple[float, ...], goes_on: bool) -> None:
+def test_reached_means_within_0_4_m_in_x_y_and_z(name, error_m, goes_on):
     search = searching(name)
     search.ticks(1)
     x, y, z = search.last
@@ -130,7 +115,7 @@ def test_reached_means_within_0_4_m_in_x_y_and_z(name: str, error_m: tuple[float
 
 
 @BOTH
-def test_a_set_point_not_reached_is_sent_again_at_ticks_12_and_23(name: str) -> None:
+def test_a_set_point_not_reached_is_sent_again_at_ticks_12_and_23(name):
     search = searching(name)
     search.ticks(1)
     search.vehicle.place = (0.0, 0.0, -19.0)
@@ -139,14 +124,14 @@ def test_a_set_point_not_reached_is_sent_again_at_ticks_12_and_23(name: str) -> 
 
 
 @pytest.mark.parametrize(("name", "step_m"), [("2023", 0.5), ("1.5", 0.25)])
-def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name: str, step_m: float) -> None:
+def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name, step_m):
     search = searching(name, rise_m=0.5, obeys=True)
     search.vehicle.rise_m = 5.0  # whatever is commanded, z is not reached
     search.ticks(35)
     assert [z for _, _, z in search.vehicle.commanded] == pytest.approx([-19.0 - step_m * times for times in range(4)])
 
 
-def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short_and_stays() -> None:
+def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short_and_stays():
     search = searching("2023", obeys=True, rise_m=0.5)
     search.ticks(20)
     assert search.vehicle.times_s[:3] == [0.25, 12.25, 13.25]
@@ -154,7 +139,7 @@ def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short_and_stays
 
 
 @pytest.mark.parametrize(("name", "z_m"), [("2023", -19.5), ("1.5", -19.0)])
-def test_offset_after_a_new_activation(name: str, z_m: float) -> None:
+def test_offset_after_a_new_activation(name, z_m):
     search = searching(name, obeys=True, rise_m=0.5 if name == "2023" else 0.45)
     search.ticks(13)
     search.node.apply(INACTIVE)
@@ -164,7 +149,7 @@ def test_offset_after_a_new_activation(name: str, z_m: float) -> None:
     assert search.last[2] == pytest.approx(z_m)
 
 
-def test_an_altitude_change_in_a_stall_locks_the_spiral_up_and_the_offset_goes_on_falling() -> None:
+def test_an_altitude_change_in_a_stall_locks_the_spiral_up_and_the_offset_goes_on_falling():
     search = searching("2023", 3.0, obeys=True, rise_m=0.5)
     search.ticks(5)
     search.node.apply(spiral_at(1.0))
@@ -174,7 +159,7 @@ def test_an_altitude_change_in_a_stall_locks_the_spiral_up_and_the_offset_goes_o
 
 
 @BOTH
-def test_inactive_it_sends_nothing(name: str) -> None:
+def test_inactive_it_sends_nothing(name):
     search = searching(name, obeys=True)
     search.ticks(3)
     search.node.apply(INACTIVE)
@@ -182,7 +167,7 @@ def test_inactive_it_sends_nothing(name: str) -> None:
     assert len(search.vehicle.commanded) == 3
 
 
-def test_revision_2023_goes_on_with_its_spiral_when_activated_again() -> None:
+def test_revision_2023_goes_on_with_its_spiral_when_activated_again():
     search = searching("2023", obeys=True)
     search.ticks(7)
     search.node.apply(INACTIVE)
@@ -192,7 +177,7 @@ def test_revision_2023_goes_on_with_its_spiral_when_activated_again() -> None:
     assert search.spiral(ORIGIN)[-1] == point(8, 8)
 
 
-def test_revision_15_starts_afresh_where_it_is_when_activated_again() -> None:
+def test_revision_15_starts_afresh_where_it_is_when_activated_again():
     search = searching("1.5", obeys=True)
     search.ticks(7)
     search.node.apply(INACTIVE)
@@ -200,87 +185,3 @@ def test_revision_15_starts_afresh_where_it_is_when_activated_again() -> None:
     search.node.apply(spiral_at(1.0))
     search.ticks(1)
     assert search.spiral((-10.0, 1.0))[-1] == point(1, 1)
-
-
-def test_before_any_mode_the_altitude_parameter_is_2_m() -> None:
-    assert Search("1.5", PlacedVehicle()).node.altitude_m == 2.0
-
-
-# Queueing way-points is the same as checking at each tick
-
-
-class PlainSpiral:
-    """The rules of revision 2023's node, one tick after the other."""
-
-    def __init__(self, env: simpy.Environment, vehicle: Vehicle) -> None:
-        self.env, self.vehicle = env, vehicle
-        self.active, self.altitude_m, self.last_altitude_m = False, 2.0, None
-        self.count, self.radius_m, self.waited, self.lowered_m = 0, 0.0, 0, 0.0
-        self.place = None
-        env.process(self.tick_each_second())
-
-    def set_mode(self, altitude_m: float | None) -> None:
-        self.active = altitude_m is not None
-        self.altitude_m = altitude_m or self.altitude_m
-
-    def tick_each_second(self):
-        yield self.env.timeout(PHASE_S)
-        while True:
-            if self.active:
-                self.tick()
-            yield self.env.timeout(1.0)
-
-    def tick(self) -> None:
-        self.count += self.altitude_m != self.last_altitude_m
-        self.last_altitude_m = self.altitude_m
-        near = [True] * 3
-        if self.place is not None:
-            near = [abs(a - b) <= 0.4 for a, b in zip(self.vehicle.position(self.env.now), self.place, strict=True)]
-        if all(near):
-            self.waited = 0
-            self.radius_m += TURN_WIDTH_PER_M * self.altitude_m * 0.1 / (2.0 * math.pi) if self.count else 0.0
-            angle = 0.1 * self.count
-            x_m, y_m = ORIGIN[0] + self.radius_m * math.cos(angle), ORIGIN[1] + self.radius_m * math.sin(angle)
-            self.place = (x_m, y_m, -20.0 + self.altitude_m)
-            self.count += 1
-        elif self.waited <= 10:
-            self.waited += 1
-            return
-        else:
-            self.waited = 1  # set to 0 by sending, counted up in the same tick
-            self.lowered_m += 0.5 if near[0] and near[1] else 0.0
-        self.vehicle.command(self.env.now, *self.place[:2], -20.0 + self.altitude_m - self.lowered_m)
-
-
-def real_search(happenings: list, *, plainly: bool) -> list:
-    """Way of a vehicle whose search mode, thrusters and set-point change meanwhile; by the node or tick by tick."""
-    env = simpy.Environment()
-    vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0, altitude_error_m=0.45)
-    plain = PlainSpiral(env, vehicle) if plainly else None
-    node = GenerateSearchPath(env, sender(env, vehicle), revision("2023").spiral, ORIGIN, VIEW_TANGENT, PHASE_S)
-
-    def happen(t_s: float, what: int):
-        yield env.timeout(t_s + 0.013)  # never at the very time of a tick
-        if what < 4:
-            altitude_m = [None, 1.0, 2.0, 3.0][what]
-            if plain is None:
-                node.apply(INACTIVE if altitude_m is None else spiral_at(altitude_m))
-            else:
-                plain.set_mode(altitude_m)
-        elif what < 7:
-            vehicle.set_thruster(env.now, what - 3, "frozen")
-        else:
-            vehicle.command(env.now, -15.0, 3.0, -18.0)
-
-    for t_s, what in [(-0.013, 3), *happenings]:
-        env.process(happen(t_s, what))
-    env.run(until=75.0)
-    vehicle.look_ahead(row_at(75.0))
-    return vehicle.track[: row_at(75.0), :3].tolist()
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.tuples(st.integers(1, 70), st.integers(0, 7)), max_size=6, unique_by=lambda each: each[0]))
-def test_queueing_waypoints_is_the_same_as_checking_at_each_tick(happenings: list) -> None:
-    ahead, plainly = real_search(happenings, plainly=False), real_search(happenings, plainly=True)
-    assert [pytest.approx(place, abs=1e-9) for place in plainly] == ahead

@@ -16,7 +16,7 @@ def searching(name: str = "bt", revision: str = "1.5", **options: bool) -> AtWor
 
 
 @BOTH_TREES
-def test_the_tree_ticks_every_tenth_of_a_second(name: str) -> None:
+def test_the_tree_ticks_every_tenth_of_a_second(name):
     manager = AtWork(name).manager
     assert manager.period_s == 0.1 and 0.0 <= manager.starts_s < 0.1
 
@@ -35,46 +35,36 @@ def test_the_tree_ticks_every_tenth_of_a_second(name: str) -> None:
         (0.5, "fd_spiral_low"),
     ],
 )
-def test_search_is_as_high_as_the_visibility_allows(name: str, revision: str, visibility_m: float, mode: str) -> None:
+def test_search_is_as_high_as_the_visibility_allows(name, revision, visibility_m, mode):
     at_work = searching(name, revision)
     at_work.measured("water_visibility", visibility_m)
     assert (SEARCH, mode) in at_work.adapt()
 
 
 @BOTH_TREES
-def test_a_visibility_not_yet_measured_counts_as_good(name: str) -> None:
+def test_a_visibility_not_yet_measured_counts_as_good(name):
     assert (SEARCH, "fd_spiral_high") in searching(name).adapt()
 
 
 @BOTH_REVISIONS
 @BOTH_TREES
-def test_a_failed_thruster_is_recovered(name: str, revision: str) -> None:
+@pytest.mark.parametrize(
+    ("reports", "mode"),
+    [
+        ([], "fd_all_thrusters"),
+        ([(1, "FALSE")], "fd_recover_thrusters"),
+        ([(1, "FALSE"), (4, "FALSE"), (1, "RECOVERED")], "fd_recover_thrusters"),
+        ([(4, "FALSE"), (4, "RECOVERED")], "fd_all_thrusters"),
+    ],
+)
+def test_thrusters_are_recovered_while_one_is_lost(name, revision, reports, mode):
     at_work = searching(name, revision)
-    at_work.reported(1, "FALSE")
-    assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
+    for report in reports:
+        at_work.reported(*report)
+    assert (MOTION, mode) in at_work.adapt()
 
 
-@BOTH_REVISIONS
-def test_without_failure_all_thrusters_are_used(revision: str) -> None:
-    assert (MOTION, "fd_all_thrusters") in searching("bt", revision).adapt()
-
-
-def test_recovery_goes_on_while_one_thruster_is_still_lost() -> None:
-    at_work = searching()
-    at_work.reported(1, "FALSE")
-    at_work.reported(4, "FALSE")
-    at_work.reported(1, "RECOVERED")
-    assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
-
-
-def test_recovered_thrusters_are_all_used_again() -> None:
-    at_work = searching()
-    at_work.reported(4, "FALSE")
-    at_work.reported(4, "RECOVERED")
-    assert (MOTION, "fd_all_thrusters") in at_work.adapt()
-
-
-def test_a_failure_from_before_the_task_is_not_forgotten() -> None:
+def test_a_failure_from_before_the_task_is_not_forgotten():
     at_work = AtWork("bt")
     at_work.reported(1, "FALSE")
     at_work.request("search_pipeline")
@@ -83,7 +73,7 @@ def test_a_failure_from_before_the_task_is_not_forgotten() -> None:
 
 @BOTH_REVISIONS
 @BOTH_TREES
-def test_after_the_search_it_follows(name: str, revision: str) -> None:
+def test_after_the_search_it_follows(name, revision):
     at_work = searching(name, revision)
     at_work.cancel("search_pipeline")
     at_work.request("inspect_pipeline")
@@ -91,11 +81,11 @@ def test_after_the_search_it_follows(name: str, revision: str) -> None:
     assert asked[FOLLOW] == "fd_follow_pipeline" and SEARCH not in asked
 
 
-def test_before_any_task_revision_15_asks_for_nothing() -> None:
+def test_before_any_task_revision_15_asks_for_nothing():
     assert AtWork("bt", "1.5").adapt() == []
 
 
-def test_in_2023_maintain_motion_is_kept_between_tasks() -> None:
+def test_in_2023_maintain_motion_is_kept_between_tasks():
     at_work = searching("bt", "2023")
     at_work.cancel("search_pipeline")
     assert at_work.adapt() == [(MOTION, "fd_all_thrusters")]
@@ -111,24 +101,26 @@ def with_battery(level: float | None = None) -> AtWork:
     return at_work
 
 
-@pytest.mark.parametrize("level", [None, 1.0, 0.25])
-def test_with_enough_battery_it_searches(level: float | None) -> None:
+@pytest.mark.parametrize(
+    ("level", "search", "recharge"),
+    [
+        (None, "fd_spiral_high", None),
+        (0.25, "fd_spiral_high", None),
+        (0.2475, "fd_unground", "normal"),
+    ],
+)
+def test_with_a_low_battery_it_goes_to_recharge(level, search, recharge):
     asked = dict(with_battery(level).adapt())
-    assert asked[SEARCH] == "fd_spiral_high" and RECHARGE not in asked
+    assert (asked[SEARCH], asked.get(RECHARGE)) == (search, recharge)
 
 
-def test_with_a_low_battery_it_goes_to_recharge() -> None:
-    asked = dict(with_battery(0.2475).adapt())
-    assert (asked[SEARCH], asked[RECHARGE]) == ("fd_unground", "normal")
-
-
-def test_recharging_still_recovers_thrusters() -> None:
+def test_recharging_still_recovers_thrusters():
     at_work = with_battery(0.2)
     at_work.reported(2, "FALSE")
     assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
 
 
-def test_recharged_it_goes_on_and_the_way_to_the_station_stays_active() -> None:
+def test_recharged_it_goes_on_and_the_way_to_the_station_stays_active():
     at_work = with_battery(0.2)
     at_work.adapt()
     at_work.measured("battery_level", 1.0)
@@ -136,7 +128,7 @@ def test_recharged_it_goes_on_and_the_way_to_the_station_stays_active() -> None:
     assert asked[SEARCH] == "fd_spiral_high" and RECHARGE not in asked
 
 
-def test_following_is_interrupted_by_a_low_battery_too() -> None:
+def test_following_is_interrupted_by_a_low_battery_too():
     at_work = with_battery()
     at_work.cancel("search_pipeline")
     at_work.request("inspect_pipeline")
@@ -144,13 +136,9 @@ def test_following_is_interrupted_by_a_low_battery_too() -> None:
     assert (FOLLOW, "fd_unground") in at_work.adapt()
 
 
-def test_without_a_battery_there_is_no_recharging() -> None:
-    at_work = searching("bt_extended")
+@pytest.mark.parametrize(("name", "has_battery"), [("bt_extended", False), ("bt", True)])
+def test_without_a_battery_or_as_the_plain_tree_it_never_recharges(name, has_battery):
+    at_work = searching(name, battery=has_battery)
     at_work.measured("battery_level", 0.1)
-    assert RECHARGE not in dict(at_work.adapt())
-
-
-def test_the_plain_tree_knows_no_battery() -> None:
-    at_work = searching("bt", battery=True)
-    at_work.measured("battery_level", 0.1)
-    assert dict(at_work.adapt())[SEARCH] == "fd_spiral_high"
+    asked = dict(at_work.adapt())
+    assert asked[SEARCH] == "fd_spiral_high" and RECHARGE not in asked

@@ -1,5 +1,6 @@
 """Behaviour trees: their parts, how they are drawn, their ticks in the timeline, and trees of py_trees."""
 
+import csv
 from itertools import pairwise
 
 import pytest
@@ -10,6 +11,7 @@ from suave_des.managing.bt import Behaviour
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
+from tests.helpers.command import command_here
 
 py_trees = pytest.importorskip("py_trees")
 
@@ -67,13 +69,13 @@ def ticked(*outcomes: bool) -> tuple[list[str], list[Behaviour]]:
         ("=>", (True, True), "01", True),
     ],
 )
-def test_parts_tick_their_children_as_far_as_they_must(kind, outcomes, visited: str, succeeds: bool) -> None:
+def test_parts_tick_their_children_as_far_as_they_must(kind, outcomes, visited, succeeds):
     seen, conditions = ticked(*outcomes)
     assert Behaviour(kind, "part", tuple(conditions)).tick() is succeeds
     assert "".join(seen) == visited
 
 
-def test_a_drawing_has_a_line_for_each_part() -> None:
+def test_a_drawing_has_a_line_for_each_part():
     clear, mode = Behaviour("", "clear", act=lambda: True), Behaviour("!", "f = fd_a", act=lambda: True)
     tree = Behaviour("?", "root", (Behaviour("->", "first", (clear, mode)), Behaviour("", "else")))
     expected = ["? root", "├─ -> first", "│  ├─ clear", "│  └─ ! f = fd_a", "└─ else"]
@@ -83,18 +85,18 @@ def test_a_drawing_has_a_line_for_each_part() -> None:
 
 
 @pytest.mark.parametrize(("manager", "scenario"), [("bt", "release15"), ("bt_extended", "extended")])
-def test_the_command_draws_the_tree_of_a_manager(manager: str, scenario: str) -> None:
+def test_the_command_draws_the_tree_of_a_manager(manager, scenario):
     shown = CliRunner().invoke(app, ["tree", manager, scenario]).output
     assert "visibility is at least 3.25 m, or unknown" in shown
     assert ("battery is below 0.25" in shown) is (manager == "bt_extended")
 
 
-def test_a_manager_without_tree_is_refused() -> None:
+def test_a_manager_without_tree_is_refused():
     result = CliRunner().invoke(app, ["tree", "metacontrol"])
     assert "has no tree" in str(result.exception)
 
 
-def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing() -> None:
+def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing():
     plain, noted = flown("bt"), flown("bt", managers__bt__records_ticks=True)
     ticks = [event for event in noted.events if event.event == "tick"]
     assert [event for event in noted.events if event.event != "tick"] == list(plain.events)
@@ -102,7 +104,7 @@ def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing() 
     assert all(earlier.detail != later.detail for earlier, later in pairwise(ticks))
 
 
-def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours() -> None:
+def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours():
     mine, ours = flown(f"{__name__}:Mine"), flown("bt")
     modes = [
         [event.detail for event in result.events if event.event == "mode_set" and "motion" not in event.detail]
@@ -112,12 +114,68 @@ def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours() -> None:
     assert any(event.event == "tick" and "fd_spiral_high success" in event.detail for event in mine.events)
 
 
-def test_a_tree_of_ones_own_is_drawn(capsys) -> None:
+def test_a_tree_of_ones_own_is_drawn(capsys):
     shown = CliRunner().invoke(app, ["tree", f"{__name__}:Mine"]).output
     assert "visibility 3.25 m" in shown
     assert "f_follow_pipeline = fd_follow_pipeline" in shown
 
 
-def test_a_manager_that_makes_no_tree_is_told_what_to_do() -> None:
+def test_a_manager_that_makes_no_tree_is_told_what_to_do():
     with pytest.raises(Exception, match="return the root of your tree from make_tree"):
         flown(f"{__name__}:Unfinished")
+
+
+pytest.importorskip("py_trees")
+
+TREES = """
+import py_trees
+from py_trees.common import Status
+from suave_des.interfaces.trees import PyTreesManager
+
+class TicksForever(py_trees.behaviour.Behaviour):
+    def tick(self):
+        while True:
+            self.status = Status.RUNNING
+            yield self
+
+    def update(self):
+        return self.status
+
+class NeverReturns(py_trees.behaviour.Behaviour):
+    def update(self):
+        while True:
+            pass
+
+class Forever(PyTreesManager):
+    def make_tree(self):
+        return TicksForever("looks around")
+
+class Stuck(PyTreesManager):
+    def make_tree(self):
+        return NeverReturns("looks around")
+
+class ItsOwnAncestor(PyTreesManager):
+    def make_tree(self):
+        root = py_trees.composites.Sequence("root", memory=False)
+        root.add_child(self.condition("always", lambda: True))
+        root.children.append(root)
+        return root
+"""
+
+
+def test_a_tick_that_does_not_end_ends_its_mission_only(tmp_path):
+    (tmp_path / "trees.py").write_text(TREES)
+    names = "none,trees:Forever,trees:Stuck,trees:ItsOwnAncestor"
+    options = ("--runs", "1", "--workers", "1", "--time-out", "2", "--quiet", "--out", "out")
+    ended = command_here("campaign", "seams2023", "--managers", names, *options, cwd=tmp_path)
+    assert ended.returncode == 3
+    said = " ".join(ended.stderr.split())
+    for words in (
+        "a tick of the tree does not end: 100,000 behaviours so far, the last one 'looks around'",
+        "not done after 2 s (time-out), in update (trees.py, line ",
+        "RecursionError",
+        "3 of 4 missions failed; the others are kept",
+    ):
+        assert words in said
+    with (tmp_path / "out" / "runs.csv").open(newline="") as file:
+        assert [row["manager"] for row in csv.DictReader(file)] == ["none"]

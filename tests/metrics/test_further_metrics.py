@@ -20,8 +20,7 @@ from suave_des.scenario.revision import ThrusterFailureRevision
 from suave_des.simulation.simulator import Simulator
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at
-from tests.helpers.stand_ins import silent
-from tests.helpers.vehicles import BLUEROV2
+from tests.helpers.stand_ins import BLUEROV2, silent
 
 TANGENT = math.tan(math.radians(30.0))
 
@@ -57,21 +56,21 @@ class Watched:
         ([(0.0, "a", "b"), (2.0, "b", "a"), (4.0, "a", "b"), (6.0, "b", "a")], 2),
     ],
 )
-def test_a_change_taken_back_in_time_is_undone(changes: list[tuple[float, str, str]], undone: int) -> None:
+def test_a_change_taken_back_in_time_is_undone(changes, undone):
     watched = Watched()
     for t_s, before, after in changes:
         watched.at(t_s + 1.0).adapted("f", before, after)
     assert watched.noted.value("adaptations_undone") == undone
 
 
-def test_changes_of_different_functions_do_not_undo_each_other() -> None:
+def test_changes_of_different_functions_do_not_undo_each_other():
     watched = Watched()
     watched.at(1.0).adapted("f", "a", "b")
     watched.at(2.0).adapted("g", "b", "a")
     assert watched.noted.value("adaptations_undone") == 0
 
 
-def test_configurations_are_counted_once_each_and_not_when_passed_through() -> None:
+def test_configurations_are_counted_once_each_and_not_when_passed_through():
     watched = Watched()
     for t_s, function, mode in [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (3.0, "g", "y"), (5.0, "f", "a")]:
         watched.at(t_s).mode_effect(function, Mode(mode, True, {}))
@@ -79,7 +78,7 @@ def test_configurations_are_counted_once_each_and_not_when_passed_through() -> N
     assert watched.at(7.0).value("configurations") == len([{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}])
 
 
-def test_operational_thrusters_are_a_mean_over_time() -> None:
+def test_operational_thrusters_are_a_mean_over_time():
     watched = Watched()
     watched.thruster(10.0, "failure")
     watched.thruster(30.0, "recovery")
@@ -91,44 +90,34 @@ def track_of(*places: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarra
     return rows, np.full(len(rows), 3.0)
 
 
-def test_a_camera_at_rest_has_seen_one_square() -> None:
+def test_a_camera_at_rest_has_seen_one_square():
     track, visibility_m = track_of((0.0, 0.0, -18.0))
     side_m = 2 * 2.0 * TANGENT
     assert covered_area_m2(track, 3, visibility_m, -20.0, TANGENT) == pytest.approx(side_m**2, rel=0.1)
 
 
-def test_what_is_seen_twice_counts_once() -> None:
+def test_what_is_seen_twice_counts_once():
     track, visibility_m = track_of((0.0, 0.0, -18.0), (1.0, 0.0, -18.0), (0.0, 0.0, -18.0))
     side_m = 2 * 2.0 * TANGENT
     assert covered_area_m2(track, 11, visibility_m, -20.0, TANGENT) == pytest.approx(side_m * (side_m + 1), rel=0.1)
 
 
 @pytest.mark.parametrize("visibility_m", [1.9, math.nan])
-def test_in_murky_water_nothing_is_seen(visibility_m: float) -> None:
+def test_in_murky_water_nothing_is_seen(visibility_m):
     track, _ = track_of((0.0, 0.0, -18.0))
     assert covered_area_m2(track, 3, np.full(4, visibility_m), -20.0, TANGENT) == 0.0
 
 
-def test_visibility_counts_as_it_was_measured_last() -> None:
+def test_visibility_counts_as_it_was_measured_last_and_before_the_first_measurement_there_is_none():
     rows = measured_at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
-    picked = [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)]
-    assert picked == [3.0, 3.0, 2.0, 1.0]
-
-
-def test_before_the_first_measurement_there_is_none() -> None:
-    assert np.isnan(measured_at_rows((0.2,), (3.0,), 10)[:4]).all()
-
-
-def test_where_nothing_is_measured_there_is_none() -> None:
-    assert np.isnan(measured_at_rows((), (), 10)).all()
-
-
-def test_measurements_after_the_end_are_left_out() -> None:
-    assert measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20
+    assert [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)] == [3.0, 3.0, 2.0, 1.0]
+    assert np.isnan(rows[:4]).all() and np.isnan(measured_at_rows((), (), 10)).all()
+    after_the_end = measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40)
+    assert after_the_end.tolist() == [3.0] * 20 + [2.0] * 20
 
 
 @given(st.sampled_from(["at_least", "at_most", "close_to"]), st.floats(-9, 9), st.floats(0, 9), st.floats(-99, 99))
-def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(relation, value, tolerance, measured) -> None:
+def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(relation, value, tolerance, measured):
     requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=tolerance)
     assert 0.0 <= requirement.satisfaction(measured) <= 1.0
     assert requirement.satisfaction(value) == 1.0
@@ -138,7 +127,7 @@ def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(relati
     ("relation", "measured", "degree"),
     [("at_most", 130.0, 0.75), ("at_most", 160.0, 0.0), ("at_least", 90.0, 0.75), ("close_to", 140.0, 0.5)],
 )
-def test_satisfaction_falls_in_a_line_over_the_tolerance(relation: str, measured: float, degree: float) -> None:
+def test_satisfaction_falls_in_a_line_over_the_tolerance(relation, measured, degree):
     value = {"at_most": 120.0, "at_least": 100.0, "close_to": 120.0}[relation]
     requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=40.0)
     assert requirement.satisfaction(measured) == pytest.approx(degree)
@@ -153,7 +142,7 @@ def mission(tmp_path):
     return fly
 
 
-def test_a_requirement_on_a_measured_value_is_a_mean_over_time(mission) -> None:
+def test_a_requirement_on_a_measured_value_is_a_mean_over_time(mission):
     text = (
         "base: release15.yaml\n"
         "signals: {water_visibility: {kind: step, before: 3.0, after: 1.0, time_s: 100}}\n"
@@ -162,21 +151,21 @@ def test_a_requirement_on_a_measured_value_is_a_mean_over_time(mission) -> None:
     assert mission(text).further["requirement_see"] == pytest.approx((100 * 1.0 + 200 * 0.5) / 300, abs=0.01)
 
 
-def test_time_before_the_first_measurement_does_not_count(mission) -> None:
+def test_time_before_the_first_measurement_does_not_count(mission):
     signal = "{kind: constant, value: 3.0, publishing_period_s: 50}"
     required = "{attribute: water_visibility, relation: at_least, value: 2.0}"
     text = f"base: release15.yaml\nsignals: {{water_visibility: {signal}}}\nrequirements: {{see: {required}}}\n"
     assert mission(text).further["requirement_see"] == pytest.approx(1.0)
 
 
-def test_reasoning_takes_the_scenarios_time_in_each_cycle_that_adapts(mission) -> None:
+def test_reasoning_takes_the_scenarios_time_in_each_cycle_that_adapts(mission):
     text = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
     assert mission(text, "metacontrol").further["reasoning_time_s"] % 0.5 == 0.0
     assert mission(text, "metacontrol").further["reasoning_time_s"] > 0.0
     assert mission(text, "none").further["reasoning_time_s"] == 0.0
 
 
-def test_all_of_them_leave_the_mission_as_it_is(mission) -> None:
+def test_all_of_them_leave_the_mission_as_it_is(mission):
     metrics = ", ".join(name for name in FURTHER_METRICS if name != "surfacing_time_s")
     plain = mission("base: extended.yaml\nname: mine\nmetrics: []\n", "metacontrol")
     observed = mission(f"base: extended.yaml\nname: mine\nmetrics: [{metrics}]\n", "metacontrol")
@@ -202,7 +191,7 @@ def test_all_of_them_leave_the_mission_as_it_is(mission) -> None:
         ),
     ],
 )
-def test_what_cannot_be_evaluated_is_refused(mission, line: str, problem: str) -> None:
+def test_what_cannot_be_evaluated_is_refused(mission, line, problem):
     with pytest.raises(InputError) as caught:
         mission(f"base: seams2023.yaml\n{line}\n")
     assert problem in caught.value.problem

@@ -165,14 +165,6 @@ def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):
         assert place(found, 0) != place(found, 1)
 
 
-def test_two_managers_reasoning_is_in_sight_on_a_projector(both, browser):
-    with opened(browser, both, (1280, 800), hash_="#t=60") as found:
-        bottom = "document.querySelector('.phase.plan').getBoundingClientRect().bottom"
-        assert found.value(f"{bottom} < document.querySelector('.deck').getBoundingClientRect().top + 1")
-        found.page.keyboard.press("b")
-        assert found.value("getComputedStyle(document.body).zoom") == "1.4"
-
-
 def test_it_says_when_no_design_is_left(tmp_path, browser):
     rules, file = tmp_path / "stay.swrl", tmp_path / "replay.html"
     rules.write_text("stay: typeFD(?fg, fd_spiral_medium) -> fd_realisability(fd_spiral_low, false)")

@@ -1,7 +1,5 @@
 """Real missions assisted by simulated ones: the estimator, what it is given, and how often its intervals hold."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -63,7 +61,7 @@ def compared(**changed: pandas.DataFrame) -> AssistedComparison:
 # The estimator
 
 
-def test_the_mean_is_that_of_ppi_python() -> None:
+def test_the_mean_is_that_of_ppi_python():
     real = np.array([52.0, 118, 83, 61, 97, 130, 75, 88, 143, 69, 110, 92])
     same = np.array([55.0, 121, 80, 57, 101, 127, 79, 93, 136, 66, 113, 99])
     many = np.array([50.0, 64, 71, 83, 88, 95, 104, 110, 116, 125, 133, 140, 59, 77, 92, 101, 120, 86, 98, 107])
@@ -75,7 +73,7 @@ def test_the_mean_is_that_of_ppi_python() -> None:
     assert assisted_mean(real, same + noise, many)[0].value == pytest.approx(93.51167902, abs=1e-8)
 
 
-def test_with_few_conditions_the_simulation_counts_fully_or_not_at_all() -> None:
+def test_with_few_conditions_the_simulation_counts_fully_or_not_at_all():
     real, many = np.array([52.0, 118, 83]), np.linspace(50.0, 140.0, 200)
     found, weight = assisted_mean(real, real + 4.0 + np.array([1.0, -1.0, 0.0]), many)
     assert weight == 1.0
@@ -85,7 +83,7 @@ def test_with_few_conditions_the_simulation_counts_fully_or_not_at_all() -> None
     assert off.value == pytest.approx(real.mean())
 
 
-def test_deviations_that_happen_to_be_equal_are_not_taken_for_certain() -> None:
+def test_deviations_that_happen_to_be_equal_are_not_taken_for_certain():
     real, many = np.array([52.0, 118, 83]), np.linspace(50.0, 140.0, 10_000)
     narrow, _ = assisted_mean(real, real + 4.0, many)
     wide, _ = assisted_mean(real, real + 4.0, many, (9.0, 3.0, 3.0), 2.0)
@@ -96,7 +94,7 @@ def test_deviations_that_happen_to_be_equal_are_not_taken_for_certain() -> None:
 
 @pytest.mark.parametrize("shift_s", [0.0, 40.0])
 @pytest.mark.parametrize("n", [3, 6, 30])
-def test_intervals_hold_the_truth_also_of_a_biased_simulation(n: int, shift_s: float) -> None:
+def test_intervals_hold_the_truth_also_of_a_biased_simulation(n, shift_s):
     chance, covered = np.random.default_rng(n), 0
     for _ in range(200):
         at = chance.choice([50.0, 120.0, 130.0], n)
@@ -110,7 +108,7 @@ def test_intervals_hold_the_truth_also_of_a_biased_simulation(n: int, shift_s: f
 # Comparisons
 
 
-def test_a_comparison_corrects_what_the_conditions_do() -> None:
+def test_a_comparison_corrects_what_the_conditions_do():
     found = compared()
     by_name = found.estimates.set_index(["metric", "group", "other"])
     row = by_name.loc[("search_time_s", "a", "")]
@@ -124,7 +122,7 @@ def test_a_comparison_corrects_what_the_conditions_do() -> None:
     assert [note.split(" are ")[0] for note in found.notes] == ["the fewest runs of one of them"]
 
 
-def test_all_forms_say_the_same() -> None:
+def test_all_forms_say_the_same():
     found = compared()
     value = f"{found.estimates['assisted'][0]:.2f}"
     assert all(value in text for text in (str(found), found.markdown(), found.latex()))
@@ -133,7 +131,7 @@ def test_all_forms_say_the_same() -> None:
     assert max(map(len, str(found).splitlines())) <= 95
 
 
-def test_conditions_are_found_by_number_and_by_order() -> None:
+def test_conditions_are_found_by_number_and_by_order():
     real = real_missions(2, 25.0)
     numbered = real.assign(condition=np.repeat([1, 2, 3, 4, 5, 6] * 2, 2)).drop(columns="start.y_m")
     expected = compared().estimates
@@ -141,7 +139,7 @@ def test_conditions_are_found_by_number_and_by_order() -> None:
         pandas.testing.assert_frame_equal(compared(real=other).estimates, expected)
 
 
-def test_missions_that_never_found_the_pipeline_count_with_the_limit() -> None:
+def test_missions_that_never_found_the_pipeline_count_with_the_limit():
     real, same = real_missions(2), missions(2, POINTS, 5)
     for frame, end_s in ((real, 301.0), (same, 300.0)):
         frame.loc[0, ["search_time_s", "pipeline_found"]] = [end_s, False]
@@ -168,13 +166,13 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit() -> None:
         ({"real": real_missions(1).assign(condition=7).drop(columns="start.y_m")}, "there is no condition 7"),
     ],
 )
-def test_what_does_not_belong_together(changed: dict[str, pandas.DataFrame], text: str) -> None:
+def test_what_does_not_belong_together(changed, text):
     with pytest.raises(InputError) as raised:
         compared(**changed)
     assert text in str(raised.value) and raised.value.remedy
 
 
-def test_other_starts_are_other_conditions() -> None:
+def test_other_starts_are_other_conditions():
     real, same = real_missions(2), missions(2, POINTS, 5)
     same["initial_y_m"] = same["start.y_m"] + 0.4
     in_order = real.assign(initial_y_m=real["start.y_m"]).drop(columns="start.y_m")
@@ -184,7 +182,7 @@ def test_other_starts_are_other_conditions() -> None:
         compared(real=turned, same=same)
 
 
-def test_runs_that_share_a_draw_are_one_draw() -> None:
+def test_runs_that_share_a_draw_are_one_draw():
     frame = population(draws=50)
     four = pandas.concat([frame.assign(run=4 * (frame["run"] - 1) + each) for each in (1, 2, 3, 4)])
     four.attrs["runs_sharing_draw"] = 4
@@ -195,7 +193,7 @@ def test_runs_that_share_a_draw_are_one_draw() -> None:
 # Plans
 
 
-def test_a_plan_needs_fewer_missions_with_the_simulation() -> None:
+def test_a_plan_needs_fewer_missions_with_the_simulation():
     seen = deviations(compared().conditions)
     row = seen[(seen["manager"] == "a") & (seen["metric"] == "search_time_s")].iloc[0]
     assert row["deviation_mean"] == pytest.approx(25.0, abs=2.0)
@@ -207,7 +205,7 @@ def test_a_plan_needs_fewer_missions_with_the_simulation() -> None:
     assert unreachable.plan["runs"].isna().all() and "not reached" in str(unreachable)
 
 
-def test_plans_rest_on_the_deviations_of_2025_and_say_so() -> None:
+def test_plans_rest_on_the_deviations_of_2025_and_say_so():
     frame = population().replace({"manager": {"a": "metacontrol", "b": "mine"}})
     found = planned(frame, ["search_time_s:5"])
     assert found.plan["manager"].eq("metacontrol").all()
@@ -231,7 +229,7 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_command(campaigns: Path) -> None:
+def test_the_command(campaigns):
     assisted = ["compare", str(REAL), "--managers", "none,bt", "--assisted-by", "same"]
     both = [*assisted, "--population", "population"]
     shown = command_here(*both, "--plan", "search_time_s:8", cwd=campaigns)
@@ -245,7 +243,7 @@ def test_the_command(campaigns: Path) -> None:
     assert plan.returncode == 0 and "those of 2025" in plan.stdout
 
 
-def test_the_report_has_the_assisted_means(campaigns: Path) -> None:
+def test_the_report_has_the_assisted_means(campaigns):
     rows = pandas.read_csv(REAL)
     rows[rows["manager"].isin(["none", "bt"])].to_csv(campaigns / "real.csv", index=False)
     both = "--assisted-by", "same", "--population", "population"

@@ -1,7 +1,5 @@
 """Managers are compared from result files: estimates, paired and unpaired differences, and what follows."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -64,7 +62,7 @@ def runs(**values: list[float]) -> pandas.DataFrame:
 
 
 class TestPublishedRuns:
-    def test_the_papers_table_is_printed_to_the_last_digit(self, published: Comparison) -> None:
+    def test_the_papers_table_is_printed_to_the_last_digit(self, published):
         lines = [" ".join(line.split()) for line in published.latex().splitlines()]
         assert [line for line in lines if line.startswith(MANAGERS) and "-" not in line] == [
             r"none & 187.85 & 42.40 & 31.40 & 13.00 \\",
@@ -72,7 +70,7 @@ class TestPublishedRuns:
             r"metacontrol & 106.95 & 39.46 & 51.15 & 12.01 \\",
         ]
 
-    def test_p_values_are_scipys(self, published: Comparison) -> None:
+    def test_p_values_are_scipys(self, published):
         frame = pandas.read_csv(published_runs())
         count = 0
         for first in MANAGERS:
@@ -88,7 +86,7 @@ class TestPublishedRuns:
                     count += 1
         assert count == 6
 
-    def test_shares_have_wilsons_interval_and_fishers_test(self, published: Comparison) -> None:
+    def test_shares_have_wilsons_interval_and_fishers_test(self, published):
         found = summary(published, "random", "pipeline_found")
         assert found.mean == 0.8
         assert interval(found, "mean") == pytest.approx(tuple(stats.binomtest(16, 20).proportion_ci(0.95, "wilson")))
@@ -104,7 +102,7 @@ HEADINGS = {
 
 
 class TestCampaign:
-    def test_runs_with_common_random_numbers_are_paired(self, campaign: Path) -> None:
+    def test_runs_with_common_random_numbers_are_paired(self, campaign):
         comparison = compare_folders([campaign])
         times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
         found = difference(comparison, "bt", "metacontrol")
@@ -118,7 +116,7 @@ class TestCampaign:
         welch = stats.ttest_ind(times["bt"], times["metacontrol"], equal_var=False).confidence_interval()
         assert interval(apart, "difference") == pytest.approx((welch.low, welch.high))
 
-    def test_the_runs_needed_give_that_interval(self, campaign: Path) -> None:
+    def test_the_runs_needed_give_that_interval(self, campaign):
         times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
         comparison = compare_folders([campaign], half_widths=["search_time_s:2"])
         found = difference(comparison, "bt", "metacontrol")
@@ -129,7 +127,7 @@ class TestCampaign:
         ratio = (times["bt"].var() + times["metacontrol"].var()) / apart**2  # what pairs are worth
         assert found.runs_needed_unpaired == pytest.approx(ratio * found.runs_needed_paired, rel=0.05)
 
-    def test_folders_side_by_side_are_told_apart_by_name(self, campaign: Path, tmp_path: Path) -> None:
+    def test_folders_side_by_side_are_told_apart_by_name(self, campaign, tmp_path):
         run_campaign("seams2023", ["bt"], 10, 1, out=tmp_path / "again")
         comparison = compare_folders([campaign, tmp_path / "again"])
         assert {each.group for each in rows(comparison.summaries)} == {"none", "bt (out)", "bt (again)", "metacontrol"}
@@ -138,13 +136,13 @@ class TestCampaign:
         assert "15 of one without a counterpart" in same.why
         assert same.p == 1.0
 
-    def test_different_seeds_are_not_paired(self, campaign: Path, tmp_path: Path) -> None:
+    def test_different_seeds_are_not_paired(self, campaign, tmp_path):
         run_campaign("seams2023", ["bt"], 10, 2, out=tmp_path / "again")
         found = difference(compare_folders([campaign, tmp_path / "again"]), "bt (out)", "bt (again)")
         assert not found.paired
         assert "seeds 1 and 2 differ" in found.why
 
-    def test_the_restricted_mean_is_lifelines(self, campaign: Path) -> None:
+    def test_the_restricted_mean_is_lifelines(self, campaign):
         import lifelines  # takes a while, too
 
         frame = pandas.read_csv(campaign / "runs.csv")
@@ -157,7 +155,7 @@ class TestCampaign:
 
 
 class TestSweep:
-    def test_runs_are_independent_and_points_are_not(self, tmp_path: Path) -> None:
+    def test_runs_are_independent_and_points_are_not(self, tmp_path):
         values = {"visibility.period_s": [60.0, 80.0, 100.0]}
         frame = run_campaign("seams2023", ["none", "metacontrol"], 5, 1, out=tmp_path / "out", sweep=values).frame()
         comparison = compare_folders([tmp_path / "out"])
@@ -167,7 +165,7 @@ class TestSweep:
         assert found.std == pytest.approx(by_run.std())
         assert any("averaged over visibility.period_s" in note for note in comparison.notes)
 
-    def test_points_can_be_compared_with_each_other(self, tmp_path: Path) -> None:
+    def test_points_can_be_compared_with_each_other(self, tmp_path):
         values = {"visibility.period_s": [60.0, 80.0]}
         frame = run_campaign("seams2023", ["none"], 5, 1, out=tmp_path / "out", sweep=values).frame()
         comparison = compare_folders([tmp_path / "out"], by=["visibility.period_s"])
@@ -176,7 +174,7 @@ class TestSweep:
         assert found.paired
         assert found.difference == pytest.approx((times[60.0] - times[80.0]).mean())
 
-    def test_managers_are_compared_within_each_point(self, tmp_path: Path) -> None:
+    def test_managers_are_compared_within_each_point(self, tmp_path):
         values = {"visibility.period_s": [60.0, 80.0]}
         run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
         for against in (None, "none"):
@@ -186,7 +184,7 @@ class TestSweep:
         assert re.match("period_s 60[:;] ", found.conclusion)
         assert "period_s 80: " in found.conclusion and "bt, period_s" not in found.conclusion
 
-    def test_points_of_which_the_same_is_concluded_share_a_sentence(self, tmp_path: Path) -> None:
+    def test_points_of_which_the_same_is_concluded_share_a_sentence(self, tmp_path):
         values = {"thruster_events.0.time_s": [400.0, 500.0]}  # after the time limit
         run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
         found = compare_folders([tmp_path / "out"], by=["thruster_events.0.time_s"])
@@ -196,14 +194,14 @@ class TestSweep:
 class TestHeadlines:
     """What a headline says beside the difference: of how many tests, and what the test does not show."""
 
-    def test_that_most_missions_did_not_find_the_pipeline_comes_first(self) -> None:
+    def test_that_most_missions_did_not_find_the_pipeline_comes_first(self):
         lost = [300.0] * 15 + [120.0] * 5
         found = compare_frame(runs(a=[130.0] * 11 + [300.0] * 9, b=lost))
         assert found.conclusion.startswith("The pipeline was not found by b in 15 of 20 missions; ")
         assert not compare_frame(runs(a=[100.0] * 20, b=[130.0] * 11 + [300.0] * 9)).conclusion.startswith("The pipe")
 
 
-def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(campaign: Path) -> None:
+def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(campaign):
     times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
     comparison = compare_folders([campaign], managers=["bt", "none"])
     apart = times["bt"] - times["none"]
@@ -217,19 +215,19 @@ def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(camp
 
 
 class TestFewValues:
-    def test_one_run_has_a_mean_and_no_interval(self) -> None:
+    def test_one_run_has_a_mean_and_no_interval(self):
         comparison = compare_frame(runs(a=[100.0], b=[120.0]))
         found = summary(comparison, "a")
         assert (found.mean, interval(found, "mean"), found.std) == (100.0, None, None)
         assert not (comparison.differences["p_holm"] < 0.05).any()
 
-    def test_equal_values_do_not_say_how_many_runs_are_needed(self) -> None:
+    def test_equal_values_do_not_say_how_many_runs_are_needed(self):
         found = difference(compare_frame(runs(a=[100.0] * 4, b=[120.0] * 4)), "a", "b", "pipeline_found")
         assert (found.runs_needed_paired, found.runs_needed_unpaired) == (None, None)
         low, high = interval(found, "difference")
         assert -1.0 <= low < 0.0 < high <= 1.0
 
-    def test_missions_that_all_never_found_the_pipeline_have_no_median(self) -> None:
+    def test_missions_that_all_never_found_the_pipeline_have_no_median(self):
         comparison = compare_frame(runs(a=[300.0] * 25, b=[300.0] * 25))
         search = summary(comparison, "a")
         assert (search.restricted_mean_s, search.censored_median_s) == (300.0, None)
@@ -238,7 +236,7 @@ class TestFewValues:
         assert found.conclusion == "a and b have the same search time in all 25 pairs."
         assert comparison.conclusion.startswith("The pipeline was not found by a in 25 of 25 missions, b in 25 of 25 m")
 
-    def test_a_difference_that_is_the_same_in_each_pair_is_claimed(self) -> None:
+    def test_a_difference_that_is_the_same_in_each_pair_is_claimed(self):
         a = np.random.default_rng(1).normal(100.0, 5.0, 20)
         claim = "a finds the pipeline 5.00 s sooner than b (no interval; 20 pairs, Wilcoxon, p < 0.001)."
         assert difference(compare_frame(runs(a=list(a), b=list(a + 5.0))), "a", "b").conclusion == claim
@@ -246,7 +244,7 @@ class TestFewValues:
         assert few.conclusion.startswith("No difference in search time is shown between a and b (")
 
 
-def test_a_significant_difference_of_ranks_against_that_of_means_is_reported() -> None:
+def test_a_significant_difference_of_ranks_against_that_of_means_is_reported():
     chance = np.random.default_rng(1)
     a = chance.normal(100.0, 1.0, 60)
     b = np.where(np.arange(60) < 8, 290.0, a - 5.0)
@@ -259,7 +257,7 @@ def test_a_significant_difference_of_ranks_against_that_of_means_is_reported() -
 class TestConclusions:
     """What a sentence claims is what the figures beside it show."""
 
-    def test_ranks_alone_are_not_said_of_means(self) -> None:
+    def test_ranks_alone_are_not_said_of_means(self):
         a = np.random.default_rng(1).normal(100.0, 5.0, 60)
         b = np.where(np.arange(60) < 6, a + 60.0, a - 5.0)
         comparison = compare_frame(runs(a=list(a), b=list(b)), metrics=["search_time_s"])
@@ -272,7 +270,7 @@ class TestConclusions:
         assert "no difference of the means is shown (a - b: " in found.conclusion
         assert comparison.conclusion == found.conclusion
 
-    def test_the_best_mean_of_all_runs_is_not_called_better_where_its_pairs_are_worse(self) -> None:
+    def test_the_best_mean_of_all_runs_is_not_called_better_where_its_pairs_are_worse(self):
         chance = np.random.default_rng(1)
         hard = chance.normal(200.0, 5.0, 20)  # b has only these runs, and is sooner in each
         frame = runs(a=[*hard, *chance.normal(80.0, 5.0, 80)], b=list(hard - chance.normal(10.0, 1.0, 20)))
@@ -282,14 +280,14 @@ class TestConclusions:
 class TestCaveats:
     """Missions that never found the pipeline, or have no value, are told of."""
 
-    def test_their_search_time_and_their_number_are_reported(self) -> None:
+    def test_their_search_time_and_their_number_are_reported(self):
         notes = compare_frame(runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])).notes
         (note,) = (each for each in notes if "never found" in each)
         assert "(a 1 of 3) is the time at which they ended" in note
         frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])
         assert f"% Note: {note}.\n" in compare_frame(frame).latex()
 
-    def test_missions_that_are_left_out_are_reported(self) -> None:
+    def test_missions_that_are_left_out_are_reported(self):
         frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 110.0])
         frame["mean_reaction_time_s"] = [1.0, float("nan"), 1.2, 0.5, 0.6, 0.7]
         notes = compare_frame(frame).notes
@@ -307,12 +305,12 @@ class TestCaveats:
         (Choices(half_widths=["adaptations:1"]), "'adaptations' is not compared"),
     ],
 )
-def test_a_choice_that_makes_no_sense_is_refused(choices: Choices, words: str) -> None:
+def test_a_choice_that_makes_no_sense_is_refused(choices, words):
     with pytest.raises(InputError, match=words):
         compare_folders([published_runs()], **choices)
 
 
-def test_the_frame_of_a_campaign_is_compared_and_drawn() -> None:
+def test_the_frame_of_a_campaign_is_compared_and_drawn():
     frame = api.run_campaign("seams2023", ["none", "bt"], runs=4, progress=False)
     comparison = frame[frame["run"] > 1].compare(metrics=["distance_inspected_m"])
     assert [(each.group, each.other, each.n) for each in rows(comparison.differences)] == [("none", "bt", 3)]
@@ -320,7 +318,7 @@ def test_the_frame_of_a_campaign_is_compared_and_drawn() -> None:
     assert len(frame.figure().axes) == 2
 
 
-def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_whole() -> None:
+def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_whole():
     long = ["a_module_with_a_long_name:AndAClassWithAnEvenLongerName", "another_module_of_a_thesis:AnotherLongManager"]
     frame = runs(**{"none": [100.0, 120.0, 140.0], long[0]: [90.0, 95.0, 130.0], long[1]: [80.0, 85.0, 120.0]})
     for width in (80, 95):
@@ -330,7 +328,7 @@ def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_who
         assert all(name in joined for name in long)
 
 
-def test_a_manager_that_reacts_at_once_has_a_reaction_time_of_zero(tmp_path: Path) -> None:
+def test_a_manager_that_reacts_at_once_has_a_reaction_time_of_zero(tmp_path):
     frame = run_campaign("seams2023", ["oracle"], 3, 1, out=tmp_path / "out").frame()
     assert (frame["mean_reaction_time_s"] == 0.0).all()
     for comparison in (compare_folders([tmp_path / "out"]), compare_frame(frame)):

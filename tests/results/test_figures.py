@@ -1,9 +1,8 @@
 """Figures are drawn from result files alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
+import numpy as np
 import pandas
 import pytest
 from matplotlib.figure import Figure
@@ -16,6 +15,7 @@ from suave_des.estimates import mean_of
 from suave_des.records.mission_folder import MissionRecord, read_mission
 from suave_des.results import style
 from suave_des.results.campaign_figures import (
+    draw_differences,
     draw_distributions,
     draw_heat_map,
     draw_sweep,
@@ -41,7 +41,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
+def test_the_map_shows_every_mode_and_what_happened(mission):
     figure = draw_map(read_mission(mission))
     legend = figure.axes[0].get_legend()
     assert legend is not None
@@ -59,7 +59,7 @@ def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
     assert any(text.startswith("pipeline detected, ") for text in told)
 
 
-def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign: Path) -> None:
+def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign):
     figure = draw_distributions(grouped(read_missions([campaign]))[0])
     for axes in figure.axes:
         curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
@@ -68,12 +68,12 @@ def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign
 
 
 @pytest.mark.parametrize(("ending", "date"), [(".pdf", b"CreationDate"), (".svg", b"dc:date")])
-def test_no_picture_has_the_time_at_which_it_was_written(ending: str, date: bytes, tmp_path: Path) -> None:
+def test_no_picture_has_the_time_at_which_it_was_written(ending, date, tmp_path):
     write_picture(Figure(), tmp_path / f"empty{ending}")
     assert date not in (tmp_path / f"empty{ending}").read_bytes()
 
 
-def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: Path) -> None:
+def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path):
     values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": ["fd_spiral_low"]}
     values["default_modes.f_generate_search_path"].append("fd_spiral_medium")
     result = run_campaign("seams2023", ["none", "random"], 3, 1, out=tmp_path / "out", sweep=values)
@@ -114,7 +114,7 @@ def sweep_frame(points: int, runs: int) -> pandas.DataFrame:
     return pandas.DataFrame(rows)
 
 
-def test_the_intervals_of_a_sweep_are_those_of_its_runs() -> None:
+def test_the_intervals_of_a_sweep_are_those_of_its_runs():
     figure = draw_sweep(missions_of(sweep_frame(6, 5)), ["start.y_m"])
     (container,) = figure.axes[0].containers
     low, high = container[2][0].get_segments()[0][:, 1]
@@ -122,13 +122,13 @@ def test_the_intervals_of_a_sweep_are_those_of_its_runs() -> None:
     assert (low, high) == pytest.approx(expected)
 
 
-def test_many_values_are_drawn_in_bins_of_equally_many_missions() -> None:
+def test_many_values_are_drawn_in_bins_of_equally_many_missions():
     figure = draw_sweep(missions_of(sweep_frame(24, 2)), ["start.x_m"])
     xs = list(figure.axes[0].containers[0][0].get_xdata())
     assert xs == pytest.approx([1.0 + 3.0 * number for number in range(8)])
 
 
-def test_no_parameter_is_left_out_silently() -> None:
+def test_no_parameter_is_left_out_silently():
     frame = sweep_frame(4, 2)
     frame["key_3"] = frame["start.x_m"] * 3
     figure = draw_sweep(missions_of(frame))
@@ -138,7 +138,7 @@ def test_no_parameter_is_left_out_silently() -> None:
         draw_sweep(missions_of(frame))
 
 
-def test_a_manager_looks_the_same_in_every_figure() -> None:
+def test_a_manager_looks_the_same_in_every_figure():
     assert style.looks(["none", "random", "metacontrol", "bt"]) == [0, 1, 2, 3]
     assert style.looks(["mine", "metacontrol", "yours", "none"]) == [4, 2, 5, 0]
     assert style.looks(["mine", "yours"]) == [4, 5]
@@ -151,7 +151,7 @@ def test_a_manager_looks_the_same_in_every_figure() -> None:
     assert [container[0].get_color() for container in means] == expected
 
 
-def test_a_single_mission_of_a_manager_with_an_awkward_name_is_drawn(tmp_path: Path) -> None:
+def test_a_single_mission_of_a_manager_with_an_awkward_name_is_drawn(tmp_path):
     text = "scenario,manager,run,seed,search_time_s,distance_inspected_m,pipeline_found,detection_x_m,adaptations\n"
     (tmp_path / "runs.csv").write_text(text + "a,_$x^<b>&\\,1,1,300,0,False,,3\n")
     draw_results([tmp_path], tmp_path / "out.svg")
@@ -159,7 +159,7 @@ def test_a_single_mission_of_a_manager_with_an_awkward_name_is_drawn(tmp_path: P
 
 
 class TestTimeline:
-    def test_shows_modes_tasks_failures_and_adaptations(self, mission: Path) -> None:
+    def test_shows_modes_tasks_failures_and_adaptations(self, mission):
         record = read_mission(mission)
         figure = draw_timeline(record)
         rows = [tick.get_text() for tick in figure.axes[1].get_yticklabels()]
@@ -169,7 +169,7 @@ class TestTimeline:
         assert len(listed) == len(adaptations(record)) > 3
         assert listed[0].startswith("A  ")
 
-    def test_a_failure_ends_with_the_recovery(self, tmp_path: Path) -> None:
+    def test_a_failure_ends_with_the_recovery(self, tmp_path):
         run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "out")
         (span,) = failure_spans(read_mission(tmp_path / "out"))["c_thruster_1"]
         assert 35.0 < span.begin_s < 37.0
@@ -185,14 +185,14 @@ class TestBattery:
         run_mission(folder / "battery.yaml", "bt_extended", 1, 1, folder / "out")
         return read_mission(folder / "out")
 
-    def test_the_mode_is_that_of_the_function_that_moves_the_vehicle(self, record: MissionRecord) -> None:
+    def test_the_mode_is_that_of_the_function_that_moves_the_vehicle(self, record):
         spans = mode_spans(record)["f_generate_search_path"]
         way = record.trajectory.set_index("t_s")["mode"]
         for span in spans:
             if span.what.startswith("fd_spiral"):
                 assert set(way[span.begin_s + 0.1 : span.end_s - 0.1]) == {span.what}
 
-    def test_it_is_drawn_and_named_as_a_cause(self, record: MissionRecord) -> None:
+    def test_it_is_drawn_and_named_as_a_cause(self, record):
         assert any("battery" in axes.get_ylabel() for axes in draw_map(record).axes)
         causes = {each.cause for each in adaptations(record)}
         assert "battery recharged" in causes
@@ -203,7 +203,7 @@ LONG = "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerNam
 
 
 @pytest.mark.parametrize("kind", sorted(CAMPAIGN_KINDS))
-def test_a_long_name_is_shown_whole(kind: str, campaign: Path, tmp_path: Path) -> None:
+def test_a_long_name_is_shown_whole(kind, campaign, tmp_path):
     frame = read_missions([campaign]).frame
     frame = frame.assign(manager=frame["manager"].astype(str) + LONG)
     with style.publication():
@@ -215,7 +215,7 @@ def test_a_long_name_is_shown_whole(kind: str, campaign: Path, tmp_path: Path) -
     assert boxes and all(box.x0 >= 0.0 and box.x1 <= width_px for box in boxes)
 
 
-def test_a_campaign_without_the_swept_parameter_is_reported(campaign: Path, tmp_path: Path) -> None:
+def test_a_campaign_without_the_swept_parameter_is_reported(campaign, tmp_path):
     run_campaign("seams2023", managers=["none"], runs=1, sweep={"start.y_m": [2.0, 2.5]}, out=tmp_path / "swept")
     with pytest.raises(InputError, match=r"does not vary start\.y_m"):
         draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png")
@@ -234,7 +234,7 @@ def texts_of(figure: Figure) -> list[str]:
     return [" ".join(each.get_text().split()) for each in figure.findobj(Text)]
 
 
-def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits: pandas.DataFrame) -> None:
+def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits):
     texts = texts_of(draw_frame(two_limits, "distributions"))
     assert "none (n = 4)" in texts
     assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
@@ -243,7 +243,7 @@ def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits
 class TestDifferences:
     """Differences between managers, run by run."""
 
-    def test_show_each_run_the_mean_and_the_runs_at_the_ends(self) -> None:
+    def test_show_each_run_the_mean_and_the_runs_at_the_ends(self):
         frame = sweep_frame(1, 5).drop(columns=["start.x_m", "start.y_m"])
         other = frame.assign(manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0])
         axes = draw_frame(pandas.concat([frame, other]), "differences").axes[0]
@@ -253,13 +253,13 @@ class TestDifferences:
         low, high = axes.containers[0][2][0].get_segments()[0][:, 0]
         assert (low, high) == pytest.approx(mean_of([1.0, 2.0, 3.0, 4.0, 40.0]).interval)
 
-    def test_of_a_sweep_are_of_means_of_runs(self, two_limits: pandas.DataFrame) -> None:
+    def test_of_a_sweep_are_of_means_of_runs(self, two_limits):
         both = pandas.concat([two_limits, two_limits.assign(manager="other")])
         texts = texts_of(draw_frame(both, "differences"))
         assert any(text.endswith("other (n = 2)") for text in texts)
         assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
 
-    def test_need_runs_with_the_same_random_numbers(self) -> None:
+    def test_need_runs_with_the_same_random_numbers(self):
         with pytest.raises(InputError, match="share their random numbers"):
             draw_folder_of_published("differences")
 
@@ -268,7 +268,7 @@ def draw_folder_of_published(kind: str) -> Figure:
     return draw_frame(read_missions([published_runs()]).frame, kind)
 
 
-def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs() -> None:
+def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs():
     frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
     figure = draw_heat_map(missions_of(frame), ["depth", "start.y_m"])
     assert [text.get_text() for text in figure.axes[0].texts] == ["115.00"] * 4
@@ -278,3 +278,32 @@ def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs() -> None
     assert "means of n = 2 runs, each averaged over the parameters of the other panels" in texts_of(
         draw_sweep(missions_of(frame))
     )
+
+
+def _times_s(n: int) -> np.ndarray:
+    """Make search times in clusters, as turns of the spiral make them."""
+    rng = np.random.default_rng(7)
+    return np.abs(rng.choice((60.0, 110.0, 190.0), n) + rng.normal(0.0, 8.0, n))
+
+
+def test_figures_of_many_missions_are_written_from_few_points():
+    n = 30_000
+    frame = pandas.DataFrame(
+        {"manager": "none", "run": np.arange(1, n + 1), "seed": 1, "search_time_s": _times_s(n)}
+    ).assign(distance_inspected_m=20.0, pipeline_found=True, scenario="seams2023")
+    groups, _ = grouped(missions_of(pandas.concat([frame, frame.assign(manager="bt")])))
+    for axes in draw_differences(groups).axes:
+        assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
+
+
+def test_a_legend_of_long_names_stays_within_the_figure():
+    names = [f"a manager with a long name {number}" for number in range(4)]
+    frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
+    groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)))
+    for draw in (draw_differences, draw_distributions):
+        with style.publication():
+            figure = draw(groups)
+            figure.draw_without_rendering()
+        box = figure.legends[0].get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.x1 <= figure.bbox.x1

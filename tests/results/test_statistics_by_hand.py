@@ -1,18 +1,27 @@
-"""Statistics of comparisons against figures from papers, SciPy, and formulas evaluated here."""
-
-from __future__ import annotations
+"""Statistics against figures from papers, SciPy, and formulas evaluated here; and how often intervals hold."""
 
 import math
 
 import numpy as np
 import pandas
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
-from suave_des.estimates import mean_of
+from suave_des.estimates import mean_of, share_of
 from suave_des.results import statistics
 from suave_des.results.compare import compare_frame
 from suave_des.results.comparison import Comparison
+from suave_des.results.statistics import (
+    agreement,
+    anderson_darling,
+    difference_interval,
+    mann_whitney,
+    mean_interval,
+    paired_share_difference,
+    ratio_interval,
+    sign_of,
+)
 from tests.helpers.compared import rows
 
 
@@ -33,14 +42,14 @@ def compared(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> 
     return compare_frame(frame(seeds, **search_times_s), metrics=["search_time_s"])
 
 
-def test_two_shares_differ_as_in_newcombes_example() -> None:
+def test_two_shares_differ_as_in_newcombes_example():
     # R. G. Newcombe, Statistics in Medicine 17 (1998), table II: 56/70 against 48/80 by method 10.
     found = statistics.share_difference((56, 70), (48, 80))
     assert found.value == pytest.approx(0.2)
     assert found.interval == pytest.approx((0.0524, 0.3339), abs=5e-5)
 
 
-def test_paired_shares_differ_by_the_formula_of_bonett_and_price() -> None:
+def test_paired_shares_differ_by_the_formula_of_bonett_and_price():
     # D. G. Bonett, R. M. Price, Journal of Educational and Behavioral Statistics 37 (2012): one is added to each count
     # of pairs that differ.
     n, only_first, only_second = 40, 9, 2
@@ -54,14 +63,14 @@ def test_paired_shares_differ_by_the_formula_of_bonett_and_price() -> None:
 
 
 @pytest.mark.parametrize("n", range(2, 60, 2))
-def test_half_of_the_missions_have_found_it_when_the_middle_one_has(n: int) -> None:
+def test_half_of_the_missions_have_found_it_when_the_middle_one_has(n):
     # The survival function is a product of fractions, which need not be exactly a half there.
     times_s = np.arange(1.0, n + 1.0)
     _, half = statistics.search_times(times_s, np.ones(n, dtype=bool), n + 1.0)
     assert half.value == n / 2
 
 
-def test_the_mean_to_the_limit_has_the_interval_of_a_sample_though_missions_end_at_the_limit() -> None:
+def test_the_mean_to_the_limit_has_the_interval_of_a_sample_though_missions_end_at_the_limit():
     times_s = np.array([100.0, 140.0, 180.0, 300.0, 300.0])
     found, _ = statistics.search_times(times_s, times_s < 300.0, 300.0)
     assert found.value == pytest.approx(times_s.mean())
@@ -70,13 +79,13 @@ def test_the_mean_to_the_limit_has_the_interval_of_a_sample_though_missions_end_
     assert earlier.interval is None
 
 
-def test_the_effect_of_pairs_is_the_rank_biserial_correlation_of_those_that_differ() -> None:
+def test_the_effect_of_pairs_is_the_rank_biserial_correlation_of_those_that_differ():
     # Ranks of the differences 3, -1, 2, 4: 3, 1, 2, 4; those in favour have 9 of 10, so r = (9 - 1) / 10.
     first, second = np.array([13.0, 9.0, 12.0, 14.0, 7.0]), np.array([10.0, 10.0, 10.0, 10.0, 7.0])
     assert statistics.signed_rank_test(first, second).effect.value == pytest.approx(0.8)
 
 
-def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_differences() -> None:
+def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_differences():
     a, b = [100.0, 110.0, 125.0, 130.0], [101.0, 113.0, 124.0, 135.0]
     (found,) = rows(compared(a=a, b=b).differences)
     assert found.variance_ratio == pytest.approx(
@@ -94,13 +103,13 @@ def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_diff
         ([math.nan, math.nan, 104.0, 105.0], 2),
     ],
 )
-def test_two_runs_in_common_are_a_pair_of_samples_and_one_is_not(b: list[float], n: int) -> None:
+def test_two_runs_in_common_are_a_pair_of_samples_and_one_is_not(b, n):
     (found,) = rows(compared(a=[100.0, 110.0, 121.0, 133.0], b=b).differences)
     assert found.paired is (n == 2)
     assert (found.n, found.n_other) == (n, n)
 
 
-def test_search_times_are_compared_up_to_the_shorter_limit() -> None:
+def test_search_times_are_compared_up_to_the_shorter_limit():
     missions = frame(a=[100.0, 300.0], b=[150.0, 200.0])
     missions.loc[(missions["manager"] == "b") & (missions["run"] == 2), "pipeline_found"] = False
     for each in rows(compare_frame(missions, metrics=["search_time_s"]).summaries):
@@ -109,7 +118,7 @@ def test_search_times_are_compared_up_to_the_shorter_limit() -> None:
         assert each.horizon_s == 200.0
 
 
-def test_the_conclusion_names_the_largest_p_of_those_that_it_is_about() -> None:
+def test_the_conclusion_names_the_largest_p_of_those_that_it_is_about():
     a = [100.0 + each for each in range(12)]
     b = [each + 10.0 + 0.1 * place for place, each in enumerate(a)]
     c = [each + (8.0 if place > 1 else -3.0) + 0.1 * place for place, each in enumerate(a)]
@@ -121,7 +130,7 @@ def test_the_conclusion_names_the_largest_p_of_those_that_it_is_about() -> None:
     assert f"{6 / 2**12:.3f}" == "0.001"
 
 
-def test_ranks_of_independent_missions_favour_the_first_where_it_is_greater_in_more_than_half() -> None:
+def test_ranks_of_independent_missions_favour_the_first_where_it_is_greater_in_more_than_half():
     # b is greater in most comparisons, but has a few very small values, so that its mean is less.
     a = [100.0] * 30 + [101.0] * 10
     b = [110.0 + place / 100.0 for place in range(31)] + [10.0] * 9
@@ -132,7 +141,7 @@ def test_ranks_of_independent_missions_favour_the_first_where_it_is_greater_in_m
     assert "but no difference of the means is shown (a - b: 12.63 s" in found.conclusion
 
 
-def test_groups_of_different_sizes_have_the_interval_of_a_mean_over_clusters() -> None:
+def test_groups_of_different_sizes_have_the_interval_of_a_mean_over_clusters():
     # W. G. Cochran, Sampling Techniques, 1977, chapter 9A: the variance of a ratio of cluster totals to sizes.
     groups = [[10.0, 12.0, 11.0], [20.0], [14.0, 17.0], [9.0, 8.0, 10.0, 9.0]]
     values = [each for group in groups for each in group]
@@ -141,3 +150,142 @@ def test_groups_of_different_sizes_have_the_interval_of_a_mean_over_clusters() -
     squares = sum((sum(group) - mean * len(group)) ** 2 for group in groups)
     half = stats.t.ppf(0.975, 3) * math.sqrt(4 / 3 * squares) / len(values)
     assert mean_of(values, labels).interval == pytest.approx((mean - half, mean + half))
+
+
+MEAN_S = 0.9 * (0.6 * 90.0 + 0.4 * 180.0) + 0.1 * 300.0
+
+
+def search_times(chance: np.random.Generator, n: int, delay_s: float = 0.0) -> NDArray[np.float64]:
+    """Draw times with the shape of a campaign's: found early or late, and one in ten lost at the limit."""
+    times_s = np.where(chance.random(n) < 0.6, chance.normal(90.0, 20.0, n), chance.normal(180.0, 25.0, n))
+    return np.where(chance.random(n) < 0.1, 300.0, times_s) + delay_s
+
+
+def coverage_of_means(n: int, repetitions: int) -> float:
+    chance = np.random.default_rng(1)
+    covered = 0
+    for _ in range(repetitions):
+        low, high = mean_interval(search_times(chance, n)).interval or (np.nan, np.nan)
+        covered += bool(low <= MEAN_S <= high)
+    return covered / repetitions
+
+
+def coverage_of_differences(n: int, m: int, repetitions: int) -> float:
+    chance = np.random.default_rng(2)
+    covered = 0
+    for _ in range(repetitions):
+        found = difference_interval(search_times(chance, n, 12.0), search_times(chance, m))
+        low, high = found.interval or (np.nan, np.nan)
+        covered += bool(low <= 12.0 <= high)
+    return covered / repetitions
+
+
+def test_intervals_of_a_mean_and_of_a_difference_cover_the_truth():
+    # Of 80 intervals of exactly 95%, 69 or more cover in all but one of a thousand draws.
+    assert coverage_of_means(40, 80) >= 69 / 80
+    assert coverage_of_differences(40, 60, 80) >= 69 / 80
+
+
+def test_intervals_cover_the_truth_where_most_runs_differ_little_and_a_few_by_far():
+    chance = np.random.default_rng(3)
+    covered = 0
+    for _ in range(200):
+        differences = chance.normal(5.0, 2.0, 60) + np.where(chance.random(60) < 0.05, 80.0, 0.0)
+        differences -= np.where(chance.random(60) < 0.05, 80.0, 0.0)
+        low, high = mean_interval(differences).interval or (np.nan, np.nan)
+        covered += bool(low <= 5.0 <= high)
+    assert covered / 200 >= 0.91  # a bootstrap's covers in 84%
+
+
+@pytest.mark.parametrize(
+    ("both", "only_first", "only_second"), [(0.93, 0.03, 0.01), (0.7, 0.15, 0.05), (1.0, 0.0, 0.0)]
+)
+def test_intervals_of_shares_in_pairs_cover_the_truth_and_are_shares(both, only_first, only_second):
+    chance = np.random.default_rng(4)
+    covered = 0
+    for n in (2, 5, 20, 100) * 50:
+        kinds = chance.choice(4, n, p=[both, only_first, only_second, 1.0 - both - only_first - only_second])
+        found = paired_share_difference(kinds <= 1, (kinds == 0) | (kinds == 2))
+        low, high = found.interval or (np.nan, np.nan)
+        assert -1.0 <= low < high <= 1.0
+        covered += bool(low <= only_first - only_second <= high)
+    assert covered / 200 >= 0.92
+
+
+def rng(seed: int = 1) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def normal(mean: float, std: float, n: int, seed: int) -> np.ndarray:
+    return rng(seed).normal(mean, std, n)
+
+
+class TestBootstrap:
+    def test_the_interval_of_the_ratio_is_near_that_of_f_for_normal_samples(self):
+        published, simulated = normal(0, 2, 400, 3), normal(0, 3, 300, 4)
+        ratio = simulated.std(ddof=1) / published.std(ddof=1)
+        low, high = ratio_interval(published, simulated, rng()).interval
+        quantiles = stats.f(299, 399).ppf([0.975, 0.025]) ** 0.5
+        assert (low, high) == pytest.approx(tuple(ratio / quantiles), rel=0.03)
+
+    def test_values_all_equal_have_no_ratio(self):
+        found = ratio_interval(np.full(5, 0.1), np.full(7, 0.3), rng())
+        assert np.isnan(found.value) and found.interval is None
+
+
+class TestDistributions:
+    @pytest.mark.parametrize("ties", [False, True])
+    def test_the_anderson_darling_statistic_is_the_normalised_one_of_midranks(self, ties):
+        first, second = normal(0, 3, 7, 1), normal(1, 4, 5, 2)
+        if ties:
+            first, second = first.round(), second.round()
+        # Scholz and Stephens 1987, equation 7, value by value.
+        total, terms = 0.0, []
+        pooled = np.concatenate([first, second])
+        n = len(pooled)
+        for each in (first, second):
+            terms = []
+            for value in np.unique(pooled):
+                equal, own = np.sum(pooled == value), np.sum(each == value)
+                below, own_below = np.sum(pooled < value) + equal / 2, np.sum(each < value) + own / 2
+                weight = below * (n - below) - n * equal / 4
+                terms.append(equal / n * (n * own_below - len(each) * below) ** 2 / weight)
+            total += (n - 1) / n * sum(terms) / len(each)
+        shift, _ = anderson_darling(first, second, rng(), permutations=9)
+        other = stats.anderson_ksamp([first, second], variant="midrank", method=stats.PermutationMethod(n_resamples=9))
+        assert shift == pytest.approx(other.statistic)
+        assert (total > 1.0) == (shift > 0.0)  # 1 is its mean if both come from one distribution
+
+    def test_the_permutation_p_of_equal_distributions_is_uniform(self):
+        p = [
+            anderson_darling(normal(0, 1, 8, s).round(1), normal(0, 1, 30, s + 999), rng(s), 99)[1] for s in range(200)
+        ]
+        assert stats.kstest(p, "uniform").pvalue > 0.001
+
+
+class TestManagers:
+    def test_the_conclusion_has_scipys_p_and_says_which_is_greater(self):
+        first, second = normal(100, 20, 20, 1), normal(140, 20, 20, 2)
+        found = mann_whitney(first, second, "asymptotic")
+        for p, each in ((found.p_less, "less"), (found.p_greater, "greater"), (found.p, "two-sided")):
+            assert p == pytest.approx(stats.mannwhitneyu(first, second, alternative=each, method="asymptotic").pvalue)
+        assert sign_of(found.p_less, found.p_greater) == -1
+        assert sign_of(found.p_greater, found.p_less) == 1
+        assert sign_of(0.05, 0.05) == 0
+
+    def test_subsamples_agree_with_a_clear_conclusion_and_not_with_its_opposite(self):
+        samples = normal(100, 20, 400, 1), normal(200, 20, 400, 2)
+        assert [agreement(sign, samples, (20, 20), rng(), subsamples=200) for sign in (1, 0, -1)] == [0.0, 0.0, 1.0]
+
+    def test_equal_managers_are_told_apart_by_chance_in_one_of_twenty_each_way(self):
+        samples = normal(100, 20, 4_000, 1), normal(100, 20, 4_000, 2)
+        shares = [agreement(sign, samples, (20, 20), rng()) for sign in (1, 0, -1)]
+        assert sum(shares) == pytest.approx(1.0)
+        assert shares[1] == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize(("count", "n"), [(0, 20), (9, 20), (20, 20), (1, 7)])
+@pytest.mark.parametrize("method", ["exact", "wilson"])
+def test_the_interval_of_a_share_is_scipys(count, n, method):
+    reference = stats.binomtest(count, n).proportion_ci(method=method)
+    assert share_of(count, n, method).interval == pytest.approx((reference.low, reference.high))

@@ -1,53 +1,31 @@
 """suave-des validate: what it prints, writes and refuses."""
 
-import csv
 import json
-import sys
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from suave_des.cli.main import main
 from suave_des.resources import shipped_folder
+from tests.helpers import rows_of
+from tests.helpers.command import command_here
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
 HEADER = "manager,search_time_s,distance_inspected_m"
 
 
-@dataclass(frozen=True)
-class Ended:
-    status: int
-    out: str
-    err: str
-
-
 @pytest.fixture
-def validate(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def validate(tmp_path: Path):
     """Runs `suave-des validate ARGUMENTS` in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-
-    def run(*arguments: str) -> Ended:
-        with pytest.raises(SystemExit) as ended:
-            main(("validate", *arguments))
-        captured = capsys.readouterr()
-        return Ended(int(ended.value.code or 0), captured.out, captured.err)
-
-    return run
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+    return partial(command_here, "validate", cwd=tmp_path)
 
 
 def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp_path):
     ended = validate("seams2023", "--runs", "3", "--workers", "1", "--out", "out", "--quiet")
-    assert (ended.status, ended.err) == (0, "")
-    assert "targets are met" in ended.out
-    assert "cannot be judged: too few missions" in ended.out
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "targets are met" in ended.stdout
+    assert "cannot be judged: too few missions" in ended.stdout
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "campaign.sqlite",
         "runs.csv",
@@ -59,7 +37,7 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
         "validation_targets.csv",
         "validation.json",
     }
-    cells = rows(tmp_path / "out" / "validation.csv")
+    cells = rows_of(tmp_path / "out" / "validation.csv")
     assert [(cell["manager"], cell["published_n"], cell["simulated_n"]) for cell in cells[:3]] == [
         ("none", "20", "3"),
         ("metacontrol", "20", "3"),
@@ -77,7 +55,7 @@ def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validat
     options = ("--managers", "none,random")
     validate("seams2023", "--runs", "3", "--workers", "1", "--out", "simulated", *options)
     ended = validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options)
-    assert ended.status == 0
+    assert ended.returncode == 0
     assert not (tmp_path / "recorded" / "runs.csv").exists()
     for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv"):
         assert (tmp_path / "recorded" / name).read_bytes() == (tmp_path / "simulated" / name).read_bytes()
@@ -85,38 +63,35 @@ def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validat
 
 def test_the_published_runs_against_themselves_meet_every_target(validate):
     ended = validate("--runs-file", str(DATA), "--strict")
-    assert ended.status == 0
-    assert "28 of 28 targets are met, 0 are not met." in ended.out
-    assert "NOT MET" not in ended.out
+    assert ended.returncode == 0
+    assert "28 of 28 targets are met, 0 are not met." in ended.stdout
+    assert "NOT MET" not in ended.stdout
 
 
 def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
     text = DATA.read_text(encoding="utf-8").replace("none,", "x,").replace("random,", "none,").replace("x,", "random,")
     (tmp_path / "swapped.csv").write_text(text, encoding="utf-8")
     ended = validate("--runs-file", "swapped.csv")
-    assert ended.status == 0
-    assert "NOT MET" in ended.out
-    assert validate("--runs-file", "swapped.csv", "--strict").status == 1
+    assert ended.returncode == 0
+    assert "NOT MET" in ended.stdout
+    assert validate("--runs-file", "swapped.csv", "--strict").returncode == 1
 
 
 def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tmp_path):
     (tmp_path / "real.csv").write_text(DATA.read_text(encoding="utf-8"), encoding="utf-8")
     ended = validate("--data", "real.csv", "--runs-file", "real.csv")
-    assert "24 of 24 targets are met" in ended.out
-    assert "found at" not in ended.out
+    assert "24 of 24 targets are met" in ended.stdout
+    assert "found at" not in ended.stdout
     with_shares = validate(
         "--data", "real.csv", "--runs-file", "real.csv", "--targets", str(DATA.with_suffix(".targets.yaml"))
     )
-    assert "28 of 28 targets are met" in with_shares.out
+    assert "28 of 28 targets are met" in with_shares.stdout
 
 
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (
-            ["--data", "missing.csv"],
-            "missing.csv: no such file (give a path, or one of the shipped files: planta_exp1",
-        ),
+        (["--data", "missing.csv"], "missing.csv: no such file (give a path, or one of the shipped files: planta"),
         (["--data", "unknown.csv"], "there is no manager 'magic'"),
         (["--data", "words.csv"], "words.csv: line 2: search_time_s: expected a finite number, got 'soon'"),
         (["--managers", "nobody"], "has no mission of manager 'nobody'"),
@@ -141,11 +116,11 @@ def test_bad_input_is_one_line_and_status_2_and_writes_nothing(validate, tmp_pat
     for name, content in files.items():
         (tmp_path / name).write_text(content, encoding="utf-8")
     ended = validate(*arguments)
-    assert ended.status == 2
-    assert ended.out == ""
-    assert ended.err.count("\n") == 1
-    assert ended.err.startswith("suave-des: ")
-    assert told in ended.err
+    assert ended.returncode == 2
+    assert ended.stdout == ""
+    assert ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith("suave-des: ")
+    assert told in ended.stderr
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["results.txt"]
 
 
@@ -161,9 +136,9 @@ def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(vali
         f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,251,0,False,2\n", encoding="utf-8"
     )
     ended = validate("two.yaml", "--data", "real.csv", "--runs", "2", "--workers", "1", "--out", "out", "--quiet")
-    assert ended.status == 0
-    assert "Condition 2: start.y_m=2.9, thruster_events.0.time_s=90" in ended.out
-    conditions = rows(tmp_path / "out" / "validation_conditions.csv")
+    assert ended.returncode == 0
+    assert "Condition 2: start.y_m=2.9, thruster_events.0.time_s=90" in ended.stdout
+    conditions = rows_of(tmp_path / "out" / "validation_conditions.csv")
     assert [(row["metric"], row["condition"], row["real_n"], row["simulated_n"]) for row in conditions] == [
         ("search_time_s", "1", "2", "2"),
         ("search_time_s", "2", "1", "1"),
@@ -171,7 +146,7 @@ def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(vali
         ("distance_inspected_m", "2", "1", "1"),
     ]
     again = validate("two.yaml", "--data", "real.csv", "--runs-file", "out/runs.csv", "--out", "again")
-    assert again.status == 0
+    assert again.returncode == 0
     same = "validation_conditions.csv"
     assert (tmp_path / "again" / same).read_bytes() == (tmp_path / "out" / same).read_bytes()
 
@@ -184,6 +159,6 @@ def test_several_files_are_compared_as_one_data_set(validate, tmp_path):
         (tmp_path / f"{manager}.csv").write_text("\n".join([header, *own]), encoding="utf-8")
         names += ["--data", f"{manager}.csv"]
     ended = validate(*names, "--runs-file", str(DATA), "--out", "out")
-    assert "24 of 24 targets are met" in ended.out
+    assert "24 of 24 targets are met" in ended.stdout
     data = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]["data"]
     assert [each["file"] for each in data] == ["none.csv", "random.csv", "metacontrol.csv"]

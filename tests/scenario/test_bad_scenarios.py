@@ -36,15 +36,11 @@ def refused(write, content: str, **options: object) -> InputError:
         (WHOLE + "{kind: sinusoid, minimum: 1, maximum: 2}\n", "line 3, signals.water_visibility.period_s", "missing"),
         (HEAD + "start: {x: 1}\nfoo: 1\nbar: 2\n", "line 2, start.x", "and 2 more"),
         ("signals: {}\n", "line 1, signals", "no signal named water_visibility"),
-        ("revision: 2023\n", "line 1, signals", "is missing"),
         (WHOLE + "{kind: constant, value: 2}\n  my sea: {kind: constant, value: 1}\n", "line 4, ", "'my sea' is not a"),
-        (HEAD + "name: my scenario\n", "line 2, name", "'my scenario' is not a valid name"),
         # keys in the wrong place
         (HEAD + "time_limit_s: 300\n", "line 2, time_limit_s", "it belongs under mission"),
-        (HEAD + "acceptance_m: 3\n", "line 2, ", "under revision.spiral or under revision.follow"),
         # numbers
         (HEAD + "start: {x_m: .inf}\n", "line 2, start.x_m", ".inf should be a finite number"),
-        (HEAD + "pipeline: {points_per_piece: 2.5}\n", "line 2, pipeline.", "2.5 should be a whole number"),
         (VISIBILITY + "{period_s: '80'}\n", "line 3, signals.water_visibility.period_s", "'80' should be a number"),
         (VISIBILITY + "{period_s: 0}\n", "line 3, ", "0 should be greater than or equal to 0.001"),
         (HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n", "line 2, ", ".inf should be a finite number"),
@@ -54,19 +50,11 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "reaction_metric: {visibility_thresholds_m: [1, 2, 3]}\n", "line 2, ", "is not in falling order"),
         (HEAD + "managers: {bt: {search_modes: [fd_spiral_low]}}\n", "line 2, ", "search_modes 1"),
         # kinds of signals
-        (
-            VISIBILITY + "{before: 2}\n",
-            "line 3, signals.water_visibility.before",
-            "(known: dropout_probability, outages_s",
-        ),
+        (VISIBILITY + "{before: 2}\n", "line 3, signals.water_visibility.before", "(known: dropout_probability"),
         (VISIBILITY + "{kind: sinus}\n", "line 3, signals.water_visibility.kind", "did you mean 'sinusoid'?"),
         (WHOLE + "{period_s: 80}\n", "line 3, signals.water_visibility", "kind is missing"),
         # distributions
-        (
-            HEAD + "start: {x_m: {distribution: gauss}}\n",
-            "line 2, start.x_m.distribution",
-            "is no distribution that is known (give a number, or",
-        ),
+        (HEAD + "start: {x_m: {distribution: gauss}}\n", "line 2, start.x_m.distribution", "is no distribution that"),
         (
             HEAD + "start:\n  x_m:\n    distribution: uniform\n    minimum: 3\n    maximum: 1\n",
             "line 5, start.x_m.minimum",
@@ -74,7 +62,6 @@ def refused(write, content: str, **options: object) -> InputError:
         ),
         (NORMAL + "std: 1, minimum: 9}}\n", "line 2, start.x_m.minimum", "leaves next to nothing"),
         (NORMAL + "std: 1e6}}\n", "line 2, start.x_m.std", "must be at most 20000"),
-        (HEAD + "start: {x_m: {distribution: choice, values: [1, 2e4]}}\n", "line 2, start.x_m.values", "20000 is out"),
         (HEAD + "start: {heading_rad: 90}\n", "line 2, start.heading_rad", "at least -6.3 and at most 6.3"),
         (
             HEAD + "latencies: {inference_s: {distribution: normal, mean: 1, std: 1}}\n",
@@ -83,30 +70,21 @@ def refused(write, content: str, **options: object) -> InputError:
         ),
         # thruster events, both spellings
         (EVENTS + "{thruster: 7, event: failure, time_s: 3}\n", "line 3, thruster_events[0].thruster", "equal to 6"),
-        (EVENTS + "(0,failure,35)\n", "line 3, thruster_events[0].thruster", "greater than or equal to 1"),
-        (EVENTS + "(1,failure,nan)\n", "line 3, thruster_events[0].time_s", ".nan should be a finite number"),
         (EVENTS + "(1,failed,35)\n", "line 3, thruster_events[0].event", "did you mean 'failure'?"),
         (EVENTS + "(1,failure,35)\n  - (9,failure,35)\n", "line 4, thruster_events[1].thruster", "9 should be"),
         # other parts
         (HEAD + "mission:\n", "line 2, mission", "nothing should be a mapping"),
         (HEAD + "pipeline: {vertices_m: [[1, 2], [3, 4, 5]]}\n", "line 2, pipeline.vertices_m[0][2]", "is missing"),
-        (HEAD + "managers: {metacontroll: {}}\n", "line 2, managers.metacontroll", "did you mean 'metacontrol'?"),
         (HEAD + "managers: {'mine:Manager': {starts_s: .inf}}\n", "line 2, managers.mine:Manager", "not finite"),
         (HEAD + "knowledge: {ontologies: suave.owl}\n", "line 2, knowledge.ontologies", "'suave.owl' should be a list"),
-        (
-            HEAD + "knowledge:\n  reasoner: pelet\n",
-            "line 3, knowledge.reasoner",
-            "did you mean 'pellet'? allowed: cached",
-        ),
+        (HEAD + "knowledge:\n  reasoner: pelet\n", "line 3, knowledge.reasoner", "did you mean 'pellet'? allowed"),
         # revisions and vehicles
         (HEAD + "revision: 2024\n", "line 2, revision", "no such file: '2024'"),
         ("revision: {follow: {acceptance_m: 1}}\n", "line 1, revision.name", "is missing"),
         (HEAD + "revision: {follow: {acceptance: 1}}\n", "line 2, revision.follow.acceptance", "mean 'acceptance_m'?"),
-        (HEAD + "vehicle: bluerov3\n", "line 2, vehicle", "did you mean 'bluerov2.yaml'?"),
         # other files
         ("base: nowhere.yaml\n", "line 1, base", "no such file: 'nowhere.yaml'"),
         ("base: mine.yaml\n", "line 1, base", "mine.yaml -> mine.yaml"),
-        (HEAD + "modes_file: nowhere.yaml\n", "line 2, modes_file", "suave_modes.yaml"),
         (
             HEAD + "knowledge: {ontologies: [suav.owl]}\n",
             "line 2, knowledge.ontologies[0]",
@@ -122,7 +100,6 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "default_modes: {f_search: fd_spiral_low}\n", "line 2, default_modes.f_search", "function 'f_search'"),
         # YAML
         (HEAD + "description: !!python/object/apply:os.system [ls]\n", "line 2, description", "the tag"),
-        (HEAD + "name: a\nname: b\n", "line 3, name", "appears twice, first in line 2"),
     ],
 )
 def test_a_wrong_scenario_is_refused_with_file_place_and_words(write, content, place, words):
@@ -144,12 +121,6 @@ def test_a_wrong_scenario_is_refused_with_file_place_and_words(write, content, p
 )
 def test_a_generous_value_is_taken(write, content):
     load_scenario(write("mine.yaml", HEAD + content + "\n"))
-
-
-def test_the_whole_message_is_one_readable_line(write):
-    assert str(refused(write, VISIBILITY + "{period_s: -80}\n")) == (
-        "mine.yaml: line 3, signals.water_visibility.period_s: -80 should be greater than or equal to 0.001"
-    )
 
 
 @pytest.mark.parametrize(

@@ -17,13 +17,6 @@ SCENARIO = load_scenario("seams2023")
 NUMBERS = st.floats(-1e6, 1e6)
 
 
-def test_a_number_is_its_own_value_and_draws_nothing():
-    stream = random.Random(1)
-    before = stream.getstate()
-    assert draw(ADAPTER.validate_python(3), stream) == 3
-    assert stream.getstate() == before
-
-
 @given(
     raw=st.fixed_dictionaries(
         {"distribution": st.just("normal"), "mean": NUMBERS, "std": st.floats(0, 1e3)},

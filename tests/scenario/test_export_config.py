@@ -1,7 +1,5 @@
 """The exemplar's files that are written import again to the same, and what they cannot express is named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -86,7 +84,7 @@ def expressible(draw, revision: str) -> tuple[LoadedScenario, dict]:
 @pytest.mark.parametrize("revision", REVISIONS)
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)
-def test_what_the_exemplar_can_express_imports_again_to_the_same(revision: str, data: st.DataObject) -> None:
+def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, data):
     loaded, campaign = data.draw(expressible(revision))
     texts, lost = export_config(loaded, campaign, revision)
     assert lost == ()
@@ -115,7 +113,7 @@ def lost_lines(scenario: str | LoadedScenario, revision: str | None = None, **ca
 
 
 class TestWhatTheExemplarCannotExpress:
-    def test_is_named_for_the_shipped_scenarios(self) -> None:
+    def test_is_named_for_the_shipped_scenarios(self):
         assert lost_lines("release15").startswith("battery: nothing here")
         assert lost_lines("release15").count("\n") == 0
         assert "no runner before 1.4" in lost_lines("seams2023")
@@ -129,7 +127,7 @@ class TestWhatTheExemplarCannotExpress:
         ):
             assert f"{words}: " in lost_lines("extended")
 
-    def test_is_named_for_another_revision(self) -> None:
+    def test_is_named_for_another_revision(self):
         lost = lost_lines("seams2023", "1.5")
         assert "revision: 2023 here; the code that reads the files is 1.5's" in lost
         assert "calibration.origin_y_m: -0.2 here, 0.0 in the exemplar" in lost
@@ -150,7 +148,7 @@ class TestWhatTheExemplarCannotExpress:
             ({"battery.mission_ends_at_level": 0.0}, "battery.mission_ends_at_level: 0.0 here, nothing in"),
         ],
     )
-    def test_is_named_value_by_value(self, values, words) -> None:
+    def test_is_named_value_by_value(self, values, words):
         (line,) = export_config(with_values(BLANK["1.5"], values), {"managers": ["bt"], "runs": 2, "seed": 1})[1]
         assert line.startswith(words)
 
@@ -165,11 +163,11 @@ class TestWhatTheExemplarCannotExpress:
             ),
         ],
     )
-    def test_is_named_for_a_campaign(self, campaign, words) -> None:
+    def test_is_named_for_a_campaign(self, campaign, words):
         lost = export_config(BLANK["1.5"], {"managers": ["bt"], "runs": 2, "seed": 1, **campaign})[1]
         assert lost[0].startswith(words)
 
-    def test_is_refused_where_nothing_is_left(self) -> None:
+    def test_is_refused_where_nothing_is_left(self):
         with pytest.raises(InputError, match="none of the managers oracle"):
             export_config(BLANK["1.5"], {"managers": ["oracle"], "runs": 2, "seed": 1})
         with pytest.raises(InputError, match=r"no revision '1\.6'.*did you mean '1\.5'"):
@@ -182,7 +180,7 @@ class TestCommand:
             main(["export-config", *arguments])
         return ended.value.code
 
-    def test_writes_files_that_import_config_reads(self, write, capsys) -> None:
+    def test_writes_files_that_import_config_reads(self, write, capsys):
         write("mine.yaml", "base: release15\nbattery: {}\nmission: {time_limit_s: 240}\n")
         write("c.yaml", "campaign: 1\nscenario: mine.yaml\nmanagers: [bt]\nruns: 3\nseed: 7\n")
         assert self.ended("c.yaml", "--out", "there") == 0
@@ -195,7 +193,7 @@ class TestCommand:
         settings = read_campaign_file("again_c.yaml").settings
         assert (settings.managers, settings.runs, settings.seed) == (("bt",), 3, 7)
 
-    def test_values_have_the_types_of_the_nodes_parameters(self, write) -> None:
+    def test_values_have_the_types_of_the_nodes_parameters(self, write):
         write("mine.yaml", "base: release15\nmission: {time_limit_s: 240}\nstart: {x_m: -16}\n")
         assert self.ended("mine.yaml", "--out", "there") == 0
         mission, runner = (yaml.safe_load(Path("there", name).read_text()) for name in (MISSION_FILE, RUNNER_FILE))
@@ -203,7 +201,7 @@ class TestCommand:
         x_m = runner["/suave_runner_node"]["ros__parameters"]["initial_pos_x"]
         assert (type(limit), type(x_m)) == (int, float)  # ROS 2 refuses a parameter of another type
 
-    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, capsys) -> None:
+    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, capsys):
         write("there/mission_config.yaml", "kept")
         assert self.ended("release15", "--out", "there") == 2
         assert "exists already" in capsys.readouterr().err

@@ -1,19 +1,19 @@
-"""Loading scenarios: shipped ones, those built on others, the files they name, and the trip to a worker."""
+"""Loading scenarios: shipped ones, those built on others, the files they name, and what has no effect."""
 
 import hashlib
-import pickle
-import shutil
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from suave_des.campaign.campaign import run_campaign
 from suave_des.resources import shipped_folder
-from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario.models import Calibration
-from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, TableSignal, ThrusterEvent
-from suave_des.scenario.quantities import Normal, Uniform
+from suave_des.scenario.physical import ConstantSignal, TableSignal, ThrusterEvent
+from suave_des.scenario.quantities import Normal
+from tests.helpers.command import command_here
 
 HEAD = "base: seams2023.yaml\n"
 SHIPPED = ("seams2023", "planta_exp1", "release15", "extended", "paper_table_values")
@@ -28,23 +28,6 @@ def test_a_shipped_scenario_loads_with_its_own_name(name):
 def test_every_shipped_scenario_is_known_here():
     files = {path.stem for path in shipped_folder("scenarios").glob("*.yaml")}
     assert files == {*SHIPPED, "planta_exp1_campaign", "suave_modes", "suave_extended_modes"}
-
-
-def test_seams2023_is_the_papers_experiment():
-    scenario = load_scenario("seams2023").scenario
-    assert scenario.revision.name == "2023"
-    assert scenario.mission.time_limit_s == 300
-    assert (scenario.start.x_m, scenario.start.z_m) == (-17.0, -18.5)
-    assert scenario.start.y_m == 2.0
-    assert scenario.calibration.drift_y_m == Uniform(distribution="uniform", minimum=0.56, maximum=0.59)
-    visibility = scenario.signals["water_visibility"]
-    assert isinstance(visibility, SinusoidSignal)
-    assert (visibility.period_s, visibility.minimum, visibility.maximum, visibility.shift_s) == (80, 1.25, 3.75, 0)
-    assert scenario.thruster_events == (ThrusterEvent(thruster=1, event="failure", time_s=35),)
-    assert scenario.managers.random.adaptation_period_s == 15
-    assert scenario.managers.metacontrol.reasoning_period_s == 2
-    assert scenario.latencies.inference_s == 1.0
-    assert scenario.battery is None
 
 
 def test_release15_is_the_same_vehicle_in_other_software():
@@ -65,36 +48,22 @@ def test_the_vehicle_is_the_same_in_every_revision():
     )
 
 
-def test_paper_table_values_differs_from_seams2023_in_the_knowledge_and_what_reactions_are_measured_by():
-    ours, other = load_scenario("paper_table_values").scenario, load_scenario("seams2023").scenario
-    assert ours.knowledge.values == {
-        "qa_water_visibility_low": 0.5,
-        "qa_water_visibility_medium": 1.0,
-        "qa_water_visibility_high": 2.0,
-        "qa_performance_recover_thrusters": 0.5,
-    }
-    assert ours.reaction_metric.visibility_thresholds_m == (2.0, 1.0, 0.5)
-    same = {name: getattr(other, name) for name in ("name", "description", "knowledge", "reaction_metric")}
-    assert ours.model_copy(update=same) == other
-
-
-@pytest.mark.parametrize("revision", ['"2023"', "2023", "'1.5'", "1.5"])
-def test_a_revision_needs_no_quotes(write, revision):
-    path = write("mine.yaml", HEAD + f"revision: {revision}\n")
-    assert load_scenario(path).scenario.revision.name == revision.strip("'\"")
-
-
-def test_a_revision_may_differ_from_a_shipped_one(write):
-    ours = load_scenario(write("mine.yaml", HEAD + "revision: {base: 1.5, follow: {acceptance_m: 0.3}}\n")).scenario
-    shipped = load_scenario("release15").scenario.revision
-    assert ours.revision.follow.acceptance_m == 0.3
-    follow = ours.revision.follow.model_copy(update={"acceptance_m": shipped.follow.acceptance_m})
-    assert ours.revision.model_copy(update={"follow": follow}) == shipped
-
-
-def test_a_revision_without_base_differs_from_that_of_the_base_scenario(write):
-    ours = load_scenario(write("mine.yaml", "base: release15\nrevision: {follow: {acceptance_m: 0.3}}\n")).scenario
-    assert (ours.revision.name, ours.revision.follow.acceptance_m) == ("1.5", 0.3)
+@pytest.mark.parametrize(
+    ("content", "name", "acceptance_m"),
+    [
+        *((HEAD + f"revision: {quoted}\n", "1.5", None) for quoted in ("1.5", "'1.5'", '"1.5"')),
+        (HEAD + "revision: {base: 1.5, follow: {acceptance_m: 0.3}}\n", "1.5", 0.3),
+        ("base: release15\nrevision: {follow: {acceptance_m: 0.3}}\n", "1.5", 0.3),  # of the base scenario
+        (HEAD + "revision: own.yaml\n", "own", 0.3),
+    ],
+)
+def test_a_revision_is_a_shipped_one_or_differs_from_it_or_is_a_file_beside_the_scenario(
+    write, content, name, acceptance_m
+):
+    write("own.yaml", "base: 1.5\nname: own\nfollow: {acceptance_m: 0.3}\n")
+    ours, shipped = (load_scenario(each).scenario.revision for each in (write("mine.yaml", content), "release15"))
+    follow = shipped.follow.model_copy(update={"acceptance_m": acceptance_m or shipped.follow.acceptance_m})
+    assert ours == shipped.model_copy(update={"name": name, "follow": follow})
 
 
 def test_a_revision_with_its_own_base_takes_nothing_from_the_base_scenarios(write):
@@ -103,12 +72,6 @@ def test_a_revision_with_its_own_base_takes_nothing_from_the_base_scenarios(writ
     write("base.yaml", HEAD + revision % (offset % ", minimum: 0"))
     ours = load_scenario(write("mine.yaml", "base: base.yaml\n" + revision % (offset % ""))).scenario
     assert ours.revision.set_points.node_frame_offset_x_m == Normal(distribution="normal", mean=0, std=1)
-
-
-def test_a_revision_may_be_a_file_beside_the_scenario(write):
-    write("folder/own.yaml", 'base: "2023"\nname: own\nspiral: {workaround_step_m: 0.1}\n')
-    ours = load_scenario(write("folder/mine.yaml", HEAD + "revision: own.yaml\n")).scenario
-    assert (ours.revision.name, ours.revision.spiral.workaround_step_m) == ("own", 0.1)
 
 
 def test_a_derived_scenario_says_only_what_differs(write):
@@ -145,17 +108,6 @@ def test_null_removes_a_signal_a_value_and_the_battery(write):
     assert set(scenario.signals) == {"water_visibility"}
     assert "qa_performance_recover_thrusters" not in scenario.knowledge.values
     assert len(scenario.knowledge.values) == 3
-
-
-def test_a_default_mode_is_replaced_without_losing_the_others(write):
-    path = write("mine.yaml", "revision: 2023\n" + SIGNAL + "default_modes: {f_generate_search_path: fd_spiral_high}\n")
-    assert load_scenario(path).scenario.default_modes == {
-        "f_generate_search_path": "fd_spiral_high",
-        "f_follow_pipeline": "fd_follow_pipeline",
-    }
-
-
-SIGNAL = "signals: {water_visibility: {kind: constant, value: 2}}\n"
 
 
 def test_both_spellings_of_thruster_events_mean_the_same(write):
@@ -236,10 +188,51 @@ def test_every_file_read_is_hashed_under_the_name_shown(write):
     assert inputs["mine.yaml"] == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def test_a_loaded_scenario_travels_by_value(write):
-    write("folder/sea.csv", "t_s,value\n0,3\n")
-    path = write("folder/mine.yaml", HEAD + "signals: {water_visibility: {kind: table, file: sea.csv}}\n")
-    loaded = load_scenario(path)
-    packed = pickle.dumps(loaded)
-    shutil.rmtree("folder")
-    assert pickle.loads(packed) == loaded
+EARLY = "thruster_events.0: failures have no effect before 26 s"
+
+
+def failures(*times_s: object) -> dict[str, object]:
+    return {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": time_s} for time_s in times_s]}
+
+
+@pytest.mark.parametrize(
+    ("values", "starts"),
+    [
+        (failures(35.0), []),
+        (failures(25.5), []),  # the monitor may notice it at 26 s only
+        (failures(10.0), [EARLY]),
+        (failures(10.0, 15.0), [EARLY]),  # in 2023 the second is 15 s later
+        (failures({"distribution": "uniform", "minimum": 5, "maximum": 20}), [EARLY]),
+        (failures({"distribution": "uniform", "minimum": 5, "maximum": 60}), []),
+        (failures(100.0, 250.0), ["thruster_events.1: 350 s is after the end"]),  # in 2023 it counts from the first
+        (failures(100.0, 250.0) | {"revision.monitors.thruster_event_times": "after_start"}, []),
+        (failures(100.0) | {"mission.time_limit_s": 100.0}, ["thruster_events.0: 100 s is after the end"]),
+        ({"leak": {"time_s": 301.0}}, ["leak: 301 s is after the end"]),
+        (
+            {"signals.water_visibility": {"kind": "step", "time_s": 500.0, "before": 1.0, "after": 2.0}},
+            ["signals.water_visibility: 500 s is after the end"],
+        ),
+    ],
+)
+def test_what_comes_too_early_or_too_late(values, starts):
+    loaded = load_scenario("extended" if "leak" in values else "seams2023")
+    found = list(with_values(loaded, values).scenario.without_effect())
+    assert len(found) == len(starts)
+    assert all(one.startswith(start) for one, start in zip(found, starts, strict=True)), found
+
+
+@pytest.mark.parametrize("name", ["seams2023", "release15", "planta_exp1", "extended"])
+def test_all_of_the_shipped_scenarios_has_an_effect(name):
+    assert not list(load_scenario(name).scenario.without_effect())
+
+
+def test_a_campaign_tells_for_how_many_swept_values(caplog):
+    run_campaign("seams2023", ["none"], runs=1, sweep={"thruster_events.0.time_s": [10.0, 20.0, 31.0]})
+    (message,) = [each for each in caplog.messages if "no effect" in each]
+    assert message.startswith(f"note: {EARLY}") and message.endswith(", at 2 of 3 swept values")
+
+
+def test_kb_check_warns(tmp_path):
+    done = command_here("kb", "check", "--set", "thruster_events=['(1,failure,10)']", cwd=tmp_path)
+    assert done.returncode == 0
+    assert f"WARN   shipped/scenarios/seams2023.yaml: {EARLY}" in done.stdout

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
-from tests.helpers.designs import each_pair
-from tests.helpers.polling import effects, polled
+from tests.helpers.polling import each_pair, effects, polled
 
 MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
 LOADED = {name: load_scenario(name) for name in ("seams2023", "planta_exp1", "release15")}
@@ -78,7 +77,7 @@ def assert_same(simulator: Simulator, manager: str, run: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "condition", "manager"), each_pair(sorted(LOADED), CONDITIONS, MANAGERS))
-def test_looking_ahead_changes_nothing(name: str, condition: str, manager: str) -> None:
+def test_looking_ahead_changes_nothing(name, condition, manager):
     """Each cell has a run of its own, so that there are as many different missions."""
     run = 1 + 10 * list(CONDITIONS).index(condition) + MANAGERS.index(manager)
     assert_same(simulator(name, condition), manager, run)
@@ -98,17 +97,8 @@ def test_looking_ahead_changes_nothing(name: str, condition: str, manager: str) 
 )
 @settings(max_examples=10)
 def test_looking_ahead_changes_nothing_whatever_the_scenario(
-    name: str,
-    manager: str,
-    run: int,
-    loss: float,
-    period_s: float,
-    latency_s: float,
-    failures_s: list[float],
-    poll_s: float,
-    error_m: float,
-    slower: float,
-) -> None:
+    name, manager, run, loss, period_s, latency_s, failures_s, poll_s, error_m, slower
+):
     values = {
         "revision.set_points.loss_probability": loss,
         "revision.follow.poll_period_s": poll_s,

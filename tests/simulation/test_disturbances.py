@@ -1,12 +1,14 @@
-"""What goes wrong besides murky water and thrusters that recover: leaks, currents, sensors, thrusters lost for good."""
+"""Leaks, currents, sensors, thrusters lost for good; and constants of the exemplar that users may vary."""
 
 import math
+from itertools import pairwise
 
 import pytest
 
+from suave_des.domain import SEA_BED_Z_M
 from suave_des.errors import InputError
 from suave_des.metrics.result import MissionResult
-from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
 LEAK = "base: extended.yaml\nleak: {time_s: 170}\nmetrics: [surfacing_time_s]\n"
@@ -26,7 +28,7 @@ def details(result: MissionResult, event: str) -> list[str]:
 
 
 @pytest.mark.parametrize("manager", ["none", "metacontrol", "bt", "bt_extended"])
-def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, manager: str) -> None:
+def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, manager):
     result = fly(LEAK, manager)
     assert "hull LEAK" in details(result, "component_status")
     assert details(result, "task_requested")[-1] == "surface"
@@ -35,7 +37,7 @@ def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, mana
     assert 170.0 + result.further["surfacing_time_s"] == pytest.approx(result.metrics.mission_duration_s, abs=0.2)
 
 
-def test_at_a_leak_the_task_is_given_up_at_once_and_so_is_the_way_to_the_station(fly) -> None:
+def test_at_a_leak_the_task_is_given_up_at_once_and_so_is_the_way_to_the_station(fly):
     result = fly(LEAK, "metacontrol")
     given_up = [each for each in result.events if each.event == "task_cancelled"]
     assert given_up[0].t_s == 170.0
@@ -43,13 +45,7 @@ def test_at_a_leak_the_task_is_given_up_at_once_and_so_is_the_way_to_the_station
     assert after == {"fd_surface"}
 
 
-def test_a_leak_after_the_missions_end_does_nothing(fly) -> None:
-    result = fly(LEAK.replace("170", "500"))
-    assert result.further["surfacing_time_s"] is None
-    assert details(result, "mission_ended") == ["time limit"]
-
-
-def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves(fly) -> None:
+def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves(fly):
     """With all thrusters lost, the vehicle drifts on: over a whole period the mean current, within it up and down."""
     lost = ", ".join(f'"({thruster},failure,0)"' for thruster in range(1, 7))
     wave = "{mean_m_per_s: 0.05, amplitude_m_per_s: 0.2, period_s: 100, direction_rad: 0.0}"
@@ -64,16 +60,8 @@ def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves
     assert x_m[150] - x_m[100] == pytest.approx(half, rel=0.15)
 
 
-def test_a_wave_without_amplitude_is_a_constant_current(fly) -> None:
-    constant = fly("base: seams2023.yaml\nname: mine\ncurrent: {y_m_per_s: 0.1}\n")
-    still = "{mean_m_per_s: 0.1, direction_rad: 1.5707963267948966}"
-    wave = fly(f"base: seams2023.yaml\nname: mine\ncurrent: {{wave: {still}}}\n")
-    assert wave.trajectory[-1].y_m == pytest.approx(constant.trajectory[-1].y_m, abs=0.05)
-    assert wave.metrics.search_time_s == constant.metrics.search_time_s
-
-
 @pytest.mark.parametrize(("manager", "mode"), [("metacontrol", "fd_recover_thrusters"), ("bt", "fd_recover_thrusters")])
-def test_a_thruster_that_cannot_be_recovered_stays_lost_and_is_not_reported(fly, manager: str, mode: str) -> None:
+def test_a_thruster_that_cannot_be_recovered_stays_lost_and_is_not_reported(fly, manager, mode):
     event = "{thruster: 1, event: failure, time_s: 35, recoverable: false}"
     result = fly(f"base: release15.yaml\nthruster_events: [{event}]\nmetrics: [operational_thrusters]\n", manager)
     reports = details(result, "component_status")
@@ -84,16 +72,7 @@ def test_a_thruster_that_cannot_be_recovered_stays_lost_and_is_not_reported(fly,
     assert result.further["operational_thrusters"] == pytest.approx(6 - (duration_s - 35.5) / duration_s, abs=0.01)
 
 
-def test_a_thruster_can_fail_for_good_after_it_was_recovered_once(fly) -> None:
-    events = (
-        "[{thruster: 1, event: failure, time_s: 35}, {thruster: 1, event: failure, time_s: 100, recoverable: false}]"
-    )
-    reports = details(fly(f"base: release15.yaml\nthruster_events: {events}\n", "metacontrol"), "component_status")
-    assert reports.count("c_thruster_1 FALSE") == 2
-    assert reports.count("c_thruster_1 RECOVERED") == 1
-
-
-def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly) -> None:
+def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly):
     events = (
         "[{thruster: 1, event: failure, time_s: 35, recoverable: false}, {thruster: 1, event: recovery, time_s: 60},"
         " {thruster: 1, event: failure, time_s: 100}]"
@@ -103,14 +82,14 @@ def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly) -> N
     assert reports.count("c_thruster_1 RECOVERED") == 2  # by the scenario, and by maintain_motion
 
 
-def test_in_an_outage_the_last_measurement_stays(fly) -> None:
+def test_in_an_outage_the_last_measurement_stays(fly):
     signal = "{outages_s: [[50, 120]]}"
     points = fly(f"base: release15.yaml\nsignals: {{water_visibility: {signal}}}\n").trajectory
     during = {point.visibility_m for point in points if 51.0 < point.t_s < 119.0}
     assert len(during) == 1
 
 
-def test_messages_are_lost_with_the_given_probability(fly) -> None:
+def test_messages_are_lost_with_the_given_probability(fly):
     steps = {}
     for share in (0.0, 0.5, 1.0):
         signal = f"{{dropout_probability: {share}}}"
@@ -120,24 +99,12 @@ def test_messages_are_lost_with_the_given_probability(fly) -> None:
     assert 0.35 < steps[0.5] / steps[0.0] < 0.75  # equal values come more than once
 
 
-def test_a_failed_thruster_whose_report_is_lost_is_not_recovered(fly) -> None:
+def test_a_failed_thruster_whose_report_is_lost_is_not_recovered(fly):
     result = fly("base: release15.yaml\nthruster_monitor: {outages_s: [[0, 60]]}\n", "metacontrol")
     assert details(result, "component_status") == []
 
 
-@pytest.mark.parametrize("manager", ["metacontrol", "bt_extended"])
-def test_battery_noise_is_measured_and_does_not_discharge_the_battery(fly, manager: str) -> None:
-    noise = "{noise: {distribution: uniform, minimum: -0.3, maximum: 0.0}}"
-    result = fly(f"base: extended.yaml\nbattery: {noise}\n", manager)
-    set_off_s = next(
-        each.t_s
-        for each in result.events
-        if each.event == "mode_set" and each.detail.endswith(("generate_recharge_path = fd_recharge", "path = normal"))
-    )
-    assert 85.0 < set_off_s < 140.0  # a level of 0.25 is measured from 90 s on
-
-
-def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly) -> None:
+def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly):
     """Whether a mission is recorded, with each message published, or not: the same messages are lost."""
     text = (
         "base: extended.yaml\nname: mine\nsignals: {water_visibility: {dropout_probability: 0.3}}\n"
@@ -162,7 +129,39 @@ def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly) -> None
         ("thruster_events: [{thruster: 1, event: failure, time_s: 1, recoverable: 3}]", "3 should be a boolean"),
     ],
 )
-def test_what_cannot_be_is_refused(fly, line: str, problem: str) -> None:
+def test_what_cannot_be_is_refused(fly, line, problem):
     with pytest.raises(InputError) as caught:
         fly(f"base: seams2023.yaml\n{line}\n")
     assert problem in caught.value.problem
+
+
+def flown(manager: str, **values: object) -> MissionResult:
+    """One mission of seams2023 with other values, by key path with __ for a dot."""
+    still = {"calibration.altitude_error_m": 0.0, **{path.replace("__", "."): each for path, each in values.items()}}
+    return Simulator(with_values(load_scenario("seams2023"), still)).run(manager, run=1, seed=1, record=True)
+
+
+@pytest.mark.parametrize("delay_s", [3.0, 20.0])
+def test_a_recovery_takes_as_long_as_the_revision_says(delay_s):
+    events = flown("metacontrol", revision__recovery__delay_s=delay_s).events
+    began_s = next(event.t_s for event in events if event.detail == "f_maintain_motion = fd_recover_thrusters")
+    first_s = next(event.t_s for event in events if event.detail == "c_thruster_1 RECOVERED")
+    assert first_s - began_s == pytest.approx(delay_s)
+
+
+@pytest.mark.parametrize("altitude_m", [0.75, 2.5])
+def test_the_pipeline_is_followed_at_the_revisions_altitude(altitude_m):
+    last = flown("none", revision__follow__altitude_m=altitude_m).trajectory[-1]
+    assert last.mode == "fd_follow_pipeline"
+    assert last.z_m - SEA_BED_Z_M == pytest.approx(altitude_m, abs=0.1)
+
+
+def test_weak_thrusters_limit_the_speed():
+    """Full ahead, four horizontal thrusters of F at 45 degrees hold a speed of sqrt(4 F sqrt(1/2) / c)."""
+    weak = flown("none", vehicle__thrust_limit_n=0.2)
+    strong = flown("none")
+    fastest = [
+        max(abs(b.x_m - a.x_m) / (b.t_s - a.t_s) for a, b in pairwise(way))
+        for way in (weak.trajectory, strong.trajectory)
+    ]
+    assert fastest[0] <= (4 * 0.2 * 0.5**0.5 / 33.732) ** 0.5 + 0.01 < 0.2 < fastest[1]

@@ -4,7 +4,7 @@ import pytest
 
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle
-from tests.helpers.vehicles import BLUEROV2
+from tests.helpers.stand_ins import BLUEROV2
 
 START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
 MakeVehicle = Callable[..., Vehicle]

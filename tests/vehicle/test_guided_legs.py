@@ -1,12 +1,14 @@
-"""Legs of the guided controller: how its target moves, and when a new set-point starts it anew."""
+"""Legs of the guided controller, and when changes of control act: from their own time on, to the last bit."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from suave_des.vehicle import kernel
-from suave_des.vehicle.model import Autopilot, Pose
+from suave_des.vehicle.model import Autopilot, Pose, euler_angles, quaternion
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
-from tests.helpers.vehicles import BLUEROV2, nu
+from tests.helpers.stand_ins import BLUEROV2, nu
 
 START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
 STIFF = Autopilot(
@@ -21,9 +23,7 @@ def leg_start(vehicle: Vehicle, t_s: float) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize(("distance_m", "time_s"), [(0.1, 1.474), (0.3, 2.125), (0.5, 2.520)])
-def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over_two_jerks(
-    distance_m: float, time_s: float
-) -> None:
+def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over_two_jerks(distance_m, time_s):
     """At its half time the target is half-way; a stiff vehicle is close behind it, and at the end stands at the end."""
     vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
     vehicle.command(0.0, distance_m, 0.0, -18.0)
@@ -32,7 +32,7 @@ def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over
     assert 4.0 * vehicle.track[row_at(time_s), kernel.LEG_QUARTER] == pytest.approx(time_s, abs=1e-3)
 
 
-def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point() -> None:
+def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point():
     """Where the four parts of the leg meet, way and speed go on; the speed is greatest in the middle."""
     vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
     vehicle.command(0.0, *TO_HALF_A_METRE)
@@ -44,7 +44,7 @@ def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point() -> None:
     assert speed_m_per_s.max() == pytest.approx(0.4, rel=0.15)  # j q^2, with q = 0.63 s
 
 
-def test_an_interrupted_leg_starts_anew_from_the_stopping_point() -> None:
+def test_an_interrupted_leg_starts_anew_from_the_stopping_point():
     vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0)
     vehicle.command(0.0, 3.0, 0.0, -18.0)
     x_m, y_m, z_m = vehicle.position(2.0)
@@ -53,7 +53,7 @@ def test_an_interrupted_leg_starts_anew_from_the_stopping_point() -> None:
     assert leg_start(vehicle, 2.1) == pytest.approx((x_m + u_m_per_s, y_m, z_m), abs=1e-3)  # the position gain is 1 / s
 
 
-def test_an_interrupted_leg_loses_the_integral() -> None:
+def test_an_interrupted_leg_loses_the_integral():
     vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0, current_m_per_s=(-0.3, 0.0, 0.0))
     vehicle.command(0.0, 3.0, 0.0, -18.0)
     vehicle.position(2.5)
@@ -63,14 +63,14 @@ def test_an_interrupted_leg_loses_the_integral() -> None:
     assert abs(vehicle.track[row_at(2.0) + 1, kernel.VELOCITY_INTEGRAL][0]) < 0.05
 
 
-def test_after_a_completed_leg_the_next_one_starts_at_the_last_set_point() -> None:
+def test_after_a_completed_leg_the_next_one_starts_at_the_last_set_point():
     vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0)
     vehicle.command(0.0, *TO_HALF_A_METRE)
     vehicle.command(10.0, 1.0, 0.0, -18.0)
     assert leg_start(vehicle, 10.1) == pytest.approx(TO_HALF_A_METRE)
 
 
-def test_sending_the_set_point_of_a_completed_leg_again_changes_nothing_of_its_motion() -> None:
+def test_sending_the_set_point_of_a_completed_leg_again_changes_nothing_of_its_motion():
     once, again = (Vehicle(BLUEROV2, Autopilot(), START, 30.0) for _ in range(2))
     for vehicle in (once, again):
         vehicle.command(0.0, *TO_HALF_A_METRE)
@@ -78,17 +78,7 @@ def test_sending_the_set_point_of_a_completed_leg_again_changes_nothing_of_its_m
     assert again.position(20.0) == pytest.approx(once.position(20.0), abs=1e-6)
 
 
-def test_a_set_point_a_second_slows_it_down() -> None:
-    """The same metre in one leg, and in ten of which each interrupts the one before."""
-    whole, interrupted = (Vehicle(BLUEROV2, Autopilot(), START, 30.0) for _ in range(2))
-    whole.command(0.0, 1.0, 0.0, -18.0)
-    for n in range(1, 11):
-        interrupted.command(n - 1.0, 0.1 * n, 0.0, -18.0)
-    assert whole.position(4.0)[0] > 0.8
-    assert interrupted.position(4.0)[0] < 0.5
-
-
-def test_a_new_leg_is_the_same_in_whatever_pieces_the_track_is_filled() -> None:
+def test_a_new_leg_is_the_same_in_whatever_pieces_the_track_is_filled():
     at_once, in_pieces = (Vehicle(BLUEROV2, Autopilot(), START, 20.0) for _ in range(2))
     for vehicle in (at_once, in_pieces):
         vehicle.command(0.0, *TO_HALF_A_METRE)
@@ -98,3 +88,58 @@ def test_a_new_leg_is_the_same_in_whatever_pieces_the_track_is_filled() -> None:
         vehicle.command(1.0, 0.6, 0.2, -17.0)
         vehicle.look_ahead(row_at(15.0))
     assert np.array_equal(at_once.track[: row_at(15.0)], in_pieces.track[: row_at(15.0)])
+
+
+DURATION_S = 40.0
+times = st.floats(0.0, DURATION_S)
+places = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-19, -15))
+commands = st.tuples(times, places)
+faults = st.tuples(times, st.integers(1, 6), st.sampled_from(["works", "frozen", "dead"]))
+
+
+def carry_out(vehicle: Vehicle, plan: list[tuple], readings: list[float]) -> np.ndarray:
+    """Commands and faults at their times, in between readings; the whole track."""
+    actions = [(entry[0], 0, place, entry) for place, entry in enumerate(plan)]
+    actions += [(t_s, 1, place, None) for place, t_s in enumerate(readings)]
+    for t_s, _, _, entry in sorted(actions, key=lambda action: action[:3]):
+        if entry is None:
+            vehicle.pose(t_s)
+        elif len(entry) == 2:
+            vehicle.command(t_s, *entry[1])
+        else:
+            vehicle.set_thruster(*entry)
+    vehicle.look_ahead(vehicle.last_row)
+    return vehicle.track
+
+
+@given(st.lists(commands | faults, max_size=8), st.lists(times, max_size=20))
+def test_reading_at_any_times_changes_no_bit(make_vehicle, plan, readings):
+    unread = carry_out(make_vehicle(duration_s=DURATION_S), plan, [])
+    read = carry_out(make_vehicle(duration_s=DURATION_S), plan, readings)
+    assert np.array_equal(unread, read)
+
+
+@given(st.lists(commands | faults, max_size=5), st.integers(0, 800))
+def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan, ahead):
+    foresighted = make_vehicle(duration_s=DURATION_S)
+    foresighted.control_listeners.append(lambda row, _: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
+    assert np.array_equal(carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, []))
+
+
+def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle):
+    vehicle, rows = make_vehicle(), []
+    vehicle.control_listeners.append(lambda row, _: rows.append(row))
+    vehicle.set_thruster(1.0, 2, "works")
+    vehicle.set_thruster(2.0, 2, "frozen")
+    vehicle.set_thruster(3.0, 2, "frozen")
+    assert rows == [row_at(2.0)]
+
+
+@given(st.integers(0, 10_000), st.floats(-0.49, 0.49))
+def test_a_time_belongs_to_the_nearest_row(row, offset):
+    assert row_at((row + offset) * STEP_S) == row
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
+def test_euler_angles_come_back_from_the_quaternion(roll, pitch, yaw):
+    assert euler_angles(np.array(quaternion(roll, pitch, yaw))) == pytest.approx((roll, pitch, yaw), abs=1e-6)
