@@ -144,14 +144,6 @@ def test_what_it_cannot_use_is_refused_and_changes_nothing(port, method, path, b
     assert request(port, "GET", "/monitor") == before
 
 
-def test_null_leaves_a_mode_as_it_is(port):
-    before = json.loads(request(port, "GET", "/monitor")[1])
-    keys = json.loads(request(port, "GET", "/execute_schema")[1])["properties"]
-    status, body = request(port, "PUT", "/execute", dict.fromkeys(keys))
-    assert status == 200 and json.loads(body) == {"time_s": before["time_s"], "is_over": False}
-    assert json.loads(request(port, "GET", "/monitor")[1]) == before
-
-
 @pytest.mark.parametrize(
     ("headers", "status"),
     [

@@ -114,12 +114,6 @@ def test_noise_makes_every_measurement_another_one():
     assert measured.values == [3.0, 4.0, 5.0, 6.0, 7.0]
 
 
-@pytest.mark.parametrize(("t_s", "expected_s"), [(0.0, 0.3), (0.3, 0.3), (0.31, 1.3), (7.0, 7.3)])
-def test_next_message_comes_changed_or_not(t_s, expected_s):
-    measured = SignalMeasurements.of("v", constant(2.0), 10.0, Timing(1.0, 0.3))
-    assert measured.next_message_s(t_s) == pytest.approx(expected_s)
-
-
 def test_signal_monitor_publishes_measurements_at_their_times(subscriber):
     measured = SignalMeasurements.of("current", step(1.0, 0.1, 0.4), 5.0, Timing(0.5, 0.2))
     subscriber.env.process(measured.publish(subscriber.env, subscriber.bus))
@@ -208,10 +202,6 @@ def battery_levels(subscriber: Subscriber, until_s: float, *recharged_s: float) 
 def test_battery_falls_by_a_two_hundredth_a_second(subscriber):
     levels = battery_levels(subscriber, 151.0)
     assert levels[:2] == [(0.5, 0.9975), (1.5, 0.9925)] and levels[-1] == (150.5, pytest.approx(0.2475))
-
-
-def test_an_empty_battery_stays_empty(subscriber):
-    assert battery_levels(subscriber, 300.0)[-1][1] == 0.0
 
 
 def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):
