@@ -73,12 +73,7 @@ def test_a_sampled_design_fills_each_range_evenly_and_repeats(method):
     for path, (low, high) in ranges.items():
         strata = [int((point[path] - low) / (high - low) * 16) for point in points]
         assert sorted(strata) == list(range(16))
-    assert points == [
-        Sweep(sample=Sample(method=method, points=16, ranges=ranges), seed=3).values(point) for point in range(16)
-    ]
-    assert points != [
-        Sweep(sample=Sample(method=method, points=16, ranges=ranges), seed=4).values(point) for point in range(16)
-    ]
+    assert points == sampled(3) != sampled(4)
 
 
 def test_perturbations_are_the_same_for_all_managers_and_points_and_within_their_bounds(tmp_path):

@@ -100,13 +100,6 @@ def test_a_client_goes_through_a_whole_mission_and_the_same_seed_gives_the_same_
     assert whole_mission(port, 3) == (first, metrics)
 
 
-def test_it_is_the_mission_of_that_run(port, simulator):
-    request(port, "POST", "/start", {"run": 5, "seed": 2})
-    request(port, "POST", "/advance", {"until_s": 1000})
-    found = json.loads(request(port, "GET", "/metrics")[1])
-    assert found["search_time_s"] == simulator.run("none", 5, 2).metrics.search_time_s
-
-
 def test_time_stands_still_until_a_client_says_so(port):
     assert request(port, "GET", "/monitor") == request(port, "GET", "/monitor")
     status, body = request(port, "POST", "/advance", {"advance_s": 2.5})

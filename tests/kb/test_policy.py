@@ -175,9 +175,6 @@ RULES = {
         " -> fd_realisability(fd_spiral_high, false)"
     ),
     "two attributes are compared": f"own: {OF_TWO} ^ lessThan(?v, ?w) -> fd_realisability(fd_spiral_high, false)",
-    "values of any attribute are compared with a number": (
-        "own: hasValue(?q, ?v) ^ greaterThan(?v, 3.4) -> fd_realisability(fd_spiral_medium, false)"
-    ),
     "values of any two are compared": (
         "own: hasValue(?q, ?v) ^ hasValue(?p, ?w) ^ greaterThan(?v, ?w) ^ isQAtype(?p, battery_level)"
         " -> fd_realisability(fd_spiral_low, false)"
