@@ -38,7 +38,7 @@ APART = (Revision, VehicleDescription, ManagerSettings, *SIGNALS, *DISTRIBUTIONS
 LONGEST_CHOICE = 4
 """So many words are listed; of more, those that are further metrics are a link."""
 LONGEST_DEFAULT = 80
-GENEROUS = 100.0
+GENEROUS = 6.1
 """Bounds from here on are not listed: they only catch slips."""
 BOUNDS = (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
 
