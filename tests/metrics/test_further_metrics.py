@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.metrics.coverage import covered_area_m2
-from suave_des.metrics.further import FurtherMetrics, measured_at_rows
+from suave_des.metrics.further import FurtherMetrics, covered_area_m2, measured_at_rows
 from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import FURTHER_METRICS, Requirement
