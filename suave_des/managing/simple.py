@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from functools import cache
-from itertools import count
 from typing import TYPE_CHECKING, ClassVar
 
+from suave_des.clock import until
 from suave_des.domain import (
     FOLLOW_PIPELINE,
     GENERATE_SEARCH_PATH,
@@ -200,16 +200,13 @@ class Oracle(Threshold):
 
     def _watch(self) -> AdaptationProcess:
         """Adapt whenever the true visibility crosses a threshold."""
-        env = self.system.env
-        reached = self._thresholds_reached(0.0)
-        for step in count(1):
-            t_s = step * _LOOK_PERIOD_S
-            if (now_reached := self._thresholds_reached(t_s)) != reached:
-                reached = now_reached
-                yield env.timeout(t_s - env.now)
+        scenario, reached = self.system.scenario, self._thresholds_reached(0.0)
+        longest_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        for look in range(1, int(longest_s / _LOOK_PERIOD_S) + 1):
+            before, reached = reached, self._thresholds_reached(look * _LOOK_PERIOD_S)
+            if reached != before:
+                yield until(self.system.env, look * _LOOK_PERIOD_S)
                 self.adapt()
-            elif step % 1000 == 0:  # or the search for the next crossing would go on beyond the mission's end
-                yield env.timeout(t_s - env.now)
 
     def _thresholds_reached(self, t_s: float) -> int:
         visibility_m = self._visibility_m(t_s)

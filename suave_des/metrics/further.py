@@ -94,18 +94,12 @@ class FurtherMetrics:
                 return self._operational_thrusters(now_s)
             case "area_covered_m2":
                 return self._area_covered_m2(now_s)
-            case "battery_level":
-                return self._battery.level(now_s)
-            case "recharges":
-                return self._battery.recharges
+            case "battery_level" | "recharges":
+                battery = self.measurements[BATTERY_LEVEL]
+                assert isinstance(battery, BatteryMeasurements)
+                return battery.level(now_s) if metric == "battery_level" else battery.recharges
         noted: MetricValue = getattr(self, metric)
         return noted
-
-    @property
-    def _battery(self) -> BatteryMeasurements:
-        battery = self.measurements[BATTERY_LEVEL]
-        assert isinstance(battery, BatteryMeasurements)
-        return battery
 
     def _operational_thrusters(self, now_s: float) -> float:
         """Compute the mean over mission time of the number of thrusters that work."""
