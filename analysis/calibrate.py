@@ -12,16 +12,15 @@ import argparse
 import csv
 import json
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from calibration.cases import FOLDER, Case, FreeParameter, Problem, fitted_scenario, read_cases, read_problem
-from calibration.fit import FINAL_FACTOR, Profile, fit, larger, profiles, select
-from calibration.loss import Evaluation, Judgement, evaluate, judge, resampling_spread
+from calibration.cases import FOLDER, FreeParameter, Problem, fitted_scenario, read_cases, read_problem
+from calibration.fit import FINAL_FACTOR, Profile, fit, profiles, select
+from calibration.loss import Evaluation, evaluate, resampling_spread
 from suave_des import InputError
 from suave_des.results import style
 
@@ -30,18 +29,6 @@ LOSS = (
     " time / 40 s, distance inspected / 12 m, x of detection / 1.5 m), plus the mean absolute difference of the shares"
     " in clusters"
 )
-
-
-def halves_of(cases: Sequence[Case], numbers: Sequence[int] | None) -> list[tuple[Case, Case | None]]:
-    """Split each case into the conditions to fit and the others; none of a case without conditions, or of all."""
-    if numbers is None:
-        return [(case, None) for case in cases]
-    return [
-        (case.only(numbers), case.only([each for each in case.conditions if each not in numbers]))
-        if case.has_conditions
-        else (case, None)
-        for case in cases
-    ]
 
 
 def table(found: Sequence[Profile]) -> list[list[object]]:
@@ -86,12 +73,7 @@ def _title(parameter: FreeParameter) -> str:
 
 
 def record(
-    problem: Problem,
-    tried: Sequence[Evaluation],
-    best: Evaluation,
-    spread: float,
-    found: Sequence[Profile],
-    judged: Mapping[str, Mapping[str, Judgement]],
+    problem: Problem, tried: Sequence[Evaluation], best: Evaluation, spread: float, found: Sequence[Profile]
 ) -> dict[str, Any]:
     """Return everything about a fit as plain data, for calibration.json."""
     return {
@@ -122,24 +104,11 @@ def record(
             for one in found
         },
         "history": [round(each.loss, 5) for each in tried],
-        "conditions": {
-            name: {
-                half: {
-                    "conditions": list(each.conditions),
-                    "loss": round(each.loss, 5),
-                    "median_difference_of_search_times_s": round(each.median_difference_s, 3),
-                }
-                for half, each in both.items()
-            }
-            for name, both in judged.items()
-        },
     }
 
 
-def show(
-    problem: Problem, best: Evaluation, found: Sequence[Profile], judged: Mapping[str, Mapping[str, Judgement]]
-) -> None:
-    """Print the loss of each scenario, the parameters, and how well conditions are met that were not fitted."""
+def show(problem: Problem, best: Evaluation, found: Sequence[Profile]) -> None:
+    """Print the loss of each scenario, and the parameters."""
     missions = problem.runs * FINAL_FACTOR
     print(f"\nloss {best.loss:.4f} with {missions} missions for each manager, with fresh random numbers")
     for case, loss in zip(problem.cases, best.cases, strict=True):
@@ -147,11 +116,6 @@ def show(
     admitted = {one.parameter.name: f"   {one.low:8.3f} to {one.high:.3f}" for one in found}
     for each, value in zip(problem.parameters, best.values, strict=True):
         print(f"{each.name:60s} {value:8.3f}{admitted.get(each.name, '')}")
-    for name, both in judged.items():
-        print(f"\n{f'Conditions of {name}':40s}  loss   median difference, search time")
-        for half, one in both.items():
-            listed = f"{half}: {', '.join(map(str, one.conditions))}"
-            print(f"{listed:38s} {one.loss:7.4f} {one.median_difference_s:7.2f} s")
 
 
 def options() -> argparse.Namespace:
@@ -163,7 +127,6 @@ def options() -> argparse.Namespace:
     )
     parser.add_argument("--parameters", metavar="FILE", help="free parameters; default: the scenario's, or shared")
     parser.add_argument("--managers", metavar="NAME,...", help="default: all in the data")
-    parser.add_argument("--fit-conditions", metavar="N,...", help="fit these conditions, judge on the others")
     parser.add_argument("--runs", type=int, default=150, help="missions for each manager and evaluation (default: 150)")
     parser.add_argument("--evaluations", type=int, default=500, help="sets of values to try (default: 500)")
     parser.add_argument("--no-profile", action="store_true", help="do not vary each parameter about the fit")
@@ -180,9 +143,6 @@ def main() -> None:
     own = cases[0].name if len(cases) == 1 and (FOLDER / f"{cases[0].name}.yaml").is_file() else None
     several = "shared" if len(cases) > 1 else "seams2023"
     problem = read_problem(chosen.parameters or own or several, cases, chosen.runs, chosen.seed)
-    numbers = [int(word) for word in chosen.fit_conditions.split(",")] if chosen.fit_conditions else None
-    halves = halves_of(problem.cases, numbers)
-    problem = replace(problem, cases=tuple(fitted for fitted, _ in halves))
     for note in dict.fromkeys(note for case in cases for note in case.notes):
         print(note)
     tried = fit(
@@ -202,20 +162,13 @@ def main() -> None:
     here = evaluate(problem, best.values)  # the profiles are computed with the search's own streams
     threshold = here.loss + spread
     found = [] if chosen.no_profile else profiles(problem, here, threshold, chosen.workers)
-    judged = {
-        fitted.name: {
-            half: judge(larger(problem), case, best.values) for half, case in (("fitted", fitted), ("held out", others))
-        }
-        for fitted, others in halves
-        if others is not None
-    }
-    text = json.dumps(record(problem, tried, best, spread, found, judged), indent=2)
+    text = json.dumps(record(problem, tried, best, spread, found), indent=2)
     (chosen.out / "calibration.json").write_text(text + "\n", encoding="utf-8")
     if found:
         with (chosen.out / "parameters.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(table(found))
         draw_profiles(found, here, threshold).savefig(chosen.out / "profiles.png", dpi=160)
-    show(problem, best, found, judged)
+    show(problem, best, found)
     print(f"\nThe fitted scenarios and the record are in {chosen.out}")
 
 

@@ -77,7 +77,8 @@ class CampaignKeys(Strict):
     runs_per_draw: Annotated[Whole, Field(ge=1, le=RUNS_LIMIT)] = 1
     """Number of consecutive runs that share a draw."""
     ensemble: Annotated[str | None, Option("FILE")] = None
-    """File of parameter sets, of which each run has one, or the name of a shipped one."""
+    """CSV file of parameter sets that fit the real runs equally well, of which each run has one, or the name of a
+    shipped one, such as seams2023."""
 
 
 class CampaignSettings(CampaignKeys):
@@ -96,21 +97,21 @@ class CampaignSpec(CampaignKeys):
     """
 
     scenario: str
-    """A scenario or campaign file, or a shipped scenario."""
+    """A scenario or campaign file, or the name of a shipped scenario."""
     replacements: dict[str, Any] = Field(default_factory=dict)
     """What replaces the scenario's own files and values, as of load_scenario."""
     suave_format: bool = False
     """Write the exemplar's own results files, too."""
     record_knowledge: bool = False
-    """Record knowledge states for `kb try`."""
+    """Record the knowledge states that managers analysed, in knowledge_states.jsonl, for `kb try`."""
     out: Annotated[Path | None, Option("DIR")] = None
-    """Folder for result files."""
+    """Folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists."""
     workers: Annotated[Whole | None, Field(ge=1, le=WORKERS_LIMIT), Option(default="2, or 1 for few missions")] = None
-    """Worker processes."""
+    """Worker processes; results do not depend on the number."""
     scheduler: Annotated[Annotated[str, AfterValidator(_address)] | None, Option("tcp://HOST:PORT")] = None
-    """Run missions on the workers of this Dask scheduler."""
+    """Run missions on the workers of this Dask scheduler; results are the same."""
     overwrite: bool = False
-    """Replace earlier results in the output folder."""
+    """Replace results of the same kind in the output folder."""
     command: tuple[str, ...] = ()
     """The command line, for the manifest."""
     folder: str = ""

@@ -22,6 +22,7 @@ from suave_des.domain import (
 )
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.scenario.quantities import draw
 
 
 @dataclass(eq=False)
@@ -97,7 +98,7 @@ class BehaviourTree(ManagingSubsystem):
         super().__init__(system)
         self._settings = system.scenario.managers.bt
         self.period_s = self._settings.tick_period_s
-        self.starts_s = system.first_tick_s("bt", self.period_s)
+        self.starts_s = draw(self._settings.first_tick_s, system.stream("bt/phase"))
         self._failed: set[str] = set()
         self._logged = ""
         self.root = self.make_tree()

@@ -44,6 +44,7 @@ from suave_des.scenario.quantities import (
     Period,
     Real,
     Strict,
+    Uniform,
     Within,
     mean,
     support,
@@ -76,14 +77,14 @@ class FunctionSettings(Strict):
     model_config = ConfigDict(extra="allow")
 
     node: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*(:[A-Za-z_]\w*)?$")]
-    """Its class, as module:Class or by the name that a package registers."""
+    """Class of the function's node, as module:Class, or the name under which a package registers it."""
 
 
 class MissionSettings(Strict):
     """The coordinator's time limit, and further functions that its tasks need."""
 
     time_limit_s: Annotated[Real, Field(gt=0, le=_LONGEST_MISSION_S)] = 300.0
-    """Time at which the mission ends."""
+    """Time at which the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
     """Functions needed in addition to the exemplar's."""
 
@@ -94,55 +95,55 @@ class Latencies(Strict):
     task_start_s: DelayDistribution = 0.0
     """From guided mode to the request of the first task."""
     search_start_s: DelayDistribution = 0.0
-    """From the activation of the search to its first set-point; drawn once per run."""
+    """From the first activation of the search to its first set-point; drawn once per run."""
     mode_change_s: DelayDistribution = 0.0
     """From the mode manager's answer until the mode takes effect."""
     inference_s: DelayDistribution = 1.0
-    """One analyze and plan step."""
+    """One analyze and plan step (stock Pellet starts a Java virtual machine for each)."""
 
 
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources do not give, the same for every manager."""
 
     position_gain_per_s: Annotated[Real, Field(gt=0, le=100)] = 1.0
-    """Horizontal velocity for each metre of position error."""
+    """Horizontal velocity demanded for each metre of position error; ArduSub's default."""
     jerk_m_per_s3: Annotated[Real, Field(gt=0, le=1000)] = 0.5
-    """Jerk of the autopilot's target on its way to a set-point."""
+    """Jerk with which the autopilot's target moves along a leg to a set-point."""
     velocity_gain_per_s: Annotated[Real, Field(gt=0, le=10)] = 4.0
-    """Horizontal acceleration for each m/s of velocity error."""
+    """Horizontal acceleration demanded for each m/s of velocity error."""
     velocity_integral_gain_per_s2: Annotated[Real, Field(ge=0, le=10)] = 1.2
-    """Horizontal acceleration for each metre of the integrated velocity error."""
+    """Horizontal acceleration demanded for each metre of the integrated velocity error; reset at each new leg."""
     heading_frequency_rad_per_s: Annotated[Real, Field(gt=0, le=10)] = 4.5
     """Natural frequency of heading control."""
     heading_integral_gain_per_s3: Annotated[Real, Field(ge=0, le=100)] = 0.0
-    """Angular acceleration for each rad s of the integrated heading error."""
+    """Angular acceleration demanded for each rad s of the integrated heading error."""
     altitude_error_m: OffsetDistribution = 0.0
-    """Steady error of the altitude, of unknown cause."""
+    """Steady error, of unknown cause, that is added to the set-point of the altitude."""
     drift_x_m: CoordinateDistribution = 0.0
-    """Drift to the east before guided mode."""
+    """Offset to the east from the start to where guided mode begins."""
     drift_y_m: CoordinateDistribution = 0.0
     """The same, north."""
     origin_x_m: OffsetDistribution = 0.0
-    """Offset to the east from there to the spiral's centre."""
+    """Offset to the east from there to the local frame's origin, the spiral's centre."""
     origin_y_m: OffsetDistribution = 0.0
     """The same, north."""
     real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock."""
     reasoning_slowdown: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
-    """Additional loss while the reasoner runs."""
+    """Additional loss while the reasoner runs, spread over the mission by its share of metacontrol's period."""
 
 
 class ReactionMetric(Strict):
     """Definition of a reaction in revision 1.5 (its metrics node)."""
 
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """In descending order; the first that is reached decides which altitude is expected."""
+    """In descending order; the first that is reached decides which altitude fits."""
     expected_altitudes_m: tuple[Number, ...] = (3.0, 2.0, 1.0)
-    """Altitude for each threshold."""
+    """Fitting altitude for each threshold."""
     battery_limit: Number = 0.25
-    """Battery level below which the vehicle should recharge."""
+    """Battery level below which the recharge path is expected to become active."""
     undone_within_s: Duration = 4.0
-    """An adaptation reverted within this time counts as undone."""
+    """An adaptation that is reverted within this time counts as undone."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -158,15 +159,15 @@ class KnowledgeSettings(Strict):
     """The knowledge base."""
 
     ontologies: Annotated[tuple[FileName, ...], Field(min_length=1)] = ("suave.owl",)
-    """Ontology files."""
+    """Ontology files; what they import is resolved through the catalogue beside them."""
     rules: tuple[FileName, ...] = ()
-    """Files of rules as text; a rule replaces those of the same name in the ontologies."""
+    """Files of rules as text; a rule replaces the rules of the same name in the ontologies."""
     disabled_rules: tuple[Name, ...] = ()
     """Names of rules to disable."""
     values: dict[str, Number] = Field(default_factory=dict)
-    """New hasValue of individuals, such as qa_water_visibility_low: 0.5."""
+    """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
     reasoner: ReasonerName = "cached"
-    """Reasoner for analyze; owlready2 is slow."""
+    """The reasoner for analyze; owlready2 is the reference, but slow."""
 
 
 def paired(part: Strict, one: str, other: str) -> None:
@@ -195,14 +196,16 @@ class BehaviourTreeSettings(Strict):
 
     tick_period_s: Period = 0.1
     """Period at which the tree is ticked."""
+    first_tick_s: DelayDistribution = Uniform(distribution="uniform", minimum=0.0, maximum=0.1)
+    """When it is first ticked."""
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """Minimum visibility for each of search_modes."""
+    """Minimum visibility for each of search_modes; the first threshold that is reached decides."""
     search_modes: tuple[str, ...] = ("fd_spiral_high", "fd_spiral_medium", "fd_spiral_low")
-    """Search modes."""
+    """Search modes, one for each threshold."""
     battery_limit: Number = 0.25
-    """Battery level below which bt_extended recharges."""
+    """Battery level below which the extended tree goes to recharge."""
     records_ticks: bool = False
-    """Whether the timeline has each tick with a new outcome."""
+    """Whether the timeline has each tick whose outcome differs from the previous one's."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -275,11 +278,11 @@ class Requirement(Strict):
     """
 
     metric: Metric | None = None
-    """A metric."""
+    """The metric that it is about."""
     attribute: str | None = None
-    """Instead, a measured quality attribute; satisfaction is the mean over time."""
+    """Instead of that, a measured quality attribute; satisfaction is the mean over mission time."""
     relation: Literal["at_least", "at_most", "close_to"]
-    """Required relation of the value to that below."""
+    """RELAX's AS MANY, AS FEW (or EARLY), AS CLOSE AS POSSIBLE; SHALL without tolerance."""
     value: Number
     """The required value."""
     tolerance: NotNegative = 0.0
@@ -309,7 +312,7 @@ class Scenario(Strict):
     """One mission's world, vehicle, software and knowledge."""
 
     name: Name
-    """Name in result files; by default that of the file."""
+    """Name in result files; by default that of the file without its extension."""
     description: str = ""
     """For people."""
     revision: Revision
@@ -317,7 +320,7 @@ class Scenario(Strict):
     vehicle: VehicleDescription
     """Body, thrusters and camera; in a file by default `bluerov2`."""
     mission: MissionSettings = MissionSettings()
-    """Time limit, and further functions that the tasks need."""
+    """The coordinator's time limit, and further functions that its tasks need."""
     start: Start = Start()
     """Pose before the drift; each component is drawn once per run."""
     pipeline: Pipeline = Pipeline()
@@ -327,21 +330,21 @@ class Scenario(Strict):
     signals: dict[Name, SignalDescription]
     """Measured signals, by quality attribute; water_visibility (m) is required."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
-    """Failures and recoveries, in order; also as in the exemplar: "(1,failure,35)"."""
+    """Failures and recoveries, in order; also as the exemplar writes them: "(1,failure,35)"."""
     thruster_monitor: Monitor = Monitor()
     """Faults of the thruster monitor; the battery and each signal have the same keys."""
     battery: Battery | None = None
     """The battery: falls linearly from 1.0, and is recharged at once near the station."""
     leak: Leak | None = None
-    """The vehicle abandons its tasks and surfaces. Needs f_surface in modes file and ontology."""
+    """A leak: the vehicle abandons its tasks and surfaces. Needs f_surface in the modes file, and designs for it."""
     latencies: Latencies = Latencies()
     """Mission time that the software takes, drawn at every occurrence."""
     calibration: Calibration = Calibration()
-    """Fitted parameters, drawn once per run."""
+    """Parameters that the sources do not give, the same for every manager; drawn once per run."""
     modes_file: FileName = "suave_modes.yaml"
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
-    """Mode that the manager none sets, by function."""
+    """Mode that the manager none sets, by function; functions that are not listed keep their default."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
     """User-defined functions, by their name in the modes file."""
     knowledge: KnowledgeSettings = KnowledgeSettings()
@@ -353,8 +356,9 @@ class Scenario(Strict):
     metrics: Metrics = ()
     """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
-    """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15,
-    2010). The column requirement_NAME falls from 1 to 0 where the value is off by the tolerance."""
+    """Requirements that may be partially satisfied, by name, as in RELAX (Whittle et al., Requirements Engineering 15,
+    2010). The column requirement_NAME is 1 if the value is as required, and falls linearly to 0 when it is off by the
+    tolerance."""
 
     @field_validator("signals", mode="after")
     @classmethod

@@ -92,13 +92,13 @@ def test_a_wrong_parameter_file_is_refused(both, tmp_path, entry, words):
     assert str(file) in str(raised.value)
 
 
-def test_the_program_writes_fitted_scenarios_and_judges_conditions_that_were_held_out(tmp_path):
+def test_the_program_writes_fitted_scenarios(tmp_path):
     free = f"free:\n  - {{path: {JERK}, lower: 0.3, upper: 1.0}}\n"
     free += "  - {path: calibration.altitude_error_m.mean, lower: 0.1, upper: 1.2, scenarios: [mine]}\n"
     (tmp_path / "free.yaml").write_text(free)
     (tmp_path / "mine.yaml").write_text("base: seams2023\nmission: {time_limit_s: 250}\n")
     words = ["mine.yaml", BOTH[1], "--data", "mine=seams2023_runs.csv", "--parameters", "free.yaml", "--runs", "2"]
-    few = ["--evaluations", "2", "--managers", "none", "--workers", "1", "--fit-conditions", "2,4", "--out", "fit"]
+    few = ["--evaluations", "2", "--managers", "none", "--workers", "1", "--out", "fit"]
     ended = python(FOLDER / "calibrate.py", *words, *few, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     names = {"fitted_mine.yaml", "fitted_planta_exp1.yaml", "parameters.csv", "calibration.json", "profiles.png"}
@@ -107,9 +107,6 @@ def test_the_program_writes_fitted_scenarios_and_judges_conditions_that_were_hel
     record = json.loads((tmp_path / "fit" / "calibration.json").read_text())
     assert cases.value_at(fitted, JERK) == round(record["fitted"][JERK], 3)
     assert fitted.scenario.mission.time_limit_s == 250
-    halves = record["conditions"]["planta_exp1"]
-    assert [halves[half]["conditions"] for half in ("fitted", "held out")] == [[2, 4], [1, 3, 5, 6]]
-    assert "held out: 1, 3, 5, 6" in ended.stdout
 
 
 @pytest.mark.parametrize("place", [0, 1])

@@ -35,12 +35,12 @@ def diff(
     mission_options: MissionOptions,
     one: Annotated[
         Path,
-        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add."),
+        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add to the ontologies."),
     ],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
     max_failed: MaxFailed = 2,
 ) -> None:
-    """Compare two ontologies, or two sets of rules: axioms, decisions, missions.
+    """Show what differs between two ontologies, or two sets of rules: axioms, decisions, and missions.
 
     --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
     scenario's. Decisions are compared in every state; missions with the same number use common random numbers.

@@ -30,11 +30,13 @@ _LONG_S = 5.0
 
 TimeLimitS = Annotated[
     float,
-    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s."),
+    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit of the reasoner for a state, in seconds."),
 ]
 MaxFailed = Annotated[
     int,
-    typer.Option("--max-failed", min=0, metavar="N", help="States with up to N components failed or recovered."),
+    typer.Option(
+        "--max-failed", min=0, metavar="N", help="Include states with up to N components failed or recovered."
+    ),
 ]
 
 
@@ -47,7 +49,7 @@ class KnowledgeOptions(KnowledgeFiles):
         typer.Option(
             "--scenario",
             metavar="SCENARIO",
-            help="Scenario with the knowledge base.",
+            help="Scenario that provides ontologies, values, measured attributes and revision.",
         ),
     ] = DEFAULT_SCENARIO
 
@@ -91,8 +93,8 @@ At = Annotated[
     typer.Option(
         "--at",
         metavar="WHAT",
-        help="Part of the state: NAME=VALUE, a FUNCTION with an objective, a YAML file, or FOLDER@SECONDS of a "
-        "mission; repeatable.",
+        help="Part of the state: NAME=VALUE of a quality attribute, a component or a function; a FUNCTION that has an "
+        "objective; a YAML file; or FOLDER@SECONDS of a recorded mission. Repeat it for several.",
     ),
 ]
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
-OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak is the previous version.")]
+OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; the previous version is kept as FILE.bak.")]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
 
 
@@ -47,7 +47,7 @@ def check(
     time_limit: TimeLimitS = 60.0,
     form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = FindingsFormat.TEXT,
 ) -> None:
-    """Check ontologies and rules.
+    """Check ontologies and rules: names, arguments, variables, model, shapes, contradictions.
 
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
@@ -103,7 +103,7 @@ def add_rule(
     file: OwlFile,
     rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')],
 ) -> None:
-    """Add a rule, or those of a file, to an OWL file; nothing else changes."""
+    """Add a rule, or the rules of a file, to an OWL file, and leave everything else in it as it is."""
     from suave_des.kb.rule_editor import add_rules
 
     names = [added.name for added in add_rules(file, rule)]
@@ -112,7 +112,7 @@ def add_rule(
 
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
-    """Remove a rule from an OWL file; nothing else changes."""
+    """Remove a rule from an OWL file, and leave everything else in it as it is."""
     from suave_des.kb.rule_editor import remove_rule as remove
 
     remove(file, name)
@@ -145,7 +145,7 @@ def try_(
         typer.Option(
             "--on",
             metavar="DIR",
-            help="Folder of run, of a campaign that recorded its knowledge, or of such folders.",
+            help="Output folder of run, or of a campaign that recorded its knowledge, or a folder of such folders.",
         ),
     ],
     rule: Annotated[
@@ -156,7 +156,7 @@ def try_(
     ] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:
-    """Show when a rule would have fired in recorded missions, and what it would have changed.
+    """Show when a rule would have fired in recorded missions, and which decisions would have been different.
 
     No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
     the consequences of a different decision.
