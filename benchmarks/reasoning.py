@@ -25,7 +25,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from suave_des.kb import KnowledgeBase
+from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState

@@ -67,15 +67,8 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
         is_known = has_level(findings, Level.ERROR)
         return ordered([*findings, Finding(Level.INFO, message) if is_known else Finding.of(error)])
-    findings = [*findings_in(base, subject), *_without_rules(base, subject), *check_shapes(base.sources)]
+    findings = [*findings_in(base, subject), *check_shapes(base.sources)]
     return ordered([*findings, *_ask_pellet(subject, base, findings)])
-
-
-def _without_rules(base: Ontology, subject: Subject) -> Iterator[Finding]:
-    files = {rule.file for rule in (*base.rules, *(old for old, _ in base.content.replaced))}
-    for path in subject.rules:
-        if path not in files:
-            yield Finding(Level.INFO, "there is no rule in this file", file=str(path))
 
 
 def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> Iterator[Finding]:

@@ -1,7 +1,7 @@
 """What tests cover of the rules: whether each rule fired, each atom held and failed, and how values compared.
 
 All of it is asked of Pellet, with rules that have the beginning of a rule's body as their body. What no state of the
-model reaches is told apart, and the least set of states that covers the rest is found among the states of the policy.
+model reaches is told apart, and few states that cover the rest are found among the states of the policy.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
-from suave_des.errors import number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import Body, Probes, testable_order
 from suave_des.kb.space import Situation, States
@@ -20,8 +19,6 @@ from suave_des.knowledge.state import KnowledgeState
 from suave_des.tables import Table
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
-#: Goals that no state reaches, on a terminal.
-_GOALS_SHOWN: Final = 8
 #: How the values of a comparison can relate, with the sign that says so and words for it.
 ORDERS: Final[Mapping[str, tuple[str, str]]] = {
     "less": ("<", "with the first value less than the second"),
@@ -97,15 +94,13 @@ class Coverage(NamedTuple):
         goals: all goals.
         covered: number of situations that cover each goal; none if it is missing.
         missing: goals that no situation covers, but that a state of the model reaches; further ones nothing reaches.
-        proposed: the least set of states that would cover what is missing, each with what it would add.
-        states: number of kinds of states that were looked at for that.
+        proposed: states that would cover what is missing, few ones, each with what it would add.
     """
 
     goals: tuple[Goal, ...]
     covered: Counter[Goal]
     missing: frozenset[Goal]
     proposed: tuple[tuple[KnowledgeState, tuple[Goal, ...]], ...]
-    states: int
 
     @property
     def unreachable(self) -> frozenset[Goal]:
@@ -127,21 +122,14 @@ class Coverage(NamedTuple):
         title = f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
         return Table(("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll")
 
-    def lines(self, max_failed: int) -> Iterator[str]:
+    def lines(self) -> Iterator[str]:
         """What is missing, and states that would cover it."""
         if self.missing:
             yield "not covered"
             yield from (f"  {goal}" for goal in sorted(self.missing))
-        if unreachable := sorted(self.unreachable):
-            components = number_of(max_failed, "component")
-            words = f"of {self.states} kinds of states of this model, with at most {components} reporting"
-            yield f"not reached in any state ({words}), but facts in a test may reach it"
-            yield from (f"  {goal}" for goal in unreachable[:_GOALS_SHOWN])
-            if len(unreachable) > _GOALS_SHOWN:
-                yield f"  and {len(unreachable) - _GOALS_SHOWN} more"
         if self.proposed:
             count = len(self.proposed)
-            yield f"a smallest set of states that would cover the rest: {count} (write them as tests with --write FILE)"
+            yield f"states that would cover the rest: {count} (write them as tests with --write FILE)"
             for state, goals in self.proposed:
                 yield f"  {state}"
                 yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
@@ -164,35 +152,20 @@ def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], 
     covered = Counter(goal for each in dict.fromkeys(situations) for goal in covering(each))
     left = [each for each in questions if each.goal not in covered]
     found: dict[frozenset[Goal], KnowledgeState] = {}  # one state for each different set of goals
-    states = 0
     if left:
         covering = _covering(knowledge, left)
-        every = States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space)
-        states = len(every)
-        for state in every:
+        for state in States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space):
             found.setdefault(covering(Situation(state)), state)
     candidates = {state: goals for goals, state in found.items() if goals}
-    proposed = tuple((state, tuple(sorted(candidates[state]))) for state in least_cover(candidates))
+    proposed = tuple((state, tuple(sorted(candidates[state]))) for state in small_cover(candidates))
     goals = tuple(sorted({each.goal for each in questions}))
-    return Coverage(goals, covered, frozenset[Goal]().union(*candidates.values()), proposed, states)
+    return Coverage(goals, covered, frozenset[Goal]().union(*candidates.values()), proposed)
 
 
-def least_cover(candidates: Mapping[KnowledgeState, frozenset[Goal]]) -> Sequence[KnowledgeState]:
-    """Find a set of states, as few as possible, that together cover all that any of them covers.
-
-    Source: set cover as an integer program, solved by scipy.optimize.milp (HiGHS).
-    """
-    goals = sorted(frozenset[Goal]().union(*candidates.values()))
-    if not goals:
-        return []
-    import numpy as np
-    from scipy.optimize import Bounds, LinearConstraint, milp
-
-    states = list(candidates)
-    matrix = np.array([[float(goal in candidates[state]) for state in states] for goal in goals])
-    # Among sets of the same size the one whose states come first in the policy: simpler states do.
-    cost = 1 + np.arange(len(states)) / (len(states) + 1) ** 2
-    result = milp(
-        cost, integrality=np.ones(len(states)), bounds=Bounds(0, 1), constraints=LinearConstraint(matrix, lb=1)
-    )
-    return [state for state, taken in zip(states, result.x, strict=True) if taken > 0.5]
+def small_cover(candidates: Mapping[KnowledgeState, frozenset[Goal]]) -> list[KnowledgeState]:
+    """Find few states that together cover all that any of them covers: each next one covers most of what is left."""
+    left, chosen = set[Goal]().union(*candidates.values()), list[KnowledgeState]()
+    while left:
+        chosen.append(max(candidates, key=lambda state: len(candidates[state] & left)))
+        left -= candidates[chosen[-1]]
+    return chosen

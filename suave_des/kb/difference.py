@@ -5,7 +5,7 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -36,17 +36,14 @@ _MOST_RUNS: Final = 10
 _PLACES: Final = ("initial_", "detection_")
 
 
-class AxiomDifference(NamedTuple):
-    """Axioms and rules that only the first of two knowledge bases has, and those that only the second has, as text."""
+def compare_axioms(one: Ontology, other: Ontology) -> tuple[list[str], list[str]]:
+    """Compare the axioms, facts and rules of two knowledge bases; labels and comments do not count.
 
-    removed: tuple[str, ...]
-    added: tuple[str, ...]
-
-
-def compare_axioms(one: Ontology, other: Ontology) -> AxiomDifference:
-    """Compare the axioms, facts and rules of two knowledge bases; labels and comments do not count."""
+    Returns:
+        as text, what only the first has, and what only the second has.
+    """
     before, after = frozenset(_axioms(one)), frozenset(_axioms(other))
-    return AxiomDifference(tuple(sorted(before - after)), tuple(sorted(after - before)))
+    return sorted(before - after), sorted(after - before)
 
 
 def _axioms(base: Ontology) -> Iterator[str]:
@@ -140,8 +137,17 @@ class PolicyDifference:
     def _ranges(self, cells: pandas.DataFrame) -> Iterator[str]:
         """The ranges of measured values, neighbours joined, and the number of states in each."""
         names, scale = list(self.space.attributes), self.space.scale
-        for row in joined(cells, names).to_dict("records"):
-            spans = {name: (row[f"{name}_first"], row[f"{name}_last"]) for name in names}
+        found: Any = cells.assign(all=0).groupby(["all", *names], as_index=False)["states"].sum()
+        found = found.assign(**{f"{name}_last": found[name] for name in names})
+        for name in reversed(names):
+            last = f"{name}_last"
+            others = [each for each in found if each not in (name, last, "states")]
+            found = found.sort_values([*others, name])
+            is_next = (found[others] == found[others].shift()).all(axis=1) & (found[name] == found[last].shift() + 1)
+            ends = {**dict.fromkeys(found, "first"), last: "last", "states": "sum"}
+            found = found.groupby((~is_next).cumsum()).agg(ends)
+        for row in found.sort_values(["all", *names]).to_dict("records"):
+            spans = {name: (row[name], row[f"{name}_last"]) for name in names}
             words = [
                 f"{name} {scale.text(*span)}" if len(names) > 1 else scale.text(*span)
                 for name, span in spans.items()
@@ -170,25 +176,6 @@ def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
         functions=functions,
         no_proof=tuple(dict.fromkeys((*one.no_proof, *other.no_proof))),
     )
-
-
-def joined(cells: pandas.DataFrame, attributes: Sequence[str]) -> pandas.DataFrame:
-    """Join neighbouring places of measured values.
-
-    Returns:
-        `states` of each range, with its `_first` and `_last` place of each attribute, ascending.
-    """
-    ends = [f"{name}_{end}" for name in attributes for end in ("first", "last")]
-    found: Any = cells[["states"]].assign(all=0, **{end: cells[end.rpartition("_")[0]] for end in ends})
-    for name in reversed(attributes):
-        first, last = f"{name}_first", f"{name}_last"
-        same = ["all", *(end for end in ends if end not in (first, last))]
-        found = found.groupby([*same, first, last], as_index=False)["states"].sum()
-        found["run"] = (found[first] != found.groupby(same)[last].shift() + 1).cumsum()
-        ranges = found.groupby([*same, "run"], as_index=False)
-        found = ranges.agg(**{first: (first, "min"), last: (last, "max"), "states": ("states", "sum")})
-    joined_ranges: pandas.DataFrame = found.groupby(["all", *ends], as_index=False)["states"].sum()
-    return joined_ranges
 
 
 class PairedDifference(NamedTuple):

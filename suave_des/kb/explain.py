@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.kb.matching import with_bindings
 from suave_des.kb.states import FactReader
 from suave_des.kb.tracing import Derivation, Tracer
-from suave_des.kb.why_not import RuleQuestions, WhyNot
+from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, facts_of, local_name, value_of
 from suave_des.knowledge.state import (
-    NO_GROUNDING,
     Decision,
     Fact,
     Reasoning,
@@ -27,7 +25,7 @@ from suave_des.knowledge.state import (
 
 #: Rules that are named for a fact that does not follow.
 NEAREST: Final = 3
-_WHY: Final = re.compile(r"why\s+(not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
+_WHY: Final = re.compile(r"why\s+(?:not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
 _FORMS: Final = (
     'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
 )
@@ -139,7 +137,7 @@ def explain(base: Ontology, question: str, reasoning: Reasoning, pellet: InProce
         raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
     explainer = _Explainer(base, reasoning, Tracer(base, reasoning.inference.state, pellet))
     if why:
-        return Explanation(decisions=(explainer.design(why.group(2), wanted=why.group(1) is None),))
+        return Explanation(decisions=(explainer.design(why.group(1)),))
     if question:
         return Explanation((explainer.fact(question),))
     inferred = sorted(reasoning.inference.facts, key=str)
@@ -170,52 +168,39 @@ class _Explainer:
         texts = sorted(value_text(value_of(value, self.base.names)) for value in values)
         name = "type" if triple[1] == RDF_TYPE else local_name(triple[1])
         near = RuleQuestions(self.base).missing(triple, self.tracer.state)
-        remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}", *map(_near_rule, near[:NEAREST])]
+        remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}"]
+        remedies += (f"rule {each}" for each in near[:NEAREST])
         raise InputError(f"{fact} does not follow in this state", remedy="; ".join(remedies))
 
-    def design(self, design: str, *, wanted: bool) -> DecisionExplanation:
-        """Why, or why not, a function design."""
-        functions = [name for name in self.base.functions if design in self.base.designs(name)]
-        if not functions:
+    def design(self, design: str) -> DecisionExplanation:
+        """What becomes of a function design, and why."""
+        function = next((name for name in self.base.functions if design in self.base.designs(name)), None)
+        if function is None:
             known = [each for name in self.base.functions for each in self.base.designs(name)]
             raise InputError(f"there is no function design {shown(design)}", remedy=did_you_mean(design, known))
-        function, state = functions[0], self.reasoning.inference.state
         for decision in self.reasoning.plan.decisions:
             if decision.function == function:
-                return self.decision(decision, design, wanted=wanted)
-        if function not in {each.function for each in state.objectives}:
-            answer = f"nothing is decided: {function} has no objective in this state"
-        else:
-            present = state.grounded(function) or "it"
-            answer = f"nothing is decided: the objective of {function} requires no adaptation, so {present} stays"
+                return self.decision(decision, design)
+        if function not in {each.function for each in self.reasoning.inference.state.objectives}:
+            return DecisionExplanation(function, f"nothing is decided: {function} has no objective in this state")
+        present = self.reasoning.inference.state.grounded(function) or "it"
+        answer = f"nothing is decided: the objective of {function} requires no adaptation, so {present} stays"
         return DecisionExplanation(function, answer)
 
-    def decision(self, decision: Decision, asked: str | None = None, *, wanted: bool = True) -> DecisionExplanation:
+    def decision(self, decision: Decision, asked: str | None = None) -> DecisionExplanation:
         """Why a decision is made; the answer begins with the design that was asked about."""
-        function, objective = decision.function, objective_name(decision.function)
+        objective = objective_name(decision.function)
         candidates = []
         answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
         for each in verdicts(self.base, self.reasoning, decision):
             why = (Fact(each.design, "fd_realisability", False), Fact(each.design, "fd_error_log", objective))
             because = (self.derive(fact) for fact in why if each.verdict == LEFT_OUT and fact in self.triples)
             candidates.append(replace(each, because=tuple(because)))
-            if each.design == asked and each.verdict != CHOSEN:
+            if each.design == asked:
                 answer = f"{asked} is {each.verdict}: {each.reason}"
-                if decision.design is None:
-                    present = self.reasoning.inference.state.grounded(function)
-                    stays = f"{present} stays" if present else f"{function} stays {NO_GROUNDING}"
-                    answer = f"no design is left, {stays}; {answer}"
-            elif each.design == asked and not wanted:
-                answer = f"{asked} is chosen: {decision.reason}"
         status = (
             fact
             for fact in sorted(self.reasoning.inference.facts, key=str)
             if fact.subject == objective and fact.property in ("o_status", "o_updatable")
         )
-        return DecisionExplanation(function, answer, tuple(map(self.derive, status)), tuple(candidates))
-
-
-def _near_rule(answer: WhyNot) -> str:
-    """The first atom that fails of a rule that could conclude what is missing, in the nearest match."""
-    holds = f"{answer.atom} does not hold{with_bindings(answer.bindings)}" if answer.atom else answer.answer
-    return f"rule {answer.rule}: {holds}"
+        return DecisionExplanation(decision.function, answer, tuple(map(self.derive, status)), tuple(candidates))

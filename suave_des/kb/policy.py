@@ -12,12 +12,12 @@ from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.space import (
     INCONSISTENT,
     Decide,
-    Dependence,
     Outcome,
     PolicySpace,
     Reports,
     Situation,
     States,
+    decision_keys,
     measured_attributes,
 )
 from suave_des.kb.states import ManagingSettings
@@ -129,10 +129,9 @@ def make_policy(
 
     space = space or PolicySpace.of(base, settings)
     states = States.of(base, settings, max_failed, space)
-    depends = Dependence.of(base, space)
     # States are inferred before all cases are made: memory that is full of cases makes each inference slower.
     different: dict[Hashable, KnowledgeState] = {}
-    for key, state in zip(_keys(states, depends), states, strict=True):
+    for key, state in zip(decision_keys(base, space, states), states, strict=True):
         different.setdefault(key, state)
     on_count(0, len(different))
     decided: dict[Hashable, Outcome] = {}
@@ -143,28 +142,16 @@ def make_policy(
     columns = [*space.attributes, "components", "states"]
     columns += [f"{name}_now" for name in functions] + ["statuses"] + [f"{name}_then" for name in functions]
     columns += ["marks", "problem", "state", "reports", "flipping"]
+    outcomes = map(decided.__getitem__, decision_keys(base, space, states))
+    rows = _rows(states, functions, outcomes, decide, space)
     return Policy(
         space,
-        pandas.DataFrame(
-            _rows(states, functions, map(decided.__getitem__, _keys(states, depends)), decide, space), columns=columns
-        ),
+        pandas.DataFrame(rows, columns=columns),
         functions,
         tuple(name for name in measured_attributes(base, settings) if name not in space.attributes),
         regions_of(base).reasons,
         max_failed,
     )
-
-
-def _keys(states: States, depends: Dependence) -> Iterator[Hashable]:
-    """What the decision in each kind of state can depend on."""
-    relevant = [
-        sorted({attribute for name in _asked(task) for attribute in depends.attributes[name]}) for task in states.tasks
-    ]
-    for _, values in states.measured:
-        places = depends.places(values)
-        seen = [tuple(map(places.get, names)) for names in relevant]
-        for reports in states.reports:
-            yield from ((number, reports.components, known) for number, known in enumerate(seen))
 
 
 def _rows(
@@ -238,36 +225,14 @@ class FunctionTable(NamedTuple):
     """What happens to one function's grounding, over everything that has an effect on it.
 
     Attributes:
-        function: which function.
-        spans: of each attribute with an effect: first and last place of each column's range, in which all is equal.
-        groundings: of each row: by function, the grounding now.
-        components: of each row: what components report; empty without an effect.
-        outcomes: of each row, by the number of the span of each attribute.
+        table: as `kb policy` prints it; the last measured attribute goes across, all else down.
+        down: number of its columns that say what the case is; the others have outcomes.
+        across: the measured attribute that goes across; empty without one.
     """
 
-    function: str
-    spans: dict[str, list[tuple[int, int]]]
-    groundings: list[dict[str, str]]
-    components: list[str]
-    outcomes: list[dict[tuple[int, ...], str]]
-
-    def table(self, space: PolicySpace) -> Table:
-        """The table as `kb policy` prints it: the last attribute goes across, the others down."""
-        texts = {name: [space.scale.text(*span) for span in spans] for name, spans in self.spans.items()}
-        *down, across = [range(len(each)) for each in texts.values()] or [range(1)]
-        others = [name for name in self.groundings[0] if name != self.function]
-        with_components = any(self.components)
-        rows = []
-        for groundings, components, outcomes in zip(self.groundings, self.components, self.outcomes, strict=True):
-            before = [groundings[self.function], *map(groundings.__getitem__, others), *[components] * with_components]
-            for at in itertools.product(*down):
-                places = [texts[name][number] for name, number in zip(texts, at, strict=False)]
-                cells = [outcomes[(*at, last) if texts else ()] for last in across]
-                rows.append([*before, *places, *cells])
-        headings = ["now", *others, *["components"] * with_components, *list(texts)[:-1]]
-        headings += texts[list(texts)[-1]] if texts else ["then"]
-        what = f", by measured {', '.join(texts)}" if texts else ""
-        return Table(headings, rows, f"{self.function}{what}", "l" * len(headings))
+    table: Table
+    down: int
+    across: str
 
 
 def function_table(policy: Policy, function: str) -> FunctionTable:
@@ -291,27 +256,26 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
         text = one[0] if len(one) == 1 else f"{' or '.join(one)}, by the order of the values"
         found.setdefault(at[: len(down)], {})[at[len(down) :]] = text
     spans = {name: _spans(number, len(policy.space.scale), found.values()) for number, name in enumerate(attributes)}
-    columns = list(itertools.product(*(enumerate(each) for each in spans.values())))
-    by_reports: dict[str, list[tuple[dict[str, str], dict[tuple[int, ...], str]]]] = {}
+    ranges = [[(first, policy.space.scale.text(first, last)) for first, last in each] for each in spans.values()]
+    *over, across = ranges or [[]]
+    others = [name for name in groundings if name in kept and name != own]
+    merged: dict[Any, list[str]] = {}  # what components report, of each different row
     for names, row in found.items():
         known = dict(zip(down, names, strict=True))
-        reports = known.pop("reports", "")
-        in_columns = {tuple(n for n, _ in at): row[tuple(first for _, (first, _) in at)] for at in columns}
-        by_reports.setdefault(reports, []).append(
-            ({name.removesuffix("_now"): known[name] for name in known}, in_columns)
-        )
-    # Reports that lead to the same outcomes for every grounding are in one row.
-    groups: list[tuple[list[str], Any]] = []
-    for reports, rows in by_reports.items():
-        same = next((names for names, others in groups if others == rows), None)
-        if same is None:
-            groups.append(([reports], rows))
-        else:
-            same.append(reports)
-    every = [(*row, ", ".join(names)) for names, rows in groups for row in rows]
-    return FunctionTable(
-        function, spans, [each[0] for each in every], [each[2] for each in every], [each[1] for each in every]
-    )
+        for at in itertools.product(*over):
+            cells = tuple(row[(*(first for first, _ in at), last)] for last, _ in across) or (row[()],)
+            label = tuple(map(known.__getitem__, [own, *others])), tuple(words for _, words in at), cells
+            merged.setdefault(label, []).append(known.get("reports", ""))
+    reported = ["components"] * ("reports" in kept)
+    headings = ["now", *(name.removesuffix("_now") for name in others), *reported, *attributes[:-1]]
+    rows = [
+        [*before, *[", ".join(reports)] * len(reported), *places, *cells]
+        for (before, places, cells), reports in merged.items()
+    ]
+    what = f", by measured {', '.join(attributes)}" if attributes else ""
+    outcomes = [words for _, words in across] or ["then"]
+    table = Table([*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes)))
+    return FunctionTable(table, len(headings), attributes[-1] if attributes else "")
 
 
 def _spans(number: int, places: int, rows: Iterable[dict[tuple[int, ...], str]]) -> list[tuple[int, int]]:

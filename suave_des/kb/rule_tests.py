@@ -93,7 +93,7 @@ class RuleTest:
         situations: one, or one for each region of measured values.
         follows: facts that must follow, or be asserted, each with its triple.
         follows_not: facts that must not.
-        decides: (function, what happens to its grounding: a design, "stays" or "none left").
+        decides: by function, what happens to its grounding: a design, "stays" or "none left".
         contradicts: whether the situation must contradict itself.
         problem: why it cannot be asked of the knowledge base.
     """
@@ -104,7 +104,7 @@ class RuleTest:
     situations: tuple[Situation, ...] = field(default=(), repr=False)
     follows: Mapping[Fact, Triple] = field(default_factory=dict)
     follows_not: tuple[Fact, ...] = ()
-    decides: tuple[tuple[str, str], ...] = ()
+    decides: Mapping[str, str] = field(default_factory=dict)
     contradicts: bool = False
     problem: str = ""
 
@@ -180,7 +180,7 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
         "situations": tuple(Situation(each, triples, words) for each, words in _states(test.given, knowledge, folder)),
         "follows": {reader.fact(text): reader.triple(text) for text in test.follows},
         "follows_not": tuple(map(reader.fact, test.follows_not)),
-        "decides": tuple((name, _choice(base, name, words)) for name, words in test.decides.items()),
+        "decides": {name: _choice(base, name, words) for name, words in test.decides.items()},
         "contradicts": test.contradiction,
     }
 
@@ -288,7 +288,7 @@ def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide) -> Iterator
         yield "the situation does not contradict itself", None
     yield from ((f"{fact} does not follow", fact) for fact in test.follows if fact not in outcome.known)
     yield from ((f"{fact} follows", fact) for fact in test.follows_not if fact in outcome.known)
-    for function, wanted in test.decides:
+    for function, wanted in test.decides.items():
         chosen, present = outcome.choice(function), situation.state.grounded(function)
         if chosen != wanted and not (chosen == STAYS and wanted == present):
             happens = f"{present} stays" if chosen == STAYS and present else chosen

@@ -436,17 +436,14 @@ class PolicySpace:
 
     def common(self, other: PolicySpace) -> PolicySpace:
         """What has an effect in either; components are alike only if they are so in both that have them."""
-        groups: dict[tuple[int, int], list[str]] = {}
-        for number, group in enumerate(self.alike):
-            for name in group:
-                there = next((place for place, each in enumerate(other.alike) if name in each), -1)
-                groups.setdefault((number, there), []).append(name)
-        known = {name for group in self.alike for name in group}
-        only_there = (tuple(name for name in group if name not in known) for group in other.alike)
+        groups: dict[tuple[int, ...], list[str]] = {}
+        for name in dict.fromkeys(name for group in (*self.alike, *other.alike) for name in group):
+            places = (next((n for n, group in enumerate(s.alike) if name in group), -1) for s in (self, other))
+            groups.setdefault(tuple(places), []).append(name)
         return PolicySpace(
             tuple(sorted({*self.attributes, *other.attributes})),
             tuple(sorted({*self.numbers, *other.numbers})),
-            (*map(tuple, groups.values()), *filter(None, only_there)),
+            tuple(map(tuple, groups.values())),
             tuple(sorted({*self.statuses, *other.statuses})),
             tuple(sorted({*self.functions, *other.functions})),
         )
@@ -457,30 +454,6 @@ def measured_attributes(base: Ontology, settings: ManagingSettings) -> list[str]
     return sorted(name for name in settings.measured if name in base.quality_attributes)
 
 
-@dataclass(frozen=True)
-class Dependence:
-    """What decisions can depend on.
-
-    Attributes:
-        attributes: by function, the quality attributes whose measured values can matter for its decision.
-        regions: by attribute, the places that a measured value can have; None where any two values may be told apart.
-    """
-
-    attributes: Mapping[str, frozenset[str]]
-    regions: Mapping[str, Regions] | None
-
-    @classmethod
-    def of(cls, base: Ontology, space: PolicySpace) -> Dependence:
-        """Find out from ontologies and rules, for the attributes of a space."""
-        functions = {*base.functions, *space.functions}
-        attributes = {f: frozenset(name for name in space.attributes if has_effect(base, name, [f])) for f in functions}
-        return cls(attributes, _regions(base, space.attributes))
-
-    def places(self, measured: Iterable[tuple[str, Decimal]]) -> dict[str, Hashable]:
-        """By attribute, what of a measured value a decision can depend on."""
-        return {name: value if self.regions is None else self.regions[name].region(value) for name, value in measured}
-
-
 def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] | None:
     """The regions of each attribute's values, where every rule reads values of one attribute only, and says which."""
     known = base.model.attributes
@@ -488,15 +461,18 @@ def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] 
         return None
     triples = base.content.triples
     numbers: dict[str, set[Decimal]] = {}
-    types = {subject: str(value) for subject, predicate, value in triples if predicate == IS_QA_TYPE}
+    types = [(subject, str(value)) for subject, predicate, value in triples if predicate == IS_QA_TYPE]
     for subject, predicate, value in triples:
         if predicate == HAS_VALUE and isinstance(value, Lit):
-            numbers.setdefault(types.get(subject, ""), set()).add(exact(value.text.strip()))
+            for iri in (name for each, name in types if each == subject):
+                numbers.setdefault(iri, set()).add(exact(value.text.strip()))
     for rule in base.content.enabled_rules:
         read = {atom.arguments[0] for atom in rule.body if atom.predicate == HAS_VALUE}
         typed = {atom.arguments for atom in rule.body if atom.predicate == IS_QA_TYPE and atom.arguments[0] in read}
         named = {term.iri for _, term in typed if isinstance(term, Named)}
-        if read - {subject for subject, term in typed if isinstance(term, Named)} or len(named) > 1:
+        is_typed = read <= {subject for subject, term in typed if isinstance(term, Named)}
+        others = any(predicate != HAS_VALUE for _, predicate in rule.read_values())
+        if not is_typed or len(named) > 1 or (read and others):
             return None
         terms = {term for atom in rule.body for term in atom.arguments if isinstance(term, Lit)}
         for iri in named:
@@ -581,3 +557,16 @@ def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> It
         for designs in itertools.product(*((None, *base.designs(name)) for name in asked)):
             groundings = {name: design for name, design in zip(asked, designs, strict=True) if design is not None}
             yield settings.state(dict.fromkeys(asked), groundings)
+
+
+def decision_keys(base: Ontology, space: PolicySpace, states: States) -> Iterator[Hashable]:
+    """What the decision in each kind of state can depend on: states with equal keys are decided alike."""
+    functions = {*base.functions, *space.functions}
+    effects = {each: [name for name in space.attributes if has_effect(base, name, [each])] for each in functions}
+    relevant = [sorted({name for each in task.objectives for name in effects[each.function]}) for task in states.tasks]
+    regions = _regions(base, space.attributes)
+    for _, values in states.measured:
+        places = {name: value if regions is None else regions[name].region(value) for name, value in values}
+        seen = [tuple(map(places.get, names)) for names in relevant]
+        for reports in states.reports:
+            yield from ((number, reports.components, known) for number, known in enumerate(seen))

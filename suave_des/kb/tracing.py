@@ -66,15 +66,10 @@ class Derivation:
         for premise in self.premises:
             yield from premise.lines(indent + "  ")
 
-    def all(self) -> Iterator[Derivation]:
-        """It, and everything that it follows from."""
-        yield self
-        for premise in self.premises:
-            yield from premise.all()
-
     def rules(self) -> frozenset[str]:
         """Names of all rules in it."""
-        return frozenset(each.rule for each in self.all() if each.rule is not None)
+        own = frozenset[str]() if self.rule is None else frozenset({self.rule})
+        return own.union(*(premise.rules() for premise in self.premises))
 
 
 @dataclass(frozen=True, eq=False)

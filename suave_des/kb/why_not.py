@@ -16,7 +16,6 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.kb.matching import (
     FACT_KINDS,
     Binding,
-    Bound,
     Facts,
     Probes,
     bound,
@@ -72,16 +71,12 @@ class WhyNot(NamedTuple):
         rule: its name.
         answer: in one line, without the name.
         fires: whether its whole body holds.
-        atom: the first atom that fails, as the rule writes it; empty where no single atom is the reason.
-        bindings: what the variables stand for in the nearest match.
         failing: number of the atoms that do not hold there; 0 where the answer is not about atoms.
     """
 
     rule: str
     answer: str
     fires: bool = False
-    atom: str = ""
-    bindings: Bound = ()
     failing: int = 0
 
     def __str__(self) -> str:
@@ -105,11 +100,6 @@ class RuleQuestions:
     base: Ontology
     _facts: dict[KnowledgeState, Facts | str] = field(default_factory=dict, repr=False)
 
-    @property
-    def names(self) -> list[str]:
-        """Names of all rules."""
-        return sorted({rule.name for rule in self.base.rules})
-
     def why_not(self, name: str, state: KnowledgeState) -> WhyNot:
         """Say why a rule does not fire in a state.
 
@@ -118,7 +108,8 @@ class RuleQuestions:
         """
         answers = [self.of(rule, state) for rule in self.base.rules if rule.name == name]
         if not answers:
-            raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, self.names))
+            known = sorted({rule.name for rule in self.base.rules})
+            raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, known))
         return next((each for each in answers if each.fires), answers[0])
 
     def of(self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})) -> WhyNot:
@@ -142,17 +133,17 @@ class RuleQuestions:
         # What is the same and what is different, Pellet alone knows.
         if not failing and identities and not Probes(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)):
             failing = (identities[0],)
-        bindings = shown_bindings(binding, self.base.names)
         if not failing:
+            bindings = with_bindings(shown_bindings(binding, self.base.names))
             said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
-            return WhyNot(rule.name, f"it fires{with_bindings(bindings)}, and concludes {said}", True, "", bindings)
+            return WhyNot(rule.name, f"it fires{bindings}, and concludes {said}", fires=True)
         first = rule.body[failing[0]]
         reason = describe_failure(self._usable, first, binding, facts)
         others = len(failing) - 1
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
         chain = self._concluder(rule, first, binding, facts)
-        text = write_atom(first)
-        return WhyNot(rule.name, f"{text} does not hold: {reason}{more}{chain}", False, text, bindings, len(failing))
+        answer = f"{write_atom(first)} does not hold: {reason}{more}{chain}"
+        return WhyNot(rule.name, answer, failing=len(failing))
 
     def missing(self, triple: Triple, state: KnowledgeState) -> list[WhyNot]:
         """Say why no rule concludes a fact, of each that could; those that lack least first."""

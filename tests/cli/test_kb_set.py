@@ -1,11 +1,10 @@
 """`--set KEY=VALUE` of the kb commands: values of the scenario, and measured values where a state is described."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from suave_des.kb import KnowledgeBase
+from suave_des.kb.knowledge_base import KnowledgeBase
 
 IMPROVES = "revision.metacontrol.improve_when_exceeded"
 STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibility=4")
@@ -13,8 +12,10 @@ STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibili
 
 @pytest.mark.parametrize(("improves", "functions"), [("true", ["f_generate_search_path"]), ("false", [])])
 def test_infer_decides_with_the_values_that_are_set(command, improves, functions):
-    _, out, _ = command("kb", "infer", "--format", "json", *STATE, "--set", f"{IMPROVES}={improves}")
-    assert [each["function"] for each in json.loads(out)["plan"]] == functions
+    _, out, _ = command("kb", "infer", *STATE, "--set", f"{IMPROVES}={improves}")
+    planned = out.partition("plan\n")[2]
+    assert [function for function in functions if function in planned] == functions
+    assert functions or planned == "  nothing to adapt\n"
 
 
 @pytest.mark.parametrize(

@@ -211,7 +211,7 @@ def test_the_public_api_is_documented(site):
         ("managers", "suave_des.managing.base.ManagingSubsystem.adapt"),
         ("interfaces", "suave_des.Mission.advance"),
         ("interfaces", "suave_des.PipelineInspection.step"),
-        ("knowledge", "suave_des.kb.KnowledgeBase.infer"),
+        ("knowledge", "suave_des.kb.knowledge_base.KnowledgeBase.infer"),
     ):
         text = (site / "reference" / "api" / page / "index.html").read_text(encoding="utf-8")
         assert f'id="{name}"' in text

@@ -3,7 +3,7 @@
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.kb import KnowledgeBase
+from suave_des.kb.knowledge_base import KnowledgeBase
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 
 

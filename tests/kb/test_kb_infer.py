@@ -9,7 +9,7 @@ from concurrent.futures import Future
 import pytest
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.kb import KnowledgeBase
+from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoner import Reasoner
@@ -162,7 +162,7 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         program = f"""
 import sys
 from suave_des.errors import KnowledgeError
-from suave_des.kb import KnowledgeBase
+from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 knowledge = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from suave_des import run_mission
-from suave_des.kb import KnowledgeBase
 from suave_des.kb.coverage import FIRES, FIRES_NOT, Goal, measure_coverage
+from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.mutation import EQUIVALENT, KILLED, OPERATORS, SURVIVED, Mutant, is_horn, mutants_of, mutate, sample
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
 from suave_des.kb.space import PolicySpace, Situation, States, difference, interchangeable_components
@@ -238,7 +238,7 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
 
 
 @pytest.mark.parametrize("all_rules", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_coverage_names_what_is_missing_and_the_least_set_of_states_for_it(tmp_path, knowledge, all_rules):
+def test_coverage_names_what_is_missing_and_states_for_it(tmp_path, knowledge, all_rules):
     tests = read_tests(tmp_path, knowledge, LOW_AND_HIGH)
     if not all_rules:  # what fires depends on these two alone
         others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}

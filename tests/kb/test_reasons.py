@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.kb import KnowledgeBase
+from suave_des.kb.knowledge_base import KnowledgeBase
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 CLASH = (
@@ -126,12 +126,6 @@ class TestDecisions:
         (decision,) = knowledge.explain(knowledge.state(), "why not fd_spiral_low?").decisions
         assert decision.answer == "fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
 
-    def test_where_no_design_is_left_it_is_said_which_one_stays(self, knowledge):
-        state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1})
-        for design in ("fd_spiral_low", "fd_spiral_high"):
-            (decision,) = knowledge.explain(state, f"why not {design}?").decisions
-            assert decision.answer.startswith(f"no design is left, fd_spiral_low stays; {design} is left out: ")
-
     def test_nothing_to_adapt_is_said(self, knowledge):
         state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
         (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
@@ -164,9 +158,7 @@ def test_a_fact_that_does_not_follow_names_the_rule_that_comes_nearest(knowledge
     assert (
         "does not follow in this state (fg_status of fg_spiral_high: none; rule QAWaterVisibility: lessThan(" in error
     )
-    first = error.partition("rule QAWaterVisibility: ")[2].partition("; ")[0]
-    assert "does not hold with " in first
-    assert "?fg = fg_spiral_high" in first and "= 3.5" in first and "= 3.25" in first
+    assert "does not hold: found 3.5 (?measured), needed less than 3.25" in error
 
 
 def test_a_contradiction_names_the_rules(tmp_path):

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.console import errors
+from suave_des.cli.console import counted, errors
 from suave_des.cli.kb.options import (
     At,
     KnowledgeOptions,
     MaxFailed,
     ReasonerOptions,
     TimeLimitS,
-    counting_states,
     shown,
     state_at,
 )
@@ -31,13 +30,6 @@ if TYPE_CHECKING:
     from suave_des.knowledge.state import Reasoning
 
 
-class Format(StrEnum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
-
-
 class TableFormat(StrEnum):
     """How to print a table."""
 
@@ -46,34 +38,10 @@ class TableFormat(StrEnum):
     JSON = "json"
 
 
-def infer(
-    options: ReasonerOptions,
-    at: At = None,
-    form: Annotated[Format, typer.Option("--format", help="Output format: text or JSON.")] = Format.TEXT,
-) -> None:
+def infer(options: ReasonerOptions, at: At = None) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     knowledge = options.knowledge()
-    reasoning = knowledge.infer(state_at(at, knowledge))
-    if form is Format.JSON:
-        from suave_des.kb.states import state_dict
-
-        plan = [
-            {
-                "function": decision.function,
-                "design": decision.design,
-                "reason": decision.reason,
-                "rejected": {rejection.design: rejection.reason for rejection in decision.rejected},
-            }
-            for decision in reasoning.plan.decisions
-        ]
-        inferred = sorted(map(str, reasoning.inference.facts))
-        _print_json({"state": state_dict(reasoning.inference.state), "inferred": inferred, "plan": plan})
-    else:
-        print(*_inference_lines(reasoning), sep="\n")
-
-
-def _print_json(content: object) -> None:
-    print(json.dumps(content, indent=2, ensure_ascii=False))
+    print(*_inference_lines(knowledge.infer(state_at(at, knowledge))), sep="\n")
 
 
 def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
@@ -117,9 +85,7 @@ def policy(
     options: ReasonerOptions,
     max_failed: MaxFailed = 2,
     csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write all rows of the table.")] = None,
-    png: Annotated[
-        Path | None, typer.Option("--png", metavar="FILE", help="Draw it over one or two measured values.")
-    ] = None,
+    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="Draw the tables.")] = None,
 ) -> None:
     """Tabulate the decision in every state.
 
@@ -130,7 +96,7 @@ def policy(
     if csv is not None and csv.is_dir():
         raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
     knowledge = options.knowledge()
-    with counting_states(knowledge) as on_count:
+    with counted("states", errors()) as on_count:
         found = knowledge.policy(max_failed, on_count)
     if png is not None:
         from suave_des.kb.policy_figure import draw_policy
@@ -139,7 +105,7 @@ def policy(
     if csv is not None:
         write_files(csv.parent, {csv.name: found.csv()})
     for name in found.functions:
-        print(shown(function_table(found, name).table(found.space)))
+        print(shown(function_table(found, name).table))
     print(*found.lines(), sep="\n")
 
 
@@ -164,7 +130,8 @@ def query(
     for name in found.unknown:
         errors().print(f"suave-des: the knowledge base does not have {name}")
     if form is TableFormat.JSON:
-        _print_json([dict(zip(found.columns, row, strict=True)) for row in found.rows])
+        rows_by_name = [dict(zip(found.columns, row, strict=True)) for row in found.rows]
+        print(json.dumps(rows_by_name, indent=2, ensure_ascii=False))
     elif form is TableFormat.CSV:
         print(csv_text(found.columns, found.rows), end="")
     else:
@@ -203,7 +170,7 @@ def why_not(
     state, limit = builder.state(), TimeLimit(time_limit, "--time-limit")
     answers = [
         limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire")
-        for name in names or questions.names
+        for name in names or sorted({rule.name for rule in questions.base.rules})
     ]
     answers = [answer for answer in answers if names or not answer.fires]
     print("\n".join(map(str, answers)) or "all rules fire")

@@ -1,26 +1,232 @@
-"""The command `suave-des kb`: its commands.
+"""The command `suave-des kb`: its commands, of which those on rules and OWL files are here.
 
 What reads ontologies or starts Java is imported when a command runs, so that help appears at once.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+import json
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from suave_des.cli.kb import ask, diff, rules, tests
-from suave_des.cli.options import CommandsUnderHeadings, Headings
+from suave_des.cli.console import counted, errors, progress
+from suave_des.cli.kb import ask, tests
+from suave_des.cli.kb.options import KnowledgeOptions, MaxFailed, ReasonerOptions, TimeLimitS, shown
+from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet, Seed, Workers
+
+if TYPE_CHECKING:
+    from suave_des.knowledge.ontology import Ontology
+
+FOUND = 1
+"""Exit status of `check` when there are findings that --fail-on names."""
+OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak is the previous version.")]
+RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
+
+
+class FindingsFormat(StrEnum):
+    """How to print findings."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+class FailOn(StrEnum):
+    """The least level that counts as failure."""
+
+    ERROR = "error"
+    WARN = "warn"
+
+
+def check(
+    options: KnowledgeOptions,
+    modes: Modes = None,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")] = (
+        FailOn.ERROR
+    ),
+    time_limit: TimeLimitS = 60.0,
+    form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = FindingsFormat.TEXT,
+) -> None:
+    """Check ontologies and rules.
+
+    Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
+    """
+    from suave_des.findings import Finding, Level, has_level, ordered, summary
+    from suave_des.kb.check import check as run_checks
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.scenario.yamlfile import shown_name
+    from suave_des.scenario_knowledge import subject_of
+
+    loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
+    findings = run_checks(replace(subject_of(loaded), time_limit_s=time_limit))
+    useless = (Finding(Level.WARN, words, shown_name(loaded.path)) for words in loaded.scenario.without_effect())
+    findings = ordered([*findings, *useless])
+    if form is FindingsFormat.JSON:
+        print(json.dumps(list(map(asdict, findings)), indent=2, ensure_ascii=False))
+    else:
+        print(*map(str, findings), summary(findings), sep="\n")
+    if has_level(findings, Level(fail_on.upper())):
+        raise typer.Exit(FOUND)
+
+
+def rules(options: KnowledgeOptions) -> None:
+    """List all rules as text, in the format that --rules reads."""
+    from suave_des.scenario_knowledge import open_base
+
+    print(rules_text(open_base(options.loaded())), end="")
+
+
+def rules_text(base: Ontology) -> str:
+    """Write all rules of a knowledge base as one text, file by file."""
+    from suave_des.knowledge.rules import EXPRESSION, naming, write_rule
+
+    named = naming(lambda iri: not base.vocabulary.means_itself(iri))
+    blocks = []
+    for file in dict.fromkeys(rule.file for rule in sorted(base.rules, key=lambda rule: base.files.index(rule.file))):
+        blocks.append(f"# {file}\n")
+        for rule in base.rules:
+            if rule.file == file:
+                text = write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled)
+                if any(atom.predicate in ("", EXPRESSION) for atom in rule.atoms):
+                    lines = "".join(f"# {line}\n" for line in text.splitlines())
+                    text = f"# This rule has an atom without a name, which rules as text cannot have:\n{lines}"
+                blocks.append(text)
+    return "\n".join(blocks) or "# no rules\n"
+
+
+def add_rule(
+    file: OwlFile,
+    rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')],
+) -> None:
+    """Add a rule, or those of a file, to an OWL file; nothing else changes."""
+    from suave_des.kb.rule_editor import add_rules
+
+    names = [added.name for added in add_rules(file, rule)]
+    are = f"rule {names[0]} is" if len(names) == 1 else f"rules {', '.join(names)} are"
+    print(f"{are} in {file} now; {file}.bak is the previous version")
+
+
+def remove_rule(file: OwlFile, name: RuleName) -> None:
+    """Remove a rule from an OWL file; nothing else changes."""
+    from suave_des.kb.rule_editor import remove_rule as remove
+
+    remove(file, name)
+    print(f"rule {name} is not in {file} any more; {file}.bak is the previous version")
+
+
+def enable_rule(file: OwlFile, name: RuleName) -> None:
+    """Switch a rule of an OWL file on (swrla:isRuleEnabled)."""
+    _switch(file, name, enabled=True)
+
+
+def disable_rule(file: OwlFile, name: RuleName) -> None:
+    """Switch a rule of an OWL file off (swrla:isRuleEnabled), for every reasoner."""
+    _switch(file, name, enabled=False)
+
+
+def _switch(file: Path, name: str, *, enabled: bool) -> None:
+    from suave_des.kb.rule_editor import set_enabled
+
+    word = "enabled" if enabled else "disabled"
+    if set_enabled(file, name, enabled=enabled):
+        print(f"rule {name} is {word} in {file} now; {file}.bak is the previous version")
+    else:
+        print(f"rule {name} is {word} in {file} already")
+
+
+def try_(
+    on: Annotated[
+        Path,
+        typer.Option(
+            "--on",
+            metavar="DIR",
+            help="Folder of run, of a campaign that recorded its knowledge, or of such folders.",
+        ),
+    ],
+    rule: Annotated[
+        str | None, typer.Argument(metavar="RULE", help='Rule to try, "name: body -> head", or a .swrl file.')
+    ] = None,
+    disable: Annotated[
+        str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
+    ] = None,
+    time_limit: TimeLimitS = 60.0,
+) -> None:
+    """Show when a rule would have fired in recorded missions, and what it would have changed.
+
+    No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
+    the consequences of a different decision.
+    """
+    from suave_des.kb.replay import summary, try_rules
+
+    print(*summary(list(try_rules(on, rule, disabled=disable, limit_s=time_limit))), sep="\n")
+
+
+@dataclass(frozen=True)
+class MissionOptions:
+    """Options of the missions that are run with both."""
+
+    missions: Annotated[
+        int | None,
+        typer.Option("--missions", min=1, metavar="N", help="Run N missions with each, and compare them in pairs."),
+    ] = None
+    modes: Modes = None
+    seed: Seed = 1
+    workers: Workers = 1
+    quiet: Quiet = False
+
+
+def diff(
+    options: ReasonerOptions,
+    mission_options: MissionOptions,
+    one: Annotated[
+        Path,
+        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add."),
+    ],
+    other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
+    max_failed: MaxFailed = 2,
+) -> None:
+    """Compare two ontologies, or two sets of rules: axioms, decisions, missions.
+
+    --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
+    scenario's. Decisions are compared in every state; missions with the same number use common random numbers.
+    """
+    from suave_des.kb.difference import compare_axioms, compare_missions
+
+    both = [options.with_file(file) for file in (one, other)]
+    before, after = (each.knowledge() for each in both)
+    removed, added = compare_axioms(before.base, after.base)
+    with counted("states", errors()) as on_count:
+        difference = before.diff(after, max_failed, on_count)
+    missions = None
+    if mission_options.missions is not None:
+        replaced = [each.replacements | {"modes_file": mission_options.modes} for each in both]
+        with progress("missions with A, then with B", quiet=mission_options.quiet) as on_progress:
+            missions = compare_missions(
+                both[0].scenario,
+                mission_options.missions,
+                *replaced,
+                seed=mission_options.seed,
+                workers=mission_options.workers,
+                on_progress=on_progress,
+            )
+    if removed or added:
+        print(f"axioms and rules: {len(removed)} removed, {len(added)} added")
+        print(*(f"  - {text}" for text in removed), *(f"  + {text}" for text in added), sep="\n")
+    print(*difference.lines(), sep="\n")
+    if missions is not None:
+        print()
+        print(shown(missions.table(difference)))
+        print(*missions.lines(), sep="\n")
 
 
 class _Commands(CommandsUnderHeadings):
     headings: ClassVar[Headings] = {
         "Ask": (ask.infer, ask.explain, ask.why_not, ask.policy, ask.query),
-        "Check, test and compare": (rules.check, tests.test, rules.try_, diff.diff),
-        "Rules and OWL files": (
-            *(rules.rules, rules.add_rule, rules.remove_rule),
-            *(rules.enable_rule, rules.disable_rule),
-        ),
+        "Check, test and compare": (check, tests.test, try_, diff),
+        "Rules and OWL files": (rules, add_rule, remove_rule, enable_rule, disable_rule),
     }
 
 

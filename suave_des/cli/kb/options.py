@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.console import counted, errors, output
+from suave_des.cli.console import output
 from suave_des.cli.options import KnowledgeFiles, Reasoner
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.kb import KnowledgeBase
+    from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.knowledge.state import KnowledgeState
     from suave_des.scenario.loader import LoadedScenario
-
-
-#: Seconds for an inference by a reasoner that is slower than the Pellet in this process (which takes 2 to 7 ms).
-_SECONDS_EACH = {"owlready2": 1.0}
-#: Work that takes longer than so many seconds is announced.
-_LONG_S = 5.0
 
 
 TimeLimitS = Annotated[
@@ -69,7 +62,7 @@ class ReasonerOptions(KnowledgeOptions):
 
     def knowledge(self) -> KnowledgeBase:
         """Load the knowledge base and start the reasoner."""
-        from suave_des.kb import KnowledgeBase
+        from suave_des.kb.knowledge_base import KnowledgeBase
 
         return KnowledgeBase.load(
             self.ontology or (),
@@ -106,21 +99,6 @@ def state_at(at: Iterable[str] | None, knowledge: KnowledgeBase) -> KnowledgeSta
     builder = StateBuilder(knowledge.base, knowledge.settings)
     builder.add_words(at or ())
     return builder.state()
-
-
-@contextmanager
-def counting_states(knowledge: KnowledgeBase) -> Iterator[Callable[[int, int], None]]:
-    """Show how many states are inferred; before that, how long it will take, unless it is short."""
-    with counted("states", errors()) as show:
-
-        def on_count(done: int, total: int) -> None:
-            duration_s = total * _SECONDS_EACH.get(knowledge.reasoner, 0.007)
-            if not done and duration_s >= _LONG_S:
-                about = f"{total} kinds of states have to be inferred: about {duration_s:.0f} s"
-                errors().print(f"suave-des: {about}, less if they are cached")
-            show(done, total)
-
-        yield on_count
 
 
 def shown(table: Table) -> str:

@@ -24,7 +24,7 @@ from suave_des.files import check_output_file, write_files
 from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
-    from suave_des.kb import KnowledgeBase
+    from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.kb.rule_tests import RuleTest, Tested, TestResult
     from suave_des.knowledge.state import KnowledgeState
 
@@ -54,7 +54,7 @@ class TestOptions(KnowledgeFiles):
 
     def load(self, about: Tested) -> KnowledgeBase:
         """Load a knowledge base."""
-        from suave_des.kb import KnowledgeBase
+        from suave_des.kb.knowledge_base import KnowledgeBase
 
         return KnowledgeBase.load(**about, values=self.values, time_limit_s=self.time_limit)
 
@@ -248,7 +248,7 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     for about, knowledge, tests in suites:
         situations = [situation for test in tests for situation in test.situations]
         found = measure_coverage(knowledge, situations, max_failed)
-        print("", shown(found.table()).rstrip("\n"), *found.lines(max_failed), sep="\n")
+        print("", shown(found.table()).rstrip("\n"), *found.lines(), sep="\n")
         if file is not None and found.proposed:
             states: list[tuple[str, KnowledgeState]] = [(str(goals[0]), state) for state, goals in found.proposed]
             text = tests_text(about, knowledge, states, "States that other tests do not cover.")
