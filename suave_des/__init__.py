@@ -20,8 +20,7 @@ if _TYPE_CHECKING:
     from suave_des.managed.node import CustomFunction
     from suave_des.managing.base import ManagingSubsystem
     from suave_des.managing.metacontrol import Metacontrol
-    from suave_des.managing.reference import Threshold
-    from suave_des.managing.simple import NoManager
+    from suave_des.managing.simple import NoManager, Threshold
     from suave_des.monitor.diagnostics import FAILED, Kind
     from suave_des.records.runs import read_runs
     from suave_des.resources import find
@@ -58,8 +57,7 @@ _HOMES = {
         "managed.node": ("CustomFunction",),
         "managing.base": ("ManagingSubsystem",),
         "managing.metacontrol": ("Metacontrol",),
-        "managing.reference": ("Threshold",),
-        "managing.simple": ("NoManager",),
+        "managing.simple": ("NoManager", "Threshold"),
         "monitor.diagnostics": ("FAILED", "Kind"),
         "records.runs": ("read_runs",),
         "resources": ("find",),

@@ -42,6 +42,14 @@ def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], None]) ->
     until(env, t_s).callbacks.append(lambda _: callback())
 
 
+def call_next(env: simpy.Environment, callback: Callable[[], None]) -> None:
+    """Call a function when the current event is over and before any other, as SimPy does with interrupts."""
+    event = simpy.Event(env)
+    event.callbacks.append(lambda _: callback())
+    event._ok, event._value = True, None
+    env.schedule(event, simpy.events.URGENT)
+
+
 def advance(env: simpy.Environment, t_s: float) -> None:
     """Process all events before mission time t, and go there; stop at the event of the mission's end.
 
@@ -78,13 +86,6 @@ class Alarm:
         """Call the function at mission time t, or as the next thing now if t has passed."""
         self._pending = event = until(self._env, t_s)
         event.callbacks.append(self._ring)
-
-    def set_now(self) -> None:
-        """Call the function now, when the current event is over and before any other, as SimPy does with interrupts."""
-        self._pending = event = simpy.Event(self._env)
-        event.callbacks = [self._ring]
-        event._ok, event._value = True, None
-        self._env.schedule(event, simpy.events.URGENT)
 
     def cancel(self) -> None:
         """Drop the pending call."""

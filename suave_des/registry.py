@@ -50,8 +50,8 @@ _BUILT_IN = {
     "metacontrol": "suave_des.managing.metacontrol:Metacontrol",
     "bt": "suave_des.managing.bt:BehaviourTree",
     "bt_extended": "suave_des.managing.bt:ExtendedBehaviourTree",
-    "threshold": "suave_des.managing.reference:Threshold",
-    "oracle": "suave_des.managing.reference:Oracle",
+    "threshold": "suave_des.managing.simple:Threshold",
+    "oracle": "suave_des.managing.simple:Oracle",
 }
 _FAMILIES = {
     "fixed": ("suave_des.managing.simple:fixed_mode", "fixed:MODE"),

@@ -77,8 +77,7 @@ class CampaignKeys(Strict):
     runs_per_draw: Annotated[Whole, Field(ge=1, le=RUNS_LIMIT)] = 1
     """Number of consecutive runs that share a draw."""
     ensemble: Annotated[str | None, Option("FILE")] = None
-    """CSV file of parameter sets that fit the real runs equally well, of which each run has one, or the name of a
-    shipped one, such as seams2023."""
+    """File of parameter sets, of which each run has one, or the name of a shipped one."""
 
 
 class CampaignSettings(CampaignKeys):
@@ -97,21 +96,21 @@ class CampaignSpec(CampaignKeys):
     """
 
     scenario: str
-    """A scenario or campaign file, or the name of a shipped scenario."""
+    """A scenario or campaign file, or a shipped scenario."""
     replacements: dict[str, Any] = Field(default_factory=dict)
     """What replaces the scenario's own files and values, as of load_scenario."""
     suave_format: bool = False
     """Write the exemplar's own results files, too."""
     record_knowledge: bool = False
-    """Record the knowledge states that managers analysed, in knowledge_states.jsonl, for `kb try`."""
+    """Record knowledge states for `kb try`."""
     out: Annotated[Path | None, Option("DIR")] = None
-    """Folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists."""
+    """Folder for result files."""
     workers: Annotated[Whole | None, Field(ge=1, le=WORKERS_LIMIT), Option(default="2, or 1 for few missions")] = None
-    """Worker processes; results do not depend on the number."""
+    """Worker processes."""
     scheduler: Annotated[Annotated[str, AfterValidator(_address)] | None, Option("tcp://HOST:PORT")] = None
-    """Run missions on the workers of this Dask scheduler; results are the same."""
+    """Run missions on the workers of this Dask scheduler."""
     overwrite: bool = False
-    """Replace results of the same kind in the output folder."""
+    """Replace earlier results in the output folder."""
     command: tuple[str, ...] = ()
     """The command line, for the manifest."""
     folder: str = ""

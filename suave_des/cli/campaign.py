@@ -56,7 +56,7 @@ def campaign(
         str | None,
         typer.Argument(
             metavar="SCENARIO",
-            help="A scenario or campaign file, or the name of a shipped scenario.",
+            help="A scenario or campaign file, or a shipped scenario.",
             show_default=False,
             autocompletion=complete_scenarios,
         ),

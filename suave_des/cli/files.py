@@ -49,7 +49,7 @@ class SchemaOf(StrEnum):
 def schema(
     what: Annotated[
         SchemaOf,
-        typer.Argument(metavar="WHAT", help="scenario: scenario files; exec: messages of exec:COMMAND managers."),
+        typer.Argument(metavar="WHAT", help="scenario, or exec for messages of exec:COMMAND."),
     ] = SchemaOf.SCENARIO,
 ) -> None:
     """Print the JSON Schema of scenario files, or of messages.
@@ -73,29 +73,23 @@ def schema(
 def import_config(
     files: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="FILE...", help="Mission, campaign and System Modes files of the exemplar, in any order."
-        ),
+        typer.Argument(metavar="FILE...", help="The exemplar's files, in any order."),
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
-    campaign: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Campaign file to write, from a campaign configuration.")
-    ] = None,
+    campaign: Annotated[Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")] = None,
     base: Annotated[
         str | None,
-        typer.Option(
-            metavar="SCENARIO", help="Scenario to build on; by default the shipped one of the files' revision."
-        ),
+        typer.Option(metavar="SCENARIO", help="Scenario to build on; by default that of the revision."),
     ] = None,
     revision: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Revision of the exemplar that the files are of, if they fit several."),
+        typer.Option(metavar="NAME", help="Revision of the files, if they fit several."),
     ] = None,
     runner_seed: Annotated[
         int | None,
         typer.Option(
             metavar="SEED",
-            help="Write the values that the exemplar's runner draws from this seed (its random_seed).",
+            help="Write the values that the exemplar's runner draws from this seed.",
         ),
     ] = None,
     overwrite: Overwrite = False,
@@ -139,14 +133,12 @@ def import_config(
 
 def export_config(
     scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A scenario or campaign file, or the name of a shipped scenario.")
+        str, typer.Argument(metavar="SCENARIO", help="A scenario or campaign file, or a shipped scenario.")
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml.")],
     revision: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Revision of the exemplar that is to read them.", show_default="the scenario's"
-        ),
+        typer.Option(metavar="NAME", help="Revision that is to read them.", show_default="the scenario's"),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -174,7 +166,7 @@ def export_config(
 
 def tree(
     manager: Annotated[str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")],
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario that provides the tree's settings.")] = (
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario with the tree's settings.")] = (
         "release15"
     ),
 ) -> None:

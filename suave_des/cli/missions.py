@@ -41,13 +41,13 @@ def run(
         str,
         typer.Option(
             metavar="NAME",
-            help="Managing subsystem by name, or your own as module:Class.",
+            help="A manager's name, or module:Class.",
             autocompletion=complete_managers,
         ),
     ] = "metacontrol",
     run_number: Annotated[
         int,
-        typer.Option("--run", metavar="K", help="Run number; with the seed, it identifies a mission of a campaign."),
+        typer.Option("--run", metavar="K", help="Run number."),
     ] = 1,
     manager_option: ManagerOptions = None,
     files: Files,
@@ -68,13 +68,11 @@ def run(
 
 def train(
     manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
-    missions: Annotated[int, typer.Option(help="Number of training missions; they are runs 1 to NUMBER.")],
+    missions: Annotated[int, typer.Option(help="Number of training missions.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
     scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = DEFAULT_SCENARIO,
-    seed: Annotated[int, typer.Option(help="Training seed; use a different one for the evaluation.")] = 0,
-    start: Annotated[
-        Path | None, typer.Option("--from", metavar="FILE", help="Continue from the file of an earlier training.")
-    ] = None,
+    seed: Annotated[int, typer.Option(help="Training seed.")] = 0,
+    start: Annotated[Path | None, typer.Option("--from", metavar="FILE", help="Continue an earlier training.")] = None,
     overwrite: Overwrite = False,
     manager_option: ManagerOptions = None,
     *,
@@ -106,12 +104,12 @@ def train(
 
 def serve(
     scenario: Scenario,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = ("127.0.0.1"),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any free one.")] = 3000,
+    host: Annotated[str, typer.Option(help="Address.")] = ("127.0.0.1"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")] = 3000,
     run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run of the first mission.")] = 1,
     seed: Seed = 1,
     real_time_factor: Annotated[
-        float, typer.Option(metavar="X", help="Mission seconds per wall-clock second; 0: advance only on request.")
+        float, typer.Option(metavar="X", help="Mission seconds per second; 0: advance only on request.")
     ] = 0.0,
     *,
     files: Files,

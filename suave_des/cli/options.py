@@ -61,12 +61,10 @@ Scenario = Annotated[
 ]
 Results = Annotated[
     list[Path],
-    typer.Argument(
-        metavar="DIR...", help="Folders of campaign or reproduce, the exemplar's CSV files, or folders of these."
-    ),
+    typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files."),
 ]
 Modes = Annotated[
-    Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file to use instead of the scenario's.")
+    Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file instead of the scenario's.")
 ]
 Reasoner = Annotated[
     str | None, typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow).")
@@ -74,7 +72,7 @@ Reasoner = Annotated[
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
 SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", show_default="1")]
 """For commands that may go on from results, which have a seed already."""
-Workers = Annotated[int, typer.Option("--workers", help="Worker processes; results do not depend on the number.")]
+Workers = Annotated[int, typer.Option("--workers", help="Worker processes.")]
 ManagersInData = Annotated[
     str | None,
     typer.Option(
@@ -84,15 +82,15 @@ ManagersInData = Annotated[
         autocompletion=complete_managers,
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings about rules and ontologies.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings.")]
 Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in the output folder.")]
 ManagerOptions = Annotated[
     list[str] | None,
     typer.Option(
         "--manager-option",
         metavar="[MANAGER.]KEY=VALUE",
-        help="Setting of a manager; without MANAGER, of every manager that is not built in; repeat it for several.",
+        help="Setting of a manager, or of all that are not built in; repeatable.",
     ),
 ]
 Given = dict[str, Any]
@@ -171,20 +169,18 @@ class KnowledgeFiles:
 
     ontology: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Ontology to use instead of the scenario's; repeat it for several files."),
+        typer.Option(metavar="FILE", help="Ontology instead of the scenario's; repeatable."),
     ] = None
     rules: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Rule file to add to the ontologies; repeat it for several files."),
+        typer.Option(metavar="FILE", help="File of rules to add to the ontologies; repeatable."),
     ] = None
-    disable_rule: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Disable a rule; repeat it for several.")
-    ] = None
+    disable_rule: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Rule to disable; repeatable.")] = None
     set: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY=VALUE",
-            help="Override a scenario value, its key as in a sweep: visibility.period_s=40; repeatable.",
+            help="Value of the scenario, such as visibility.period_s=40; repeatable.",
         ),
     ] = None
 

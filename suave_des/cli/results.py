@@ -43,11 +43,11 @@ class CompareFormat(StrEnum):
 
 AssistedBy = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="DIR... are real missions, and this a campaign under the same conditions."),
+    typer.Option(metavar="DIR", help="DIR... are real missions; this is a campaign under the same conditions."),
 ]
 Population = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many conditions drawn as theirs were."),
+    typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many such conditions."),
 ]
 
 
@@ -70,24 +70,20 @@ def compare(
         ),
     ] = None,
     by: Annotated[
-        str | None, typer.Option(metavar="KEY,...", help="Compare the values of these swept parameters, too.")
+        str | None, typer.Option(metavar="KEY,...", help="Compare values of these swept parameters, too.")
     ] = None,
     half_width: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="METRIC:VALUE", help="Estimate the runs needed for an interval this narrow; repeat it for several."
-        ),
+        typer.Option(metavar="METRIC:VALUE", help="Estimate the runs needed for an interval this narrow; repeatable."),
     ] = None,
-    unpaired: Annotated[
-        bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
-    ] = False,
+    unpaired: Annotated[bool, typer.Option("--unpaired", help="Treat runs as independent.")] = False,
     assisted_by: AssistedBy = None,
     population: Population = None,
     plan: Annotated[
         list[str] | None,
         typer.Option(
             metavar="METRIC:VALUE",
-            help="Plan real missions for intervals this narrow; without --assisted-by, DIR... is their population.",
+            help="Plan real missions for intervals this narrow.",
         ),
     ] = None,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = CompareFormat.TABLE,
@@ -186,9 +182,7 @@ class FigureKind(StrEnum):
 
 
 def figure(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Output folders of run, campaign or reproduce, or CSV files.")
-    ],
+    folders: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Result folders or CSV files.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
     kind: Annotated[
         FigureKind,
@@ -227,12 +221,12 @@ def replay(
         list[Path] | None,
         typer.Argument(
             metavar="[DIR]...",
-            help="Output folder of run or campaign; two of run are shown side by side.",
+            help="Folder of a campaign, or one or two of run.",
             show_default=False,
         ),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(metavar="SCENARIO", help="Run missions of this scenario instead of reading DIR.")
+        str | None, typer.Option(metavar="SCENARIO", help="Run missions of this scenario instead.")
     ] = None,
     managers: Annotated[
         str | None,
@@ -240,7 +234,7 @@ def replay(
             "--managers",
             "--manager",
             metavar="NAME,...",
-            help="One or two managing subsystems, on the same random numbers.",
+            help="One or two managers.",
             show_default="metacontrol; for a campaign, the last and the first",
             autocompletion=complete_managers,
         ),
@@ -299,7 +293,7 @@ def report(
         int | None,
         typer.Option(
             metavar="N",
-            help="Number of runs of each manager whose path and timeline are in the page.",
+            help="Runs of each manager with path and timeline.",
             show_default=str(_PATHS),
         ),
     ] = None,
@@ -310,7 +304,7 @@ def report(
     population: Population = None,
     show: Open = False,
 ) -> None:
-    """Make a page about a campaign: its conclusion, tables, interactive charts, and how it was made.
+    """Make a page about a campaign: conclusion, tables, charts.
 
     It is one file that needs no network.
     """

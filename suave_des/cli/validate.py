@@ -35,7 +35,7 @@ _Data = Annotated[
     typer.Option(
         "--data",
         metavar="FILE",
-        help="Real missions; repeat it for several files. By default those published for the scenario, or else the 60"
+        help="Real missions; repeatable. By default those published for the scenario, or else the 60"
         " of the SUAVE paper.",
         show_default=False,
     ),
@@ -47,13 +47,13 @@ def validate(
         str | None,
         typer.Argument(
             metavar="SCENARIO",
-            help="A scenario or campaign file, or the name of a shipped scenario.",
+            help="A scenario or campaign file, or a shipped scenario.",
             show_default=DEFAULT_SCENARIO,
         ),
     ] = None,
     data: _Data = None,
     runs_file: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Compare this campaign's runs.csv; nothing is simulated.")
+        Path | None, typer.Option(metavar="FILE", help="Compare this runs.csv; nothing is simulated.")
     ] = None,
     managers: ManagersInData = None,
     targets: Annotated[

@@ -94,7 +94,7 @@ class SetPointSender:
     frame_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     loss_probability: float = 0.0
     stream: random.Random | None = None
-    _before_loss: int = field(default=0, init=False)  # messages that arrive before the next one that is lost
+    _before_loss: float = field(init=False)  # how many messages arrive before the next one that is lost
 
     def __post_init__(self) -> None:
         self._before_loss = self._draw()
@@ -115,9 +115,9 @@ class SetPointSender:
         self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:
         """Send and queue set-points (see `Vehicle.queue_waypoints`), up to the first whose message will be lost."""
-        if self.loss_probability > 0.0:
-            send = send and not self._is_lost()
-            waypoints = waypoints[: 1 + self._before_loss]
+        send = send and not self._is_lost()
+        if self._before_loss < len(waypoints):
+            waypoints = waypoints[: 1 + int(self._before_loss)]
         x_error_m, y_error_m, z_error_m = self.frame_error_m
         sent_as_m = x_error_m, y_error_m, z_m + z_error_m
         return self.vehicle.queue_waypoints(
@@ -129,15 +129,15 @@ class SetPointSender:
         self._before_loss -= count
 
     def _is_lost(self) -> bool:
-        is_lost = self.loss_probability > 0.0 and self._before_loss == 0
+        is_lost = self._before_loss == 0
         self._before_loss = self._draw() if is_lost else self._before_loss - 1
         return is_lost
 
-    def _draw(self) -> int:
+    def _draw(self) -> float:
         """Draw the number of messages that arrive before one is lost, from the geometric distribution, by inversion."""
         if self.stream is None or self.loss_probability == 0.0:
-            return 0
-        return int(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
+            return math.inf
+        return math.floor(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Hashable
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
-from suave_des.clock import Alarm, call_at, tick_at_or_after
+from suave_des.clock import call_at, call_next, tick_at_or_after
 from suave_des.domain import UNGROUND_MODE, Task
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import (
@@ -193,7 +193,7 @@ class Metacontrol(ManagingSubsystem):
         if period_s > 0.0:
             call_at(env, tick_at_or_after(env.now, self._bridge_phase_s, period_s), deliver)
         else:
-            Alarm(env, deliver).set_now()
+            call_next(env, deliver)
 
     def _add_objectives(self, functions: tuple[str, ...]) -> None:
         if not self._is_listening():

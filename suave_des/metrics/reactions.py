@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from operator import itemgetter
 from typing import Any
 
-import numpy as np
 import simpy
 
 from suave_des.domain import GENERATE_RECHARGE_PATH, MAINTAIN_MOTION
 from suave_des.monitor.diagnostics import FAILED, Diagnostic
-from suave_des.monitor.measurements import Measurements, SignalMeasurements
+from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import ReactionMetric
 from suave_des.scenario.modes import Mode
 
@@ -33,7 +32,7 @@ class ReactionMeter:
 
     env: simpy.Environment
     settings: ReactionMetric
-    visibility: SignalMeasurements
+    visibility: Measurements
     initial_altitude_m: float
     battery: Measurements | None = None
     _entries: list[_Entry] = field(default_factory=list, init=False)
@@ -62,12 +61,13 @@ class ReactionMeter:
 
     def _fitting_altitudes(self) -> Iterator[_Entry]:
         """The messages from which on another altitude fits than before."""
-        settings, times_s = self.settings, self.visibility.times_s
-        altitudes_m = (None, *settings.expected_altitudes_m[::-1])
-        for message, reached in _levels(self.visibility.arrays[1].tobytes(), settings.visibility_thresholds_m[::-1]):
-            if times_s[message] > self.env.now:
+        measured, thresholds_m = self.visibility, self.settings.visibility_thresholds_m[::-1]
+        altitudes_m = (None, *self.settings.expected_altitudes_m[::-1])
+        for t_s in measured.crossings_s(thresholds_m):
+            if t_s > self.env.now:
                 break
-            yield times_s[message], _OpenEvents.expect, altitudes_m[reached]
+            visibility_m = measured.values[measured.count_until(t_s) - 1]
+            yield t_s, _OpenEvents.expect, altitudes_m[bisect_right(thresholds_m, visibility_m)]
 
     def _low_battery(self) -> Iterator[_Entry]:
         if self.battery is not None:
@@ -143,14 +143,6 @@ class _OpenEvents:
                 self._since_s.setdefault("mismatch", message_s)
             elif self._since_s.get("mismatch", -math.inf) >= message_s:
                 del self._since_s["mismatch"]
-
-
-@lru_cache(maxsize=64)
-def _levels(values: bytes, thresholds: tuple[float, ...]) -> list[tuple[int, int]]:
-    """Find which values (float64; without noise the same in each run) reach more or fewer thresholds; and how many."""
-    reached = np.searchsorted(thresholds, np.frombuffer(values), side="right")
-    changes = np.flatnonzero(np.diff(reached, prepend=-1))
-    return list(zip(changes.tolist(), reached[changes].tolist(), strict=True))
 
 
 _Entry = tuple[float, Callable[[_OpenEvents, float, Any], None], Any]

@@ -1,4 +1,4 @@
-"""What monitors measure of quality attributes: a signal's whole mission as a table, the battery's level so far.
+"""What monitors measure of quality attributes, as tables of a whole mission.
 
 Managers look values up here; a monitor publishes them on the diagnostics bus only if somebody subscribes to them.
 """
@@ -6,17 +6,16 @@ Managers look values up here; a monitor publishes them on the diagnostics bus on
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import ClassVar, NamedTuple
+from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 import simpy
 
-from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.clock import Process, exactly_at, tick_at_or_after
 from suave_des.compiling import Array, IntArray
 from suave_des.domain import BATTERY_LEVEL
 from suave_des.draws import Draws
@@ -56,6 +55,10 @@ class Timing(NamedTuple):
         in_step = "monitors" in scenario.revision.timers_in_step
         return cls(period_s, period_s + _DELIVERY_S if in_step else draws.phase(monitor, period_s))
 
+    def count(self, duration_s: float) -> int:
+        """Count the measurements in a mission."""
+        return max(0, math.floor((duration_s - self.phase_s) / self.period_s)) + 1
+
 
 def message_loss(key: str, monitor: Monitor, draws: Draws) -> Loss | None:
     """Make the function that says which of a monitor's messages are lost; None if none can be."""
@@ -70,23 +73,60 @@ def message_loss(key: str, monitor: Monitor, draws: Draws) -> Loss | None:
     return is_lost
 
 
-class Measurements(ABC):
-    """A monitor's measurements of a quality attribute.
+@dataclass(eq=False)
+class Measurements:
+    """What a monitor measures of a quality attribute: a table of the values that it publishes over the whole mission.
+
+    A monitor that repeats an unchanged value of a signal reports nothing new: only those that differ are in the table.
 
     Attributes:
         key: name of the quality attribute.
-        signal: its true value over mission time, where it is a signal.
-        are_known: whether all values of the mission are known from the start; if so, they may be looked up for times
-            to come.
-        times_s: when values were published that differ from the one before.
+        signal: its true value over mission time.
+        timing: when it is measured.
+        times_s: when the values are published, ascending.
         values: these values.
+        arrays: both as arrays, for vectorised computations.
     """
 
     key: str
     signal: Signal
-    are_known: ClassVar[bool]
-    times_s: Sequence[float]
-    values: Sequence[float]
+    timing: Timing
+    times_s: list[float] = field(repr=False)
+    values: list[float] = field(repr=False)
+    arrays: tuple[Array, Array] = field(repr=False)
+    _crossings: dict[Thresholds, list[float]] = field(default_factory=dict, repr=False, init=False)
+
+    @classmethod
+    def of(
+        cls,
+        key: str,
+        signal: Signal,
+        duration_s: float,
+        timing: Timing,
+        time_step_s: float = 0.0,
+        noise: Callable[[], float] | None = None,
+        is_lost: Loss | None = None,
+    ) -> Measurements:
+        """Measure a signal over a mission.
+
+        Args:
+            key: name of the quality attribute.
+            signal: what is measured.
+            duration_s: of the mission.
+            timing: when it is measured.
+            time_step_s: the signal is read at mission time rounded down to multiples of this; 0: at mission time.
+            noise: draws the error of one measurement; None: there is none.
+            is_lost: says which messages are not published; None: all are.
+        """
+        times: Array = timing.phase_s + timing.period_s * np.arange(timing.count(duration_s), dtype=np.float64)
+        read_s = np.floor(times / time_step_s + _ROUNDING) * time_step_s if time_step_s > 0.0 else times
+        values, changes, numbers = _sampled(signal, read_s.tobytes())
+        if noise is not None or is_lost is not None:
+            times, values = _published(times, values, noise, is_lost)
+            changes = _changes(values)
+            numbers = values[changes].tolist()
+        times = times[changes]
+        return Measurements(key, signal, timing, times.tolist(), numbers, (times, values[changes]))
 
     def count_until(self, t_s: float) -> int:
         """Count the values published by mission time t."""
@@ -101,73 +141,6 @@ class Measurements(ABC):
         """Number the region of the value last published by mission time t; -1 if there is none."""
         value = self.value(t_s)
         return -1 if value is None else region_of(value, thresholds)
-
-    @abstractmethod
-    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Find the first time after mission time t at which the region changes, or may change if that is not known."""
-
-    @abstractmethod
-    def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
-        """Publish the values at their times."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SignalMeasurements(Measurements):
-    """What a signal's monitor measures over a whole mission.
-
-    A monitor that repeats an unchanged value reports nothing new: only values that differ from the one before are kept.
-
-    Attributes:
-        signal: what is measured.
-        timing: when it is measured.
-        arrays: times and values as arrays, for vectorised computations.
-    """
-
-    are_known: ClassVar[bool] = True
-    key: str
-    signal: Signal
-    timing: Timing
-    times_s: list[float]
-    values: list[float]
-    arrays: tuple[Array, Array] = field(repr=False)
-    _crossings: dict[Thresholds, list[float]] = field(default_factory=dict, repr=False)
-
-    @classmethod
-    def of(
-        cls,
-        key: str,
-        signal: Signal,
-        duration_s: float,
-        timing: Timing,
-        time_step_s: float = 0.0,
-        noise: Callable[[], float] | None = None,
-        is_lost: Loss | None = None,
-    ) -> SignalMeasurements:
-        """Measure a signal over a mission.
-
-        Args:
-            key: name of the quality attribute.
-            signal: what is measured.
-            duration_s: of the mission.
-            timing: when it is measured.
-            time_step_s: the signal is read at mission time rounded down to multiples of this; 0: at mission time.
-            noise: draws the error of one measurement; None: there is none.
-            is_lost: says which messages are not published; None: all are.
-        """
-        messages = max(0, math.floor((duration_s - timing.phase_s) / timing.period_s)) + 1
-        times: Array = timing.phase_s + timing.period_s * np.arange(messages, dtype=np.float64)
-        read_s = np.floor(times / time_step_s + _ROUNDING) * time_step_s if time_step_s > 0.0 else times
-        values, changes, numbers = _sampled(signal, read_s.tobytes())
-        if noise is not None:
-            values = values + np.array([noise() for _ in range(messages)])
-        if is_lost is not None:
-            kept = [not is_lost(t_s) for t_s in times.tolist()]
-            times, values = times[kept], values[kept]
-        if noise is not None or is_lost is not None:
-            changes = _changes(values)
-            numbers = values[changes].tolist()
-        times = times[changes]
-        return cls(key, signal, timing, times.tolist(), numbers, (times, values[changes]))
 
     def crossings_s(self, thresholds: Thresholds) -> list[float]:
         """Find the times at which a value in another region is published, that of the first value included."""
@@ -189,9 +162,88 @@ class SignalMeasurements(Measurements):
 
     def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
         """Publish the values at their times."""
-        for t_s, value in zip(self.times_s, self.values, strict=True):
-            yield until(env, t_s)
+        t_s = -math.inf
+        while (published := self.count_until(t_s)) < len(self.times_s):
+            t_s = self.times_s[published]
+            yield exactly_at(env, t_s)
+            self.publish_now(env, bus)
+
+    def publish_now(self, env: simpy.Environment, bus: DiagnosticsBus) -> None:
+        """Publish the value of this very time, if there is one."""
+        value = self.value(env.now, since_s=env.now)
+        if value is not None:
             bus.publish(Diagnostic(env.now, Kind.QA_STATUS, self.key, value))
+
+
+class BatteryMeasurements(Measurements):
+    """The battery's level, which falls linearly from 1. Recharging makes what follows in the table another.
+
+    Args:
+        discharge_time_s: time from full to empty.
+        timing: when it is measured.
+        duration_s: of the mission.
+        noise: draws the error of one measurement; None: there is none.
+        is_lost: says which messages are not published; None: all are.
+
+    Attributes:
+        recharges: how often it was recharged so far.
+        listeners: each is called when it has been recharged.
+    """
+
+    def __init__(
+        self,
+        discharge_time_s: float,
+        timing: Timing,
+        duration_s: float,
+        noise: Callable[[], float] | None = None,
+        is_lost: Loss | None = None,
+    ) -> None:
+        super().__init__(BATTERY_LEVEL, self.level, timing, [], [], (np.empty(0), np.empty(0)))
+        self._discharge_time_s, self._disturbances = discharge_time_s, (noise, is_lost)
+        self._full_at_s, self.recharges = 0.0, 0
+        self.listeners: list[Callable[[], None]] = []
+        periods_s = np.full(timing.count(duration_s) - 1, timing.period_s)
+        self._ticks_s: Array = np.add.accumulate(np.append(timing.phase_s, periods_s))
+        self._measure(self._ticks_s)
+
+    def level(self, t_s: float) -> float:
+        """Compute the true level at mission time t, if it is not recharged until then."""
+        return max(0.0, 1.0 - (t_s - self._full_at_s) / self._discharge_time_s)
+
+    def recharge(self, t_s: float) -> None:
+        """Fill the battery now, and publish its level."""
+        self._full_at_s = t_s
+        self.recharges += 1
+        later = np.searchsorted(self._ticks_s, t_s, side="right")
+        self._measure(np.append(t_s, self._ticks_s[later:]))
+        for listener in self.listeners:
+            listener()
+
+    def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
+        """Publish the levels at their times, and that of a recharged battery at once."""
+        self.listeners.append(partial(self.publish_now, env, bus))
+        return super().publish(env, bus)
+
+    def _measure(self, times: Array) -> None:
+        """Measure at some times, from the first of which on the table is made anew."""
+        known = self.count_until(times[0])
+        levels = np.maximum(0.0, 1.0 - (times - self._full_at_s) / self._discharge_time_s)
+        times, levels = _published(times, levels, *self._disturbances)
+        self.times_s[known:], self.values[known:] = times.tolist(), levels.tolist()
+        self.arrays = np.append(self.arrays[0][:known], times), np.append(self.arrays[1][:known], levels)
+        self._crossings.clear()
+
+
+def _published(
+    times: Array, values: Array, noise: Callable[[], float] | None, is_lost: Loss | None
+) -> tuple[Array, Array]:
+    """Add errors to measured values, and leave out those whose message is lost."""
+    if noise is not None:
+        values = values + np.array([noise() for _ in values])
+    if is_lost is not None:
+        kept = [not is_lost(t_s) for t_s in times.tolist()]
+        times, values = times[kept], values[kept]
+    return times, values
 
 
 def _changes(values: Array) -> IntArray:
@@ -219,92 +271,3 @@ def _crossings(values: bytes, thresholds: Thresholds) -> list[int]:
     regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
     indices: list[int] = np.flatnonzero(np.diff(regions, prepend=-1)).tolist()
     return indices
-
-
-@dataclass(eq=False)
-class BatteryMeasurements(Measurements):
-    """The battery's level, which falls linearly from 1 until it is recharged; computed on demand.
-
-    Attributes:
-        discharge_time_s: time from full to empty.
-        timing: when it is measured.
-        noise: draws the error of one measurement; None: there is none.
-        is_lost: says which messages are not published; None: all are.
-        recharges: how often it was recharged so far.
-        listeners: each is called when it has been recharged.
-    """
-
-    are_known: ClassVar[bool] = False
-    discharge_time_s: float
-    timing: Timing
-    noise: Callable[[], float] | None = None
-    is_lost: Loss | None = None
-    key: str = field(default=BATTERY_LEVEL, init=False)
-    times_s: list[float] = field(default_factory=list, init=False)
-    values: list[float] = field(default_factory=list, init=False)
-    recharges: int = field(default=0, init=False)
-    listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
-    _full_at_s: float = field(default=0.0, init=False)
-
-    def __post_init__(self) -> None:
-        self._next_s = self.timing.phase_s
-
-    def count_until(self, t_s: float) -> int:
-        """Count the values published by mission time t, which must not lie in the future."""
-        while self._next_s <= t_s:
-            self._measure(self._next_s)
-            self._next_s += self.timing.period_s
-        return super().count_until(t_s)
-
-    def recharge(self, t_s: float) -> None:
-        """Fill the battery now, and publish its level."""
-        self.count_until(t_s)
-        self._full_at_s = t_s
-        self.recharges += 1
-        self._measure(t_s)
-        for listener in self.listeners:
-            listener()
-
-    def _measure(self, t_s: float) -> None:
-        error = 0.0 if self.noise is None else self.noise()
-        if self.is_lost is None or not self.is_lost(t_s):
-            self.times_s.append(t_s)
-            self.values.append(self._level(t_s) + error)
-
-    def level(self, t_s: float) -> float:
-        """Compute the true level at mission time t, which is now."""
-        self.count_until(t_s)
-        return self._level(t_s)
-
-    def _level(self, t_s: float) -> float:
-        return max(0.0, 1.0 - (t_s - self._full_at_s) / self.discharge_time_s)
-
-    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Find the earliest time after t, which is now, at which the level can be in a different region.
-
-        In the region that 1 is in, only falling leads to another one; waiting until then saves a fifth of the CPU time
-        of a mission of bt_extended.
-        """
-        region = self.region(t_s, thresholds)
-        if self.noise is not None or region != region_of(1.0, thresholds):
-            return self._next_s
-        threshold = max([each for each in thresholds if each <= 1.0], default=-math.inf)
-        falls_s = (1.0 - threshold) * self.discharge_time_s
-        return max(self._next_s, self._full_at_s + falls_s - self.timing.period_s)
-
-    def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
-        """Publish the level once a period, and when it has been recharged, unless the message is lost."""
-        published_before = 0
-
-        def report() -> None:
-            nonlocal published_before
-            published = self.count_until(env.now)
-            if published > published_before:
-                bus.publish(Diagnostic(env.now, Kind.QA_STATUS, self.key, self.values[published - 1]))
-            published_before = published
-
-        self.listeners.append(report)
-        yield until(env, self.timing.phase_s)
-        while True:
-            report()
-            yield env.timeout(self.timing.period_s)

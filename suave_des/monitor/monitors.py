@@ -9,7 +9,7 @@ import simpy
 from suave_des.clock import Process, until
 from suave_des.draws import Draws
 from suave_des.monitor.diagnostics import HULL, LEAK, Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryMeasurements, Measurements, SignalMeasurements, Timing, message_loss
+from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing, message_loss
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
@@ -18,7 +18,7 @@ from suave_des.world import signals
 from suave_des.world.signals import Signal
 
 
-def measure_signals(loaded: LoadedScenario, draws: Draws, duration_s: float) -> Iterator[SignalMeasurements]:
+def measure_signals(loaded: LoadedScenario, draws: Draws, duration_s: float) -> Iterator[Measurements]:
     """Measure the signals of a scenario in a run, in the order of their names."""
     scenario = loaded.scenario
     for name in sorted(scenario.signals):
@@ -39,10 +39,10 @@ def measure_signals(loaded: LoadedScenario, draws: Draws, duration_s: float) -> 
         timing = Timing.of(scenario, draws, key, period_s)
         noise = None if described.noise == 0.0 else draws.each_time(f"{key}.noise", described.noise)
         lost = message_loss(key, described, draws)
-        yield SignalMeasurements.of(name, signal, duration_s, timing, described.time_step_s, noise, lost)
+        yield Measurements.of(name, signal, duration_s, timing, described.time_step_s, noise, lost)
 
 
-def measure_battery(scenario: Scenario, draws: Draws) -> BatteryMeasurements | None:
+def measure_battery(scenario: Scenario, draws: Draws, duration_s: float) -> BatteryMeasurements | None:
     """Make the measurements of the battery's level in a run; None without a battery."""
     battery = scenario.battery
     if battery is None:
@@ -50,7 +50,7 @@ def measure_battery(scenario: Scenario, draws: Draws) -> BatteryMeasurements | N
     timing = Timing.of(scenario, draws, "battery_monitor", battery.publishing_period_s)
     noise = None if battery.noise == 0.0 else draws.each_time("battery.noise", battery.noise)
     lost = message_loss("battery", battery, draws)
-    return BatteryMeasurements(battery.discharge_time_s, timing, noise, lost)
+    return BatteryMeasurements(battery.discharge_time_s, timing, duration_s, noise, lost)
 
 
 def start_monitors(

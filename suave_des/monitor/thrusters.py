@@ -64,8 +64,8 @@ class Thrusters:
 
 def draw_schedule(scenario: Scenario, draws: Draws) -> list[tuple[ThrusterEvent, float]]:
     """Draw the times of the thruster events for a run, each as the revision counts it, s."""
-    keys = (f"thruster_events.{number}.time_s" for number in range(len(scenario.thruster_events)))
-    return [(each, draws.value(next(keys), each.time_s, least=0.0)) for each in scenario.thruster_events]
+    events = enumerate(scenario.thruster_events)
+    return [(each, draws.value(f"thruster_events.{n}.time_s", each.time_s, least=0.0)) for n, each in events]
 
 
 def thruster_monitor(

@@ -296,9 +296,9 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     """Draw visibility and its thresholds, the requested altitude and that flown, and letters for adaptations."""
     way = record.trajectory
     draw_thresholds(axes, record)
-    axes.plot(way["t_s"], way["visibility_m"], color=style.GREY, lw=1.0, label="visibility; dotted: thresholds")
+    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY, label="visibility; dotted: thresholds")
     times_s, asked_m = _altitude_asked_for(record)
-    axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, ls="--", label="requested altitude")
+    axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, label="requested altitude")
     axes.plot(way["t_s"], way["z_m"] - SEA_BED_Z_M, color=style.BLUE, lw=1.3, label="altitude flown")
     found_s = record.metrics["search_time_s"]
     if record.metrics["pipeline_found"]:

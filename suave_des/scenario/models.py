@@ -77,14 +77,14 @@ class FunctionSettings(Strict):
     model_config = ConfigDict(extra="allow")
 
     node: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*(:[A-Za-z_]\w*)?$")]
-    """Class of the function's node, as module:Class, or the name under which a package registers it."""
+    """Its class, as module:Class or by the name that a package registers."""
 
 
 class MissionSettings(Strict):
     """The coordinator's time limit, and further functions that its tasks need."""
 
     time_limit_s: Annotated[Real, Field(gt=0, le=_LONGEST_MISSION_S)] = 300.0
-    """Time at which the current task is cancelled and the metrics are taken."""
+    """Time at which the mission ends."""
     functions: MissionFunctions = MissionFunctions()
     """Functions needed in addition to the exemplar's."""
 
@@ -95,55 +95,55 @@ class Latencies(Strict):
     task_start_s: DelayDistribution = 0.0
     """From guided mode to the request of the first task."""
     search_start_s: DelayDistribution = 0.0
-    """From the first activation of the search to its first set-point; drawn once per run."""
+    """From the activation of the search to its first set-point; drawn once per run."""
     mode_change_s: DelayDistribution = 0.0
     """From the mode manager's answer until the mode takes effect."""
     inference_s: DelayDistribution = 1.0
-    """One analyze and plan step (stock Pellet starts a Java virtual machine for each)."""
+    """One analyze and plan step."""
 
 
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources do not give, the same for every manager."""
 
     position_gain_per_s: Annotated[Real, Field(gt=0, le=100)] = 1.0
-    """Horizontal velocity demanded for each metre of position error; ArduSub's default."""
+    """Horizontal velocity for each metre of position error."""
     jerk_m_per_s3: Annotated[Real, Field(gt=0, le=1000)] = 0.5
-    """Jerk with which the autopilot's target moves along a leg to a set-point."""
+    """Jerk of the autopilot's target on its way to a set-point."""
     velocity_gain_per_s: Annotated[Real, Field(gt=0, le=10)] = 4.0
-    """Horizontal acceleration demanded for each m/s of velocity error."""
+    """Horizontal acceleration for each m/s of velocity error."""
     velocity_integral_gain_per_s2: Annotated[Real, Field(ge=0, le=10)] = 1.2
-    """Horizontal acceleration demanded for each metre of the integrated velocity error; reset at each new leg."""
+    """Horizontal acceleration for each metre of the integrated velocity error."""
     heading_frequency_rad_per_s: Annotated[Real, Field(gt=0, le=10)] = 4.5
     """Natural frequency of heading control."""
     heading_integral_gain_per_s3: Annotated[Real, Field(ge=0, le=100)] = 0.0
-    """Angular acceleration demanded for each rad s of the integrated heading error."""
+    """Angular acceleration for each rad s of the integrated heading error."""
     altitude_error_m: OffsetDistribution = 0.0
-    """Steady error, of unknown cause, that is added to the set-point of the altitude."""
+    """Steady error of the altitude, of unknown cause."""
     drift_x_m: CoordinateDistribution = 0.0
-    """Offset to the east from the start to where guided mode begins."""
+    """Drift to the east before guided mode."""
     drift_y_m: CoordinateDistribution = 0.0
     """The same, north."""
     origin_x_m: OffsetDistribution = 0.0
-    """Offset to the east from there to the local frame's origin, the spiral's centre."""
+    """Offset to the east from there to the spiral's centre."""
     origin_y_m: OffsetDistribution = 0.0
     """The same, north."""
     real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock."""
     reasoning_slowdown: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
-    """Additional loss while the reasoner runs, spread over the mission by its share of metacontrol's period."""
+    """Additional loss while the reasoner runs."""
 
 
 class ReactionMetric(Strict):
     """Definition of a reaction in revision 1.5 (its metrics node)."""
 
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """In descending order; the first that is reached decides which altitude fits."""
+    """In descending order; the first that is reached decides which altitude is expected."""
     expected_altitudes_m: tuple[Number, ...] = (3.0, 2.0, 1.0)
-    """Fitting altitude for each threshold."""
+    """Altitude for each threshold."""
     battery_limit: Number = 0.25
-    """Battery level below which the recharge path is expected to become active."""
+    """Battery level below which the vehicle should recharge."""
     undone_within_s: Duration = 4.0
-    """An adaptation that is reverted within this time counts as undone."""
+    """An adaptation reverted within this time counts as undone."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -159,15 +159,15 @@ class KnowledgeSettings(Strict):
     """The knowledge base."""
 
     ontologies: Annotated[tuple[FileName, ...], Field(min_length=1)] = ("suave.owl",)
-    """Ontology files; what they import is resolved through the catalogue beside them."""
+    """Ontology files."""
     rules: tuple[FileName, ...] = ()
-    """Files of rules as text; a rule replaces the rules of the same name in the ontologies."""
+    """Files of rules as text; a rule replaces those of the same name in the ontologies."""
     disabled_rules: tuple[Name, ...] = ()
     """Names of rules to disable."""
     values: dict[str, Number] = Field(default_factory=dict)
-    """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
+    """New hasValue of individuals, such as qa_water_visibility_low: 0.5."""
     reasoner: ReasonerName = "cached"
-    """The reasoner for analyze; owlready2 is the reference, but slow."""
+    """Reasoner for analyze; owlready2 is slow."""
 
 
 def paired(part: Strict, one: str, other: str) -> None:
@@ -199,13 +199,13 @@ class BehaviourTreeSettings(Strict):
     first_tick_s: DelayDistribution = Uniform(distribution="uniform", minimum=0.0, maximum=0.1)
     """When it is first ticked."""
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """Minimum visibility for each of search_modes; the first threshold that is reached decides."""
+    """Minimum visibility for each of search_modes."""
     search_modes: tuple[str, ...] = ("fd_spiral_high", "fd_spiral_medium", "fd_spiral_low")
-    """Search modes, one for each threshold."""
+    """Search modes."""
     battery_limit: Number = 0.25
-    """Battery level below which the extended tree goes to recharge."""
+    """Battery level below which bt_extended recharges."""
     records_ticks: bool = False
-    """Whether the timeline has each tick whose outcome differs from the previous one's."""
+    """Whether the timeline has each tick with a new outcome."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -278,11 +278,11 @@ class Requirement(Strict):
     """
 
     metric: Metric | None = None
-    """The metric that it is about."""
+    """A metric."""
     attribute: str | None = None
-    """Instead of that, a measured quality attribute; satisfaction is the mean over mission time."""
+    """Instead, a measured quality attribute; satisfaction is the mean over time."""
     relation: Literal["at_least", "at_most", "close_to"]
-    """RELAX's AS MANY, AS FEW (or EARLY), AS CLOSE AS POSSIBLE; SHALL without tolerance."""
+    """Required relation of the value to that below."""
     value: Number
     """The required value."""
     tolerance: NotNegative = 0.0
@@ -312,7 +312,7 @@ class Scenario(Strict):
     """One mission's world, vehicle, software and knowledge."""
 
     name: Name
-    """Name in result files; by default that of the file without its extension."""
+    """Name in result files; by default that of the file."""
     description: str = ""
     """For people."""
     revision: Revision
@@ -320,7 +320,7 @@ class Scenario(Strict):
     vehicle: VehicleDescription
     """Body, thrusters and camera; in a file by default `bluerov2`."""
     mission: MissionSettings = MissionSettings()
-    """The coordinator's time limit, and further functions that its tasks need."""
+    """Time limit, and further functions that the tasks need."""
     start: Start = Start()
     """Pose before the drift; each component is drawn once per run."""
     pipeline: Pipeline = Pipeline()
@@ -330,21 +330,21 @@ class Scenario(Strict):
     signals: dict[Name, SignalDescription]
     """Measured signals, by quality attribute; water_visibility (m) is required."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
-    """Failures and recoveries, in order; also as the exemplar writes them: "(1,failure,35)"."""
+    """Failures and recoveries, in order; also as in the exemplar: "(1,failure,35)"."""
     thruster_monitor: Monitor = Monitor()
     """Faults of the thruster monitor; the battery and each signal have the same keys."""
     battery: Battery | None = None
     """The battery: falls linearly from 1.0, and is recharged at once near the station."""
     leak: Leak | None = None
-    """A leak: the vehicle abandons its tasks and surfaces. Needs f_surface in the modes file, and designs for it."""
+    """The vehicle abandons its tasks and surfaces. Needs f_surface in modes file and ontology."""
     latencies: Latencies = Latencies()
     """Mission time that the software takes, drawn at every occurrence."""
     calibration: Calibration = Calibration()
-    """Parameters that the sources do not give, the same for every manager; drawn once per run."""
+    """Fitted parameters, drawn once per run."""
     modes_file: FileName = "suave_modes.yaml"
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
-    """Mode that the manager none sets, by function; functions that are not listed keep their default."""
+    """Mode that the manager none sets, by function."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
     """User-defined functions, by their name in the modes file."""
     knowledge: KnowledgeSettings = KnowledgeSettings()
@@ -356,9 +356,8 @@ class Scenario(Strict):
     metrics: Metrics = ()
     """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
-    """Requirements that may be partially satisfied, by name, as in RELAX (Whittle et al., Requirements Engineering 15,
-    2010). The column requirement_NAME is 1 if the value is as required, and falls linearly to 0 when it is off by the
-    tolerance."""
+    """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15,
+    2010). The column requirement_NAME falls from 1 to 0 where the value is off by the tolerance."""
 
     @field_validator("signals", mode="after")
     @classmethod

@@ -49,9 +49,9 @@ class Monitor(Strict):
     """Faults that any monitor can have."""
 
     dropout_probability: Share = 0.0
-    """Probability that a message is lost, for each message."""
+    """Probability that a message is lost."""
     outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
-    """Intervals of mission time, [from, to], in which every message is lost."""
+    """Intervals [from, to] in which every message is lost."""
 
     @field_validator("outages_s", mode="after")
     @classmethod
@@ -69,11 +69,11 @@ class Monitor(Strict):
 
 class _Signal(Monitor):
     publishing_period_s: Period | None = None
-    """Period of its monitor; by default the revision's `monitors.visibility_publishing_period_s`."""
+    """Period of its monitor; by default the revision's."""
     time_step_s: NotNegative = 1.0
-    """Time is truncated to a multiple of this (whole seconds in the exemplar); 0: not truncated."""
+    """Time is truncated to a multiple of this, unless it is 0."""
     noise: ValueDistribution = 0.0
-    """Added to each measurement, drawn each time."""
+    """Added to each measurement."""
 
 
 class SinusoidSignal(_Signal):
@@ -89,7 +89,7 @@ class SinusoidSignal(_Signal):
     minimum: Number
     """Smallest value."""
     maximum: Number
-    """Greatest value, reached at t = -shift_s."""
+    """Greatest value."""
     shift_s: ShiftDistribution = 0.0
     """Phase shift, drawn once per run."""
 
@@ -127,7 +127,7 @@ class TableSignal(_Signal):
     kind: Literal["table"]
     """Values over time from a CSV file."""
     file: Annotated[str, Field(min_length=1)]
-    """CSV file with columns t_s and value."""
+    """CSV file."""
     interpolation: Literal["previous", "linear"] = "previous"
     """Between two rows: the earlier row's value, or a straight line."""
 
@@ -201,7 +201,7 @@ class CurrentWaveDescription(Strict):
     shift_s: ShiftDistribution = 0.0
     """Added to mission time."""
     direction_rad: HeadingDistribution = 0.0
-    """Direction in which the water flows, from east towards north."""
+    """Direction of the flow, from east towards north."""
 
 
 class Current(Strict):
@@ -214,7 +214,7 @@ class Current(Strict):
     z_m_per_s: CurrentDistribution = 0.0
     """Upwards."""
     wave: CurrentWaveDescription | None = None
-    """A part that oscillates in one direction: mean + amplitude sin(2 pi (t + shift) / period)."""
+    """An oscillating part: mean + amplitude sin(2 pi (t + shift) / period)."""
 
 
 class Leak(Strict):
@@ -250,9 +250,9 @@ class Pipeline(Strict):
         (-44.49, -8.07, -20.0),
         (-51.56, -15.14, -20.0),
     )
-    """Vertices [x, y, z] in order; by default those of the exemplar."""
+    """Vertices [x, y, z]."""
     points_per_piece: Annotated[int, Field(strict=True, ge=1, le=1000)] = 20
-    """Evenly spaced points on each straight piece, without its first vertex."""
+    """Points on each straight piece."""
 
 
 _TIME = r"[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|inf)|nan"
@@ -263,15 +263,15 @@ class ThrusterEvent(Strict):
     """A failure or recovery of one thruster; also given as the exemplar writes it: "(1,failure,35)"."""
 
     thruster: Annotated[int, Field(strict=True, ge=1, le=len(THRUSTER_NAMES))]
-    """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
+    """1 to 4: front right, front left, rear right, rear left; 5 and 6: vertical, right and left."""
     event: Literal["failure", "recovery"]
     """What happens to it."""
     recoverable: bool = True
-    """Whether f_maintain_motion can recover the thruster after this failure."""
+    """Whether f_maintain_motion can recover the thruster."""
     failure_mode: Literal["frozen", "dead"] | None = None
-    """What the failed thruster does: `frozen` keeps its last thrust, `dead` gives none; by default the revision's."""
+    """A frozen thruster keeps its last thrust, a dead one gives none; by default the revision's."""
     time_s: TimeDistribution
-    """Drawn once per run; the revision says whether from the start or from the previous event. Below 0 it is 0."""
+    """From the start or, in revision 2023, from the previous event; drawn once per run."""
 
     @model_validator(mode="before")
     @classmethod
@@ -291,21 +291,21 @@ class Battery(Monitor):
     discharge_time_s: Duration = 200.0
     """Time from full (1.0) to empty (0.0)."""
     publishing_period_s: Period = 1.0
-    """Period at which its level is published."""
+    """Period of its monitor."""
     station_x_m: Coordinate = -3.0
     """Recharge station, east."""
     station_y_m: Coordinate = -2.0
     """Recharge station, north."""
     station_radius_m: Length = 0.5
-    """Half-width of the square within which the vehicle counts as docked."""
+    """Half-width of the square in which the vehicle is docked."""
     noise: ValueDistribution = 0.0
-    """Added to each measurement of the level, drawn each time."""
+    """Added to each measurement."""
     approach_altitude_m: Length = 1.25
-    """Altitude above the sea bed at which the station is approached."""
+    """Altitude at which the station is approached."""
     mission_ends_at_level: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    """Level at which the mission ends; by default it continues with an empty battery."""
+    """Level at which the mission ends."""
     docking_check_period_s: Period = 5.0
-    """Period at which the station is sent to the autopilot again."""
+    """Period at which the station is sent again."""
 
 
 # Tables of signals.

@@ -115,14 +115,14 @@ class Drawn(Strict):
 
 
 class Normal(Drawn):
-    """Normal distribution, optionally truncated to [minimum, maximum] (values outside are drawn again)."""
+    """Normal distribution, truncated to [minimum, maximum]."""
 
     distribution: Literal["normal"]
     """Bell-shaped."""
     mean: Number
-    """Mean, before truncation."""
+    """Mean before truncation."""
     std: NotNegative
-    """Standard deviation, before truncation."""
+    """Standard deviation before truncation."""
     minimum: Number | None = None
     """Smallest value, if any."""
     maximum: Number | None = None
@@ -182,7 +182,7 @@ class Exponential(Drawn):
     distribution: Literal["exponential"]
     """Mostly small values, rarely large ones."""
     mean: NotNegative
-    """Mean of the value that is added to the minimum."""
+    """Mean distance from the minimum."""
     minimum: Number = 0.0
     """Smallest value."""
 

@@ -74,7 +74,6 @@ class ManagerHost:
         is_event_triggered = declared is not None and not self.system.recorded  # a recorded mission makes every call
         if declared is not None and is_event_triggered:
             self._depends_on = [(measurements[name], declared[name]) for name in measurements if name in declared]
-        self._are_known = all(each.are_known for each, _ in self._depends_on)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         if times is not None:
@@ -143,11 +142,8 @@ class ManagerHost:
                 if event_s == inf:
                     yield env.event()  # until interrupted
                 tick_s = _tick_at_or_after(event_s, next_due_s, period_s)
-                if not self._are_known:  # the regions are only then
-                    yield exactly_at(env, tick_s)
                 if self._regions(tick_s) not in self._idle_regions:
-                    if self._are_known:
-                        yield exactly_at(env, tick_s)
+                    yield exactly_at(env, tick_s)
                     self._is_waiting = False
                     return tick_s
                 next_due_s = tick_s + period_s

@@ -130,7 +130,7 @@ class Mission:
         self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, recorder.log)
         signals = {each.key: each for each in measure_signals(loaded, draws, prepared.duration_s)}
         self._visibility = signals[WATER_VISIBILITY]
-        self._battery = measure_battery(described, draws)
+        self._battery = measure_battery(described, draws, prepared.duration_s)
         self._battery_only: Mapping[str, Measurements] = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
         self._measurements: Mapping[str, Measurements] = {**signals, **self._battery_only}
 

@@ -125,14 +125,6 @@ def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(st
     assert found.median_difference_s == pytest.approx(before["median_difference_s"], abs=1e-3)
 
 
-def test_an_ideal_vehicle_at_3_m_finds_the_pipeline_when_the_water_clears_and_an_adapting_one_a_turn_later(study):
-    module = study("when_adapting_pays")
-    case = module.PAPERS
-    for start_s in range(2, 26, 2):
-        assert 58.0 <= module.ideal(case, "fd_spiral_high", start_s) <= 70.0
-        assert module.ideal(case, None, start_s) > 90.0
-
-
 def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chance(study):
     module = study("predict")
     values = {1: [10.0, 12.0], 2: [20.0, 22.0], 3: [30.0, 32.0]}

@@ -189,11 +189,6 @@ def test_on_a_terminal_it_fits_and_is_gone_at_the_end(width):
 
 
 class TestLines:
-    def test_a_short_campaign_has_none(self):
-        text = io.StringIO()
-        shown_on(Console(file=text))
-        assert text.getvalue() == ""
-
     @pytest.mark.parametrize("terminal", [{}, {"force_terminal": True, "_environ": {"TERM": "dumb"}}])
     def test_a_long_one_has_some_and_a_last_one(self, terminal, monkeypatch):
         monkeypatch.setattr(display, "_FIRST_LINE_S", 0.0)

@@ -149,19 +149,6 @@ class TestDeclaredFiles:
         done = command_here(*RESUME, "--managers", ",".join(managers), "--runs", "2", cwd=folder)
         assert done.returncode == 2 and f"files_sha256.{changed} was" in done.stderr
 
-    def test_a_change_of_the_program_of_one_of_two_is_noticed_when_the_campaign_is_resumed(self, folder):
-        program = Path(__file__).parents[2] / "docs" / "examples" / "exec" / "manager.pl"
-        commands = []
-        for name in ("a/manager.pl", "b/manager.pl"):
-            (folder / name).parent.mkdir()
-            shutil.copy(program, folder / name)
-            commands.append(f"exec:perl {name}")
-        run_campaign("seams2023", commands, 1, out=folder / "out")
-        with (folder / "a/manager.pl").open("a") as file:
-            file.write("# changed")
-        done = command_here(*RESUME, "--managers", ",".join(commands), "--runs", "2", cwd=folder)
-        assert done.returncode == 2 and "files_sha256.a/manager.pl was" in done.stderr
-
 
 def test_a_check_that_raises_is_bad_input(folder):
     text = "\nclass Picky(NoManager):\n    @classmethod\n    def check(cls, loaded):\n        return loaded.no_such\n"

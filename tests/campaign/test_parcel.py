@@ -63,13 +63,6 @@ class TestOwnModules:
         found = user_modules(["mine.manager:M", "none", "metacontrol"], [])
         assert found == {place: folder / place for place in files if place != "mine/not_imported.py"}
 
-    def test_a_class_from_another_module_brings_both(self, folder):
-        (folder / "facade.py").write_text("from behind import M\n")
-        (folder / "behind.py").write_text(
-            "from suave_des.managing.simple import NoManager\nclass M(NoManager):\n    pass\n"
-        )
-        assert set(user_modules(["facade:M"], [])) == {"facade.py", "behind.py"}
-
     def test_of_a_script_what_it_imports(self, folder, monkeypatch):
         """Its own classes are sent by value."""
         from suave_des.managing.simple import NoManager

@@ -228,11 +228,6 @@ class TestOverwrite:
         assert ended.value.code == 2
         assert "are of different campaigns" in capsys.readouterr().err
 
-    def test_a_campaign_with_more_runs_is_the_same_campaign(self, received):
-        before = json.loads((received / "manifest.json").read_text())["campaign_sha256"]
-        resume_campaign(received, runs=4)
-        assert json.loads((received / "manifest.json").read_text())["campaign_sha256"] == before
-
 
 def test_the_time_out_follows_the_reasoner():
     def default(**options: object) -> float:

@@ -11,6 +11,7 @@ import pytest
 
 from suave_des.cli.console import PlainConsole, print_timeline
 from suave_des.cli.main import main
+from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import rows_of
@@ -133,12 +134,6 @@ class TestRun:
         metrics = json.loads((tmp_path / "mission" / "mission.json").read_text())["metrics"]
         assert {name: "" if value is None else str(value) for name, value in metrics.items()} == row
 
-    def test_a_manager_of_ones_own_from_the_current_folder(self, command, tmp_path):
-        (tmp_path / "my_manager.py").write_text(MANAGER)
-        ended = command("run", "seams2023", "--manager", "my_manager:Mine")
-        assert ended.status == 0
-        assert "about search_pipeline" in ended.out
-
     def test_a_manager_that_raises_ends_with_status_3_and_one_line(self, command, tmp_path):
         (tmp_path / "clumsy.py").write_text(MANAGER)
         ended = command("run", "seams2023", "--manager", "clumsy:Raises", "--out", "out")
@@ -235,3 +230,38 @@ def test_drawn_values_are_rounded_and_names_broken_to_fit_the_terminal(width, di
         exact = [[float(row[parameter]) for parameter in parameters] for row in csv.DictReader(file)]
     assert rows == [[f"{value:.{digits}g}" for value in values] for values in exact]
     assert any(len(repr(value)) > 8 for values in exact for value in values)  # or nothing was rounded
+
+
+IMPROVES = "revision.metacontrol.improve_when_exceeded"
+STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibility=4")
+
+
+@pytest.mark.parametrize(("improves", "functions"), [("true", ["f_generate_search_path"]), ("false", [])])
+def test_infer_decides_with_the_values_that_are_set(command, improves, functions):
+    _, out, _ = command("kb", "infer", *STATE, "--set", f"{IMPROVES}={improves}")
+    planned = out.partition("plan\n")[2]
+    assert [function for function in functions if function in planned] == functions
+    assert functions or planned == "  nothing to adapt\n"
+
+
+def test_missions_that_diff_runs_have_the_values_that_are_set(command):
+    options = ("--missions", "1", "--quiet", "--max-failed", "0")
+    means = []
+    for limit_s in (20, 60):
+        _, out, _ = command(
+            "kb", "diff", "suave.owl", "suave.owl", *options, "--set", f"mission.time_limit_s={limit_s}"
+        )
+        (row,) = (line for line in out.splitlines() if line.startswith("search time, s"))
+        means.append(float(row.split()[3]))
+    assert means[0] <= 21.0 < means[1]
+
+
+def test_tests_that_are_written_cannot_have_values_that_are_set(command):
+    status, _, err = command("kb", "test", "--coverage", "--write", "new.yaml", "--set", "knowledge.reasoner=pellet")
+    assert status == 2 and "name it with --scenario" in err
+    assert not Path("new.yaml").exists()
+
+
+def test_from_python_values_are_an_argument():
+    base = KnowledgeBase.load(values={IMPROVES: False})
+    assert KnowledgeBase.load().settings.improves_exceeded and not base.settings.improves_exceeded

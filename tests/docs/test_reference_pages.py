@@ -19,7 +19,6 @@ from tests.helpers.command import python
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
-UNITS = {"_s": "s", "_m": "m", "_rad": "rad"}
 
 
 def section(page, heading):
@@ -33,14 +32,18 @@ def tables(text):
     return [[[cell.strip() for cell in row.split("|")[1:-1]] for row in each.splitlines()[2:]] for each in found]
 
 
-def columns(text):
-    """Column and unit of each row of the first table."""
-    return [(cells[0].strip("`"), cells[1]) for cells in tables(text)[0]]
+def lists(text):
+    """Names that each list explains; after `a_mean`, `_std` stands for a_std."""
+    found = re.findall(r"(?:^- .*\n(?:  .*\n)*)+", text, flags=re.MULTILINE)
+    return [
+        [name for names in re.findall(r"^- (`.*?`): ", each, flags=re.MULTILINE) for name in whole(names)]
+        for each in found
+    ]
 
 
-def unit(column):
-    metric = re.sub(r"_(mean|std|median|ci95_low|ci95_high)$", "", column)
-    return next((text for ending, text in UNITS.items() if metric.endswith(ending)), "")
+def whole(names):
+    first, *others = [name.strip("`") for name in names.split(", ")]
+    return [first, *(first.removesuffix("_mean") + name if name.startswith("_") else name for name in others)]
 
 
 @pytest.mark.parametrize(
@@ -54,12 +57,11 @@ def unit(column):
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_columns_are_those_of_the_file(page, heading, names):
-    assert columns(section(page, heading)) == [(column, unit(column)) for column in names]
+    assert lists(section(page, heading))[0] == list(names)
 
 
 def test_every_further_metric_has_a_column_and_can_be_compared():
-    rows = tables(section(CSV_PAGE, "runs.csv"))[1]
-    assert {name.strip("`") for name, *_ in rows} == {*FURTHER_METRICS, "requirement_NAME"}
+    assert {*lists(section(CSV_PAGE, "runs.csv"))[1]} == {*FURTHER_METRICS, "requirement_NAME"}
     assert {*FURTHER_METRICS} <= METRICS.keys()
 
 
@@ -77,7 +79,7 @@ def test_columns_of_the_exemplar_s_file_are_those_of_its_revision(revision, plac
 
 @pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended"])
 def test_every_event_of_a_mission_is_in_the_list(scenario):
-    rows = tables(section(CSV_PAGE, "events.csv"))[1]
+    rows = tables(section(CSV_PAGE, "events.csv"))[0]
     listed = {(name.strip("`"), source) for names, source, _ in rows for name in names.split(", ")}
     events = run_mission(scenario, "metacontrol", run=1, seed=1).events
     assert {(event.event, event.source) for event in events} <= listed
@@ -90,8 +92,7 @@ def test_keys_of_the_manifest_and_of_a_mission_are_in_the_list(tmp_path):
 
     run_campaign("seams2023", ["none"], runs=1, seed=1, out=tmp_path / "campaign")
     manifest = json.loads((tmp_path / "campaign" / "manifest.json").read_text(encoding="utf-8"))
-    rows = tables(section(CSV_PAGE, "manifest.json"))[0]
-    listed = [name.strip("`") for names, _ in rows for name in names.split(", ")]
+    (listed,) = lists(section(CSV_PAGE, "manifest.json"))
     assert sorted(listed) == sorted(manifest)
 
     run_mission("seams2023", "none", run=1, seed=1, out=tmp_path / "mission")
@@ -109,7 +110,7 @@ PYTHON_PAGE = ROOT / "docs" / "reference" / "python-api.md"
 
 
 def test_the_python_page_lists_the_names_of_the_package_each_with_an_example():
-    names = [row[0].strip("`") for row in tables(PYTHON_PAGE.read_text(encoding="utf-8"))[0]]
+    names = re.findall(r"^- `(\w+)`: ", PYTHON_PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert sorted(names) == sorted(suave_des.__all__) and len(names) <= 40
     examples = "\n".join(block.text for block in blocks_of(PYTHON_PAGE) if block.language == "python")
     assert not [name for name in names if not re.search(rf"\b{name}\b", examples)]
@@ -179,7 +180,7 @@ def test_dependencies_are_explained():
         *(each for extra in project["optional-dependencies"].values() for each in extra),
     ]
     names = {re.match(r"[\w-]+", requirement)[0] for requirement in required} - {"suave-des"}
-    explained = set(re.findall(r"^\| (\w[\w-]*) \|", page, flags=re.MULTILINE)) - {"package", "what"}
+    explained = set(re.findall(r"^- (\w[\w-]*) \(", page, flags=re.MULTILINE))
     assert explained == names
 
 

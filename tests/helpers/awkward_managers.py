@@ -128,13 +128,6 @@ class Misspells(NoManager):
         self.system.change_mode("f_generate_search_path", "fd_spiral_hihg")
 
 
-class MisspellsFunction(NoManager):
-    """Requests a mode of a function that there is not."""
-
-    def mission_started(self) -> None:
-        self.system.change_mode("generate_search_path", "fd_spiral_high")
-
-
 class ReadsNothing(NoManager):
     """Reads a quality attribute whose name it misspells."""
 

@@ -6,12 +6,11 @@ from types import SimpleNamespace
 
 import simpy
 
-from suave_des.clock import Process
 from suave_des.domain import Task
 from suave_des.draws import Streams
 from suave_des.managing.base import ManagingSubsystem, System
-from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import Measurements, Thresholds
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.measurements import Measurements
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
@@ -42,20 +41,12 @@ class AskedModes:
 class Published(Measurements):
     """Values of a quality attribute, all of them published by now."""
 
-    are_known = False
-
     def __init__(self) -> None:
         self.times_s: list[float] = []
         self.values: list[float] = []
 
     def count_until(self, t_s: float) -> int:
         return len(self.values)
-
-    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        raise AssertionError("what will be published is not known")
-
-    def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
-        raise AssertionError("it is published already")
 
 
 def system_of(

@@ -105,10 +105,6 @@ class EventTriggeredByProperty(EventTriggered):
         return {"water_visibility": tuple(self.system.settings.get("thresholds_m", (2.0, 3.0)))}
 
 
-class DependsOnTheBattery(EventTriggered):
-    depends_on: ClassVar = {"battery_level": (0.5,)}
-
-
 class DependsOnNoMeasuredValue(EventTriggered):
     depends_on: ClassVar = {}
 
@@ -264,21 +260,6 @@ class PlansLow(Metacontrol):
         low = {"f_generate_search_path": "fd_spiral_low"}
         decisions = super().plan(inference).decisions
         return Plan(tuple(replace(each, design=low.get(each.function, each.design)) for each in decisions))
-
-
-class CountsIdleCycles(Metacontrol):
-    """Requests a mode in the 25th cycle that changes nothing, and so does not say what it depends on."""
-
-    def __init__(self, system: System) -> None:
-        super().__init__(system)
-        self._idle = 0
-
-    def adapt(self):
-        execution = super().adapt()
-        self._idle += execution is None
-        if self._idle == 25:
-            self.system.change_mode("f_generate_search_path", "fd_spiral_low")
-        return execution
 
 
 class DoesMore(Metacontrol):

@@ -62,7 +62,7 @@ def test_the_examples_carry_out_the_same_missions(language, tmp_path):
 
 
 SAME = '''
-from suave_des.managing.reference import Threshold
+from suave_des.managing.simple import Threshold
 
 class Same(Threshold):
     """The examples, in this process."""

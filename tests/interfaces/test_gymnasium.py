@@ -54,12 +54,6 @@ def test_an_episode_is_the_mission_of_its_seed(simulator):
     assert (found.search_time_s, found.distance_inspected_m) == (expected.search_time_s, expected.distance_inspected_m)
 
 
-def test_a_step_lasts_one_period(simulator):
-    environment = gymnasium.make(NAME, scenario=simulator, period_s=7.5)
-    environment.reset(seed=1)
-    assert [environment.step([0, 0])[4]["time_s"] for _ in range(3)] == [7.5, 15.0, 22.5]
-
-
 def test_an_observation_has_what_monitors_measured(simulator):
     environment = gymnasium.make(NAME, scenario=simulator)
     names = environment.unwrapped.observation_names

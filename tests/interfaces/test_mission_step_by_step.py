@@ -53,14 +53,6 @@ def test_it_stops_at_its_end(simulator):
     assert mission.task is None
 
 
-def test_reading_the_metrics_on_the_way_changes_nothing(simulator):
-    mission = Mission(simulator, run=5)
-    while not mission.is_over:
-        mission.advance(mission.now_s + 10.0)
-        assert mission.metrics().mission_duration_s == mission.now_s
-    assert mission.metrics().distance_inspected_m == simulator.run("none", 5, 1).metrics.distance_inspected_m
-
-
 @pytest.mark.parametrize(
     ("function", "mode", "words"),
     [

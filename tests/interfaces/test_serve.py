@@ -100,13 +100,6 @@ def test_a_client_goes_through_a_whole_mission_and_the_same_seed_gives_the_same_
     assert whole_mission(port, 3) == (first, metrics)
 
 
-def test_it_is_the_mission_of_that_run(port, simulator):
-    request(port, "POST", "/start", {"run": 5, "seed": 2})
-    request(port, "POST", "/advance", {"until_s": 1000})
-    found = json.loads(request(port, "GET", "/metrics")[1])
-    assert found["search_time_s"] == simulator.run("none", 5, 2).metrics.search_time_s
-
-
 def test_time_stands_still_until_a_client_says_so(port):
     assert request(port, "GET", "/monitor") == request(port, "GET", "/monitor")
     status, body = request(port, "POST", "/advance", {"advance_s": 2.5})
@@ -142,14 +135,6 @@ def test_what_it_cannot_use_is_refused_and_changes_nothing(port, method, path, b
     found, answer = request(port, method, path, body)
     assert found == status and words in json.loads(answer)["error"]
     assert request(port, "GET", "/monitor") == before
-
-
-def test_null_leaves_a_mode_as_it_is(port):
-    before = json.loads(request(port, "GET", "/monitor")[1])
-    keys = json.loads(request(port, "GET", "/execute_schema")[1])["properties"]
-    status, body = request(port, "PUT", "/execute", dict.fromkeys(keys))
-    assert status == 200 and json.loads(body) == {"time_s": before["time_s"], "is_over": False}
-    assert json.loads(request(port, "GET", "/monitor")[1]) == before
 
 
 @pytest.mark.parametrize(

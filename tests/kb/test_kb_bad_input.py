@@ -21,6 +21,7 @@ ASKING = {
     "policy": ("--max-failed", "0"),
     "query": ("SELECT ?s WHERE { ?s a ?t } LIMIT 1", "--inferred"),
 }
+UNKNOWN_KEY = ("--set", "mission.time_limt_s=9")
 EDITING = {"add-rule": (RULE,), "remove-rule": ("S1a",), "enable-rule": ("S1a",), "disable-rule": ("S1a",)}
 NAMESPACES = (
     'xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#" '
@@ -71,6 +72,32 @@ def refused(command, name, arguments, said):
     assert error.startswith("suave-des: ") and error.count("\n") == 1, name
     assert said in error, name
     assert files_in(Path()) == before, name
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("infer", "--at", "c_thruster_7=FALSE"), "--at: there is no quality attribute, component or function 'c_thr"),
+        (("infer", "--at", "c_thruster_1=false"), "no rule mentions the c_status 'false' (did you mean 'FALSE'?"),
+        (("infer", "--at", "f_maintain_motion=ungrounded"), "--at: f_maintain_motion has no function design 'ungrou"),
+        (("infer", "--at", "nowhere@3"), "nowhere: no such folder"),
+        (("infer", "--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
+        (("infer", "--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
+        (("infer", "--reasoner", "hermit"), "there is no reasoner 'hermit'"),
+        (("policy", "--csv", "."), ".: is a folder (name a file"),
+        (("policy", "--max-failed", "-1"), "--max-failed"),
+        (("try", RULE, "--disable", "S1a", "--on", "flown"), "give a rule, or --disable NAME"),
+        (("try", "--on", "flown"), "give a rule, or --disable NAME"),
+        (("try", "--disable", "S1x", "--on", "flown"), "--disable: there is no rule S1x"),
+        (("try", "near: FunctionGroundin(?fg) -> fg_status(?fg, 3)", "--on", "flown"), "FunctionGroundin is not defin"),
+        *(((name, *asked, *UNKNOWN_KEY), "did you mean 'time_limit_s'") for name, asked in ASKING.items()),
+        (("test", *UNKNOWN_KEY), "did you mean 'time_limit_s'"),
+        (("diff", "suave.owl", "suave.owl", *UNKNOWN_KEY), "did you mean 'time_limit_s'"),
+    ],
+)
+def test_words_that_no_command_can_use(folder, command, words, said):
+    name, *arguments = words
+    refused(command, name, arguments, said)
 
 
 @pytest.mark.parametrize("kind", UNREADABLE)
@@ -139,7 +166,7 @@ def test_rules_that_contradict_each_other_are_named(folder, command):
     refused(command, "infer", (*STATE, *rules), "by the rules clash (clash.swrl, line 2), near (clash.swrl, line 1)")
     status, text, _ = command("check", *rules)
     assert status == 1
-    assert "by the rules clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text
+    assert "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text  # what follows from them may clash, too
     status, text, _ = command("explain", *STATE, *rules)
     assert status == 0
     assert "contradiction" in text and "by rule clash" in text and "by rule near" in text

@@ -36,13 +36,6 @@ def test_without_objectives_the_search_task_s_are_asked_for(knowledge):
     )
 
 
-def test_the_revision_decides_whether_the_search_always_improves():
-    later = KnowledgeBase.load(scenario="release15")
-    assert later.state().objectives[0].always_improve
-    decision = later.infer(later.state(groundings={"f_generate_search_path": "fd_spiral_low"})).plan.decisions
-    assert decision[0].design == "fd_spiral_high"
-
-
 def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
     file = tmp_path / "state.yaml"
     file.write_text(
@@ -76,25 +69,6 @@ def test_a_wrong_file_is_told_with_its_place(knowledge, tmp_path, text, said):
         knowledge.state(file)
     assert said in str(error.value)
     assert str(file) in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--at", "c_thruster_7=FALSE"), "--at: there is no quality attribute, component or function 'c_thruster_7'"),
-        (("--at", "c_thruster_1=false"), "no rule mentions the c_status 'false' (did you mean 'FALSE'?"),
-        (("--at", "f_maintain_motion=ungrounded"), "--at: f_maintain_motion has no function design 'ungrounded'"),
-        (("--at", "nowhere@3"), "nowhere: no such folder"),
-        (("--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
-        (("--reasoner", "hermit"), "there is no reasoner 'hermit'"),
-        (("--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
-    ],
-)
-def test_what_cannot_be_used_ends_in_one_line(command, words, said):
-    status, text, error = command("infer", *words)
-    assert (status, text) == (2, "")
-    assert said in error
-    assert error.count("\n") == 1
 
 
 def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
@@ -215,12 +189,6 @@ except KnowledgeError:
 SEARCH = "f_generate_search_path"
 
 
-def test_asks_the_ontologies(knowledge):
-    found = knowledge.query(f"SELECT ?d WHERE {{ ?d tomasys:solvesF suave:{SEARCH} }}")
-    assert found.columns == ("d",)
-    assert found.rows == (("suave:fd_spiral_high",), ("suave:fd_spiral_low",), ("suave:fd_spiral_medium",))
-
-
 def test_inferred_facts_are_there_when_asked_for(knowledge):
     state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
     query = "SELECT ?g ?s WHERE { ?g tomasys:fg_status ?s }"
@@ -235,11 +203,6 @@ def test_answers_are_the_same_each_time():
     first, second = ([KnowledgeBase.load().query(query).rows for query in queries] for _ in range(2))
     assert first == second
     assert all(first)
-
-
-def test_columns_of_all_variables_are_by_name(knowledge):
-    found = knowledge.query("SELECT  * WHERE { ?zone suave:on ?a ; suave:to ?m . ?b suave:of ?z1, ?c, [] }")
-    assert found.columns == ("a", "b", "c", "m", "z1", "zone")
 
 
 @pytest.mark.parametrize(

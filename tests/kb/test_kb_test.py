@@ -77,9 +77,6 @@ def test_a_region_stands_for_all_kinds_of_values_in_it(suite, run):
     assert failure.situation.ranges == "water_visibility 2.25"
 
 
-GIVEN = "given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: %s}}"
-
-
 def test_facts_may_introduce_individuals_and_contradict_the_state(suite, run):
     tests = suite("""
         - name: a binding

@@ -1,6 +1,5 @@
 """kb try, and the record of knowledge states that it works on."""
 
-import csv
 import itertools
 import json
 
@@ -43,19 +42,6 @@ def test_a_mission_keeps_every_state_that_differs_from_the_one_before(mission):
     assert knowledge_text(records) == (folder / KNOWLEDGE_FILE).read_text()
     assert all(one.state != other.state for one, other in itertools.pairwise(records))
     assert [record.t_s for record in records] == sorted(record.t_s for record in records)
-
-
-def test_a_manager_that_does_not_reason_leaves_no_such_file(tmp_path):
-    run_mission("seams2023", "none", 1, 1, tmp_path / "none")
-    assert not (tmp_path / "none" / KNOWLEDGE_FILE).exists()
-
-
-def test_adaptations_tell_why_the_other_designs_were_left_out(mission):
-    folder, _ = mission
-    rows = list(csv.DictReader((folder / "events.csv").open()))
-    lower = next(row["detail"] for row in rows if "-> fd_spiral_medium: o_status IN_ERROR_NFR" in row["detail"])
-    assert "; not fd_spiral_high: water_visibility " in lower
-    assert lower.endswith("measured < 3.25 expected")
 
 
 def test_a_rule_fires_exactly_where_its_body_holds(mission):
@@ -152,23 +138,6 @@ def test_a_damaged_record_of_a_campaign_is_reported(tmp_path, command, line, sai
     status, _, error = command("try", NEAR, "--on", tmp_path)
     assert (status, error.count("\n")) == (2, 1)
     assert f"knowledge_states.jsonl: {said}" in error
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ((NEAR, "--disable", "S1a"), "give a rule, or --disable NAME"),
-        ((), "give a rule, or --disable NAME"),
-        (("--disable", "S1x"), "--disable: there is no rule S1x"),
-        (("near: FunctionGroundin(?fg) -> fg_status(?fg, 3)",), "FunctionGroundin is not defined"),
-        (("near FunctionGrounding(?fg)",), "the rule"),
-    ],
-)
-def test_what_cannot_be_tried_is_reported(mission, command, words, said):
-    status, text, error = command("try", *words, "--on", mission[0])
-    assert (status, text) == (2, "")
-    assert said in error
-    assert error.count("\n") == 1
 
 
 def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):

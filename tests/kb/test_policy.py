@@ -157,15 +157,6 @@ class TestPolicy:
 
 
 class TestFiles:
-    @pytest.mark.parametrize(
-        ("words", "said"),
-        [(("--csv", "."), ".: is a folder (name a file"), (("--max-failed", "-1"), "--max-failed")],
-    )
-    def test_what_cannot_be_meant_ends_in_one_line(self, command, words, said):
-        status, text, error = command("policy", *words)
-        assert (status, text) == (2, "")
-        assert said in error
-
     def test_the_csv_file_has_every_cell(self, command, tmp_path, policy):
         file, picture = tmp_path / "policy.csv", tmp_path / "policy.png"
         status, text, _ = command("policy", "--max-failed", "1", "--csv", file, "--png", picture)
@@ -191,9 +182,6 @@ RULES = {
         " -> fd_realisability(fd_spiral_high, false)"
     ),
     "two attributes are compared": f"own: {OF_TWO} ^ lessThan(?v, ?w) -> fd_realisability(fd_spiral_high, false)",
-    "values of any attribute are compared with a number": (
-        "own: hasValue(?q, ?v) ^ greaterThan(?v, 3.4) -> fd_realisability(fd_spiral_medium, false)"
-    ),
     "values of any two are compared": (
         "own: hasValue(?q, ?v) ^ hasValue(?p, ?w) ^ greaterThan(?v, ?w) ^ isQAtype(?p, battery_level)"
         " -> fd_realisability(fd_spiral_low, false)"
@@ -252,11 +240,3 @@ def test_all_states_of_the_extended_mission_are_decided_in_a_minute():
     policy = KnowledgeBase.load(scenario="extended").policy(2, on_count=lambda *count: counts.append(count))
     assert len(policy.cases) > 90_000
     assert counts[0][0] == 0 < counts[0][1] < len(policy.cases) / 10
-
-
-def test_long_work_is_announced_before_it_begins(command, monkeypatch):
-    from suave_des.cli.kb import options
-
-    monkeypatch.setattr(options, "_LONG_S", 0.0)
-    _, _, error = command("policy", "--max-failed", "0")
-    assert "102 kinds of states have to be inferred: about 1 s" in error

@@ -122,17 +122,6 @@ def test_of_what_is_added_nothing_stays_in_a_file_whose_rules_are_marked_but_who
     assert path.read_bytes() == original
 
 
-@pytest.mark.parametrize("style", STYLES)
-def test_a_rule_of_the_file_itself(owl, style):
-    STYLES[style](owl)
-    before = said(owl)
-    assert set_enabled(owl, "QAWaterVisibility", enabled=False)
-    assert {name for name, _, enabled in said(owl) if not enabled} == {"QAWaterVisibility"}
-    remove_rule(owl, "QAWaterVisibility")
-    assert {name for name, *_ in before - said(owl)} == {"QAWaterVisibility"}
-    assert b"IN_ERROR_NFR" not in owl.read_bytes()
-
-
 def test_only_the_mark_is_written_when_there_is_none(owl):
     text = owl.read_text(encoding="utf-8")
     mark = next(line for line in text.splitlines(keepends=True) if "<swrla:isRuleEnabled rdf" in line)
@@ -228,14 +217,3 @@ def test_links_and_permissions_stay(owl):
     assert link.is_symlink()
     assert stat.S_IMODE(owl.stat().st_mode) == 0o640
     assert {name for name, _, enabled in said(owl) if not enabled} == {"QAWaterVisibility"}
-
-
-@pytest.mark.parametrize("atoms", [100, pytest.param(1000, marks=pytest.mark.slow)])
-def test_a_rule_of_many_atoms(owl, atoms):
-    body = " ^ ".join(f"hasValue(?q, ?v{number})" for number in range(atoms))
-    before = said(owl)
-    add_rules(owl, f"Long: {body} -> Role(?q)")
-    (new,) = said(owl) - before
-    assert new[1].count("hasValue") == atoms
-    remove_rule(owl, "Long")
-    assert said(owl) == before

@@ -1,6 +1,7 @@
 """kb why-not: why a rule does not fire, in one line."""
 
 import itertools
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -9,15 +10,186 @@ from hypothesis import strategies as st
 from suave_des.errors import InputError
 from suave_des.kb.matching import Probes
 from suave_des.kb.space import Situation
+from suave_des.kb.states import FactReader, ManagingSettings, StateBuilder
 from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
 from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
-from tests.helpers.rule_questions import CASES, answered
+from tests.helpers.owl_text import SUAVE, XSD
 
 SEARCH = "f_generate_search_path"
+HIGH = {"groundings": {SEARCH: "fd_spiral_high"}}
+MEASURED = "hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v)"
+OWL = "http://www.w3.org/2002/07/owl#"
+PROPERTY = f'<owl:DatatypeProperty rdf:about="{SUAVE}depth_class"/>'
+WORKING = f"""
+<owl:Class rdf:about="{SUAVE}Failed"/>
+<owl:Class rdf:about="{SUAVE}Working"><owl:equivalentClass><owl:Class>
+<owl:complementOf rdf:resource="{SUAVE}Failed"/></owl:Class></owl:equivalentClass></owl:Class>
+"""
+WHOLE = f"""
+<rdf:Description rdf:about="{SUAVE}c_thruster_1"><suave:depth_class xmlns:suave="{SUAVE}"
+rdf:datatype="{XSD}double">3.0</suave:depth_class></rdf:Description>
+"""
+
+# What is asked, the rule, the state (and what is asserted besides), what the ontology has more, and the answer.
+CASES = {
+    "a comparison that is misspelt": (
+        f"r: {MEASURED} ^ swrlb:lesThan(?v, 3.0) -> fd_realisability(fd_spiral_high, false)",
+        HIGH,
+        "",
+        "line 1, column 78: rule r: there is no builtin lesThan in Pellet (did you mean lessThan?)",
+    ),
+    "a built-in of another rule engine": (
+        "prefix temporal: <http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#>\n"
+        "r: Component(?c) ^ temporal:before(?c, ?d) -> Component(?d)",
+        {},
+        "",
+        "mine.swrl: line 2, column 20: ",
+    ),
+    "an integer where the values are decimals": (
+        "r: hasValue(?q, 1) -> QAvalue(?q)",
+        {},
+        "",
+        "1 is not a decimal, the range of hasValue: it never matches (write 1.0)",
+    ),
+    "an exact number and an inexact one": (
+        "r: depth_class(?c, 3.0) -> Component(?c)",
+        {},
+        PROPERTY + WHOLE,
+        "depth_class(?c, 3.0) does not hold: found depth_class 3.0, needed 3.0; double and decimal never match, even "
+        'where they look alike: write "3.0"^^xsd:double',
+    ),
+    "a number in quotes": (
+        f'r: {MEASURED} ^ lessThan(?v, "3.0") -> fd_realisability(fd_spiral_high, false)',
+        HIGH | {"measurements": {"water_visibility": 2}},
+        "",
+        'lessThan(?v, "3.0") does not hold: "3.0" is text, and never compares with the number 2 (?v); write it without '
+        "quotes",
+    ),
+    "a property that nothing declares": (
+        "r: hasDepth(?fg, ?d) -> fd_realisability(fd_spiral_high, false)",
+        HIGH,
+        "",
+        "line 1, column 4: hasDepth is not defined",
+    ),
+    "a class with a typo": (
+        "r: FunctionGroundng(?fg) -> fd_realisability(fd_spiral_high, false)",
+        HIGH,
+        "",
+        "line 1, column 4: FunctionGroundng is not defined (did you mean FunctionGrounding?)",
+    ),
+    "an individual with a typo": (
+        "r: isQAtype(?q, water_visibilty) -> QAvalue(?q)",
+        {},
+        "",
+        "line 1, column 17: water_visibilty is not defined (did you mean water_visibility?)",
+    ),
+    "a text in another case": (
+        'r: c_status(?c, "Failed") -> Component(?c)',
+        {"facts": ["c_status(c_thruster_1, FAILED)"]},
+        "",
+        'c_status(?c, "Failed") does not hold: found c_status "FAILED", needed "Failed"; they differ in case or spaces',
+    ),
+    "a truth value where there is text": (
+        None,
+        {"components": {"c_thruster_1": "FALSE"}, "facts": ["Binding(b)", "binding_component(b, c_thruster_1)"]},
+        "",
+        'c_status(?c, false) does not hold: found c_status "FALSE" of c_thruster_1, needed false; string and boolean '
+        'never match, even where they look alike: write "FALSE"',
+        "S2",
+    ),
+    "negation as what is not known": (
+        "r: Component(?c) ^ Working(?c) -> fd_realisability(fd_spiral_high, false)",
+        {},
+        WORKING,
+        "Working(?c) does not hold: c_thruster_1 is not known to be a Working",
+    ),
+    "two names for what may be one thing": (
+        "r: Component(?a) ^ Component(?b) ^ differentFrom(?a, ?b) -> fd_realisability(fd_spiral_high, false)",
+        {},
+        "",
+        "differentFrom(?a, ?b) does not hold: OWL does not assume that different names mean different individuals: "
+        "assert it",
+    ),
+    "a variable of the head that the body does not bind": (
+        "r: Component(?c) -> requiredBy(?c, ?fd)",
+        {},
+        "",
+        "column 36: rule r: ?fd occurs in the head, but the body does not bind it",
+    ),
+    "a compared variable that nothing binds": (
+        "r: QAvalue(?q) ^ lessThan(?v, 3.0) -> fd_realisability(fd_spiral_high, false)",
+        {},
+        "",
+        "column 27: rule r: ?v has no value in lessThan: no other atom binds it",
+    ),
+    "a data property with an individual": (
+        "r: c_status(?c, c_thruster_1) -> Component(?c)",
+        {},
+        "",
+        "c_status: c_thruster_1 is an individual where a value is needed",
+    ),
+    "a rule that is switched off": (
+        "disabled r: Component(?c) -> fd_realisability(fd_spiral_high, false)",
+        {},
+        "",
+        "never fires: it is disabled",
+    ),
+    "a value on the limit": (
+        None,
+        HIGH | {"measurements": {"water_visibility": "3.25"}},
+        "",
+        "lessThan(?measured, ?expected) does not hold: found 3.25 (?measured), needed less than 3.25 (?expected)",
+        "QAWaterVisibility",
+    ),
+    "a fact that another rule would have to conclude": (
+        None,
+        HIGH | {"measurements": {"water_visibility": 4}},
+        "",
+        'fg_status(?fg, "IN_ERROR_NFR") does not hold: fg_spiral_high has no fg_status; QAWaterVisibility would '
+        "conclude it, but its lessThan(?measured, ?expected) fails: found 4 (?measured), needed less than 3.25 "
+        "(?expected)",
+        "S1b",
+    ),
+    "a computed value": (
+        f"r: {MEASURED} ^ multiply(?w, ?v, 2.0) ^ greaterThan(?w, 5.0) -> fd_realisability(fd_spiral_high, false)",
+        HIGH | {"measurements": {"water_visibility": "2.25"}},
+        "",
+        "greaterThan(?w, 5.0) does not hold: found 4.5 (?w), needed greater than 5.0",
+    ),
+    "a state that contradicts itself": (
+        None,
+        HIGH | {"measurements": {"water_visibility": 1}, "facts": ["fg_status(fg_spiral_high, OK)"]},
+        "",
+        "nothing follows, as the state contradicts itself: ",
+        "S1b",
+    ),
+}
+
+
+def answered(name: str, ontology: Path, folder: Path) -> str:
+    """What is said to a case's question, of suave.owl with what the case adds."""
+    text, parts, _, _, *names = CASES[name]
+    parts = dict(parts)
+    facts = parts.pop("facts", ())
+    rules = folder / "mine.swrl"
+    rules.write_text((text or "") + "\n", encoding="utf-8")
+    loaded = load_scenario("seams2023", ontologies=[ontology], rules=[rules])
+    try:
+        base = open_base(loaded)
+    except InputError as error:
+        return str(error)
+    reader = FactReader(base)
+    reader.declare(facts)
+    base = base.with_facts(map(reader.triple, facts))
+    builder = StateBuilder(base, ManagingSettings.of(loaded.scenario))
+    for kind, content in parts.items():
+        for thing, value in content.items():
+            builder.add(kind, thing, value)
+    return str(RuleQuestions(base).why_not((names or ["r"])[0], builder.state()))
 
 
 @pytest.fixture(scope="module")

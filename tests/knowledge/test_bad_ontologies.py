@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from decimal import Decimal
 
 import pytest
 
@@ -12,7 +11,7 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import read_ontology
 from suave_des.knowledge.reasoner import Reasoner
-from tests.helpers.knowledge_states import FOLLOW, searching
+from tests.helpers.knowledge_states import searching
 from tests.helpers.owl_text import individual, rule
 
 HEAD = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">\n'
@@ -105,15 +104,6 @@ def test_simple_entities_as_protege_writes_them_are_read(suave_copy, kb):
     assert [one.text for one in base.rules] == [one.text for one in kb.rules]
 
 
-def test_a_function_that_the_mission_needs_must_have_a_design(suave_copy):
-    solves = '<tomasys:solvesF rdf:resource="http://www.metacontrol.org/suave#f_follow_pipeline"/>'
-    base = Ontology.load([suave_copy(replace={solves: ""})])
-    problem = problem_of(lambda: base.check([FOLLOW]))
-    assert "function f_follow_pipeline has no function design" in problem
-    assert "suave.owl" in problem
-    assert "there is no function f_dance" in problem_of(lambda: base.check(["f_dance"]))
-
-
 @pytest.mark.parametrize(
     ("value", "datatype"),
     [("deep", "decimal"), ("2.25", "double"), ("2.25", "string"), ("1e3", "decimal"), ("NaN", "decimal")],
@@ -136,12 +126,6 @@ def test_an_unknown_operator_is_reported(suave_copy):
 def test_two_things_of_one_kind_and_name_are_reported(suave_copy):
     path = suave_copy(individual("mros:fd_spiral_low", "FunctionDesign"))
     assert "two function designs have this name" in problem_of(lambda: Ontology.load([path]))
-
-
-def test_an_overridden_value_must_exist(suave_copy):
-    problem = problem_of(lambda: Ontology.load([suave_copy()], values={"qa_water_visibility_hihg": Decimal(2)}))
-    assert "no individual qa_water_visibility_hihg with a hasValue" in problem
-    assert "qa_water_visibility_high" in problem
 
 
 def test_two_values_of_a_functional_property_are_reported_with_line(suave_copy):

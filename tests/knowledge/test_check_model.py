@@ -113,12 +113,6 @@ def test_names_that_individuals_misspell_are_errors(case, tmp_path):
     assert f"#{name}" in text.splitlines()[(error.line or 0) - 1]
 
 
-def test_names_of_other_vocabularies_may_be_defined_elsewhere(tmp_path):
-    note = '<dc:creator xmlns:dc="http://purl.org/dc/elements/1.1/">me</dc:creator>'
-    findings = found(tmp_path, extra=individual("f_new", "Function", note))
-    assert [each.message for each in warnings(findings)] == ["function f_new has no function design"]
-
-
 def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path):
     known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
     warning = only(found(tmp_path, **known), "fd_spiral_medium expects a visibility of 2.25 m")
@@ -228,11 +222,6 @@ def test_an_edit_that_means_something_else(case, tmp_path):
 )
 def test_right_edits(extra, tmp_path):
     assert not warnings(found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]))
-
-
-def test_a_value_that_nothing_refers_to_is_noted(tmp_path):
-    spare = individual("qa_spare", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5"))
-    assert only(found(tmp_path, extra=spare), "qa_spare: nothing refers to it").level is Level.INFO
 
 
 def test_a_comparison_operator_with_and_without_its_datatype(tmp_path):

@@ -48,16 +48,6 @@ def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped, 
     assert len({base.content_hash for base in bases}) == 1
 
 
-def test_files_in_different_folders_and_under_other_names_are_matched_by_iri(shipped, tmp_path):
-    files = write_exemplar_files(shipped, tmp_path / "owl")
-    moved = []
-    for number, file in enumerate(files.values()):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        moved.append(file.rename(folder / f"mine_{number}.owl"))
-    assert set(Ontology.load(moved).files) == set(moved)
-
-
 def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(suave_copy, shipped, tmp_path):
     path = suave_copy()
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
@@ -77,14 +67,6 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(suave_c
 def test_known_iris_resolve_to_the_shipped_files(suave_copy, shipped, iri):
     path = suave_copy(replace={IMPORT: iri})
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
-
-
-def test_a_given_mros_file_stands_in_for_the_shipped_rules_of_that_part(shipped, tmp_path, kb):
-    files = write_exemplar_files(shipped, tmp_path / "owl")
-    files["tomasys"].unlink()
-    base = Ontology.load([files["mros"], files["suave"]])
-    assert shipped / "tomasys.owl" in base.files
-    assert sorted(rule.name for rule in base.rules) == sorted(rule.name for rule in kb.rules)
 
 
 def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy):

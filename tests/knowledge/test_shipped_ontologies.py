@@ -89,13 +89,6 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
     kb.check(kb.functions)
 
 
-def test_each_rules_variables_are_declared(shipped):
-    for path in shipped.glob("*.owl"):
-        graph = Graph().parse(path, format="xml")
-        used = {term for triple in graph for term in triple if str(term).startswith("urn:swrl:var#")}
-        assert used == set(graph.subjects(RDF.type, URIRef(SWRL + "Variable")))
-
-
 def test_proteges_catalogue_leads_each_import_to_a_shipped_file(shipped):
     catalogue = ElementTree.parse(shipped / "catalog-v001.xml").getroot()
     leads = {entry.attrib["name"]: entry.attrib["uri"] for entry in catalogue}

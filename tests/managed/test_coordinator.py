@@ -114,20 +114,6 @@ def test_search_time_is_the_limit_when_nothing_was_found(name):
     assert mission.coordinator.search_time_or_limit_s == 100.0
 
 
-def test_detection_before_the_search_was_requested_keeps_its_own_time():
-    assert Mission("1.5", 2.2, start_delay_s=5.0).run().coordinator.search_time_s == 2.0
-
-
-def test_tasks_and_the_missions_end_are_recorded():
-    assert Mission("2023", 73.45).run().logged == [
-        (0.0, "task_requested", "search_pipeline"),
-        (74.35, "task_done", "search_pipeline"),
-        (74.35, "task_requested", "inspect_pipeline"),
-        (300.2, "task_cancelled", "inspect_pipeline"),
-        (300.2, "mission_ended", "time limit"),
-    ]
-
-
 @pytest.mark.parametrize(("limit_s", "end_s"), [(300.0, 300.2), (100.21, 100.7), (100.7, 100.7)])
 @BOTH
 def test_the_limit_is_checked_every_half_second(name, limit_s, end_s):

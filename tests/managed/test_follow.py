@@ -110,13 +110,6 @@ def test_revision_2025_sends_a_point_again_at_each_poll_after_the_tenth(env):
     assert vehicle.times_s == [0.0, 22.0, 24.0, 26.0]
 
 
-def test_a_point_reached_at_the_tenth_poll_is_not_sent_again(env):
-    vehicle = MovingVehicle(lambda t_s: (0.0 if t_s > 1.9 else 50.0, 0.0, -18.75))
-    follow_of(env, "2023", vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
-    env.run(until=2.1)
-    assert [place[:2] for place in vehicle.commanded] == [(0.0, 0.0), (9.0, 9.0)]
-
-
 # Deactivation and activation. The vehicle's box for -2.0 m (fifth point) is reached before 8 s in both revisions.
 
 
@@ -188,30 +181,6 @@ def test_without_a_detection_there_is_nothing_to_follow(env, name):
     follow_of(env, name, vehicle, None).apply(ACTIVE)
     env.run(until=60.0)
     assert vehicle.commanded == []
-
-
-@BOTH
-def test_a_finished_path_is_not_followed_again(env, name):
-    vehicle = PlacedVehicle(obeys=True)
-    follow = follow_of(env, name, vehicle)
-    follow.apply(ACTIVE)
-    env.run(until=5.0)
-    sent = len(vehicle.commanded)
-    follow.apply(INACTIVE)
-    follow.apply(ACTIVE)
-    env.run(until=10.0)
-    assert len(vehicle.commanded) == sent
-
-
-@BOTH
-def test_the_real_vehicle_follows_a_straight_line_at_the_observed_speed(env, name):
-    autopilot = Autopilot()
-    vehicle = Vehicle(BLUEROV2, autopilot, Pose(0.0, 0.0, -18.75, 0.0, 0.0, 0.0), 200.0)
-    path = [(-0.5 * n, 0.0) for n in range(200)]
-    follow = follow_of(env, name, vehicle, path)
-    follow.apply(ACTIVE)
-    env.run(until=100.0)
-    assert 0.21 < follow.distance_m / 100.0 < 0.32  # published runs: 0.21 to 0.30 m/s
 
 
 # When several things happen at one time

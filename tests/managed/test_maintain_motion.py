@@ -100,7 +100,7 @@ def test_a_second_recovery_can_follow_the_first(name):
 
 def recharging() -> tuple[simpy.Environment, PlacedVehicle, GenerateRechargePath]:
     env, vehicle = simpy.Environment(), PlacedVehicle()
-    level = BatteryMeasurements(200.0, Timing(1.0, 0.5))
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 1000.0)
     node = GenerateRechargePath(env, sender(env, vehicle), Battery(), level, phase_s=0.5)
     node.apply(ACTIVE)
     return env, vehicle, node
@@ -119,7 +119,7 @@ def test_docking_is_checked_when_the_station_is_sent():
     env.run(until=155.4)
     assert node.level.recharges == 0
     env.run(until=156.0)
-    assert (node.level.recharges, node.level.level(155.5), node.level.times_s[-1]) == (1, 1.0, 155.5)
+    assert (node.level.recharges, node.level.level(155.5), node.level.value(155.5)) == (1, 1.0, 1.0)
 
 
 def test_inactive_it_leaves_the_autopilot_to_others():

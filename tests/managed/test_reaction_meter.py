@@ -12,7 +12,7 @@ import simpy
 
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.measurements import SignalMeasurements, Timing
+from suave_des.monitor.measurements import Measurements, Timing
 from suave_des.scenario.models import ReactionMetric
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, spiral_at
 
@@ -70,10 +70,10 @@ def meter_after(*entries: Entry) -> ReactionMeter:
     return meter
 
 
-def _measurements(key: str, rows: list[tuple[float, float]], phase_s: float) -> SignalMeasurements:
+def _measurements(key: str, rows: list[tuple[float, float]], phase_s: float) -> Measurements:
     times_s, values = [t_s for t_s, _ in rows], [value for _, value in rows]
     arrays = np.array(times_s), np.array(values)
-    return SignalMeasurements(key, lambda t_s: 0.0, Timing(1.0, phase_s), times_s, values, arrays)
+    return Measurements(key, lambda t_s: 0.0, Timing(1.0, phase_s), times_s, values, arrays)
 
 
 def test_mean_is_over_all_kinds_of_reaction_if_there_are_some():

@@ -97,16 +97,6 @@ def test_a_plan_comes_as_much_later_as_the_inference_takes(latency_s):
     assert modes(later, SEARCH)[1][0] == pytest.approx(modes(at_once, SEARCH)[1][0] + latency_s)
 
 
-@BOTH
-@pytest.mark.parametrize("run", [1, 2, 3, 4])
-def test_it_reacts_within_a_reasoning_period(name, run):
-    found = mission({**steps(3.5, 2.5, 20.0), **REASONED_AT_ONCE}, name=name, run=run)
-    period_s = {"seams2023": 2.0, "release15": 1.5}[name]
-    publishing_s = {"seams2023": 0.2, "release15": 1.0}[name]
-    changed_s = modes(found, SEARCH)[1][0]
-    assert 20.0 <= changed_s <= 20.0 + period_s + publishing_s + 1e-6
-
-
 def test_revision_15_waits_for_the_first_measurement():
     late = {"signals.water_visibility": {"kind": "constant", "value": 1.5, "publishing_period_s": 30.0}}
     first_message_s = next(

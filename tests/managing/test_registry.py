@@ -125,18 +125,6 @@ def test_an_adapt_that_is_never_called_is_reported(tmp_path, monkeypatch):
     assert "adapt is never called: period_s is None" in remark
 
 
-@pytest.mark.parametrize(
-    "methods",
-    [
-        "def adapt(self): pass\n    def task_requested(self, task): self.adapt()",
-        "period_s = 2.0\n    def adapt(self): pass",
-        "pass",
-    ],
-)
-def test_an_adapt_that_is_called_or_inherited_is_not(methods, tmp_path, monkeypatch):
-    assert remarks_of(methods, tmp_path, monkeypatch) == ()
-
-
 @pytest.mark.parametrize("before", ["period_s = 60.0", "pass"])
 def test_the_period_is_given_in_the_class_or_in_init(before, tmp_path, monkeypatch):
     adapt = "def adapt(self): raise ValueError(f'at {self.system.now_s:g} s')"

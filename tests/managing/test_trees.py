@@ -114,12 +114,6 @@ def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours():
     assert any(event.event == "tick" and "fd_spiral_high success" in event.detail for event in mine.events)
 
 
-def test_a_tree_of_ones_own_is_drawn(capsys):
-    shown = CliRunner().invoke(app, ["tree", f"{__name__}:Mine"]).output
-    assert "visibility 3.25 m" in shown
-    assert "f_follow_pipeline = fd_follow_pipeline" in shown
-
-
 def test_a_manager_that_makes_no_tree_is_told_what_to_do():
     with pytest.raises(Exception, match="return the root of your tree from make_tree"):
         flown(f"{__name__}:Unfinished")

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.metrics.coverage import covered_area_m2
-from suave_des.metrics.further import FurtherMetrics, measured_at_rows
+from suave_des.metrics.further import FurtherMetrics, covered_area_m2, measured_at_rows
 from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import FURTHER_METRICS, Requirement
@@ -63,13 +62,6 @@ def test_a_change_taken_back_in_time_is_undone(changes, undone):
     assert watched.noted.value("adaptations_undone") == undone
 
 
-def test_changes_of_different_functions_do_not_undo_each_other():
-    watched = Watched()
-    watched.at(1.0).adapted("f", "a", "b")
-    watched.at(2.0).adapted("g", "b", "a")
-    assert watched.noted.value("adaptations_undone") == 0
-
-
 def test_configurations_are_counted_once_each_and_not_when_passed_through():
     watched = Watched()
     for t_s, function, mode in [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (3.0, "g", "y"), (5.0, "f", "a")]:
@@ -94,12 +86,6 @@ def test_a_camera_at_rest_has_seen_one_square():
     track, visibility_m = track_of((0.0, 0.0, -18.0))
     side_m = 2 * 2.0 * TANGENT
     assert covered_area_m2(track, 3, visibility_m, -20.0, TANGENT) == pytest.approx(side_m**2, rel=0.1)
-
-
-def test_what_is_seen_twice_counts_once():
-    track, visibility_m = track_of((0.0, 0.0, -18.0), (1.0, 0.0, -18.0), (0.0, 0.0, -18.0))
-    side_m = 2 * 2.0 * TANGENT
-    assert covered_area_m2(track, 11, visibility_m, -20.0, TANGENT) == pytest.approx(side_m * (side_m + 1), rel=0.1)
 
 
 @pytest.mark.parametrize("visibility_m", [1.9, math.nan])

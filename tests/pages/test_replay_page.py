@@ -130,11 +130,6 @@ def test_the_next_key_stops_at_adaptations_alone(opened_one, missions):
         opened_one.wait_until(f"Math.abs(Number(document.body.dataset.time) - {adaptation.t_s}) < 0.05")
 
 
-def test_the_legend_names_the_marks_of_the_timeline(opened_one):
-    legend = opened_one.page.text_content("#legend")
-    assert all(word in legend for word in ("adaptation", "thruster fails", "pipeline found", "visibility"))
-
-
 def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(opened_one):
     scrub_to(opened_one, 0)
     opened_one.value("document.activeElement.blur()")

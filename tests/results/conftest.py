@@ -1,4 +1,3 @@
-import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -35,19 +34,6 @@ def write(tmp_path: Path) -> Write:
         return path
 
     return write_file
-
-
-@pytest.fixture
-def write_csv(write: Write) -> Write:
-    """Writes a CSV file from a header and rows."""
-
-    def write_rows(name: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> Path:
-        path = write(name, "")
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            csv.writer(stream).writerows([header, *rows])
-        return path
-
-    return write_rows
 
 
 @pytest.fixture

@@ -94,13 +94,6 @@ class TestPublishedRuns:
         assert tested.p == pytest.approx(stats.fisher_exact([[19, 1], [16, 4]]).pvalue, abs=1e-12)
 
 
-HEADINGS = {
-    "2023": "mission_name,datetime,initial pos (x;y),time budget (s),time search (s),distance inspected (m)",
-    "1.5": "mission name,datetime,initial pos (x;y),mission duration (s),pipeline found,"
-    "time searching pipeline (s),distance inspected (m),mean reaction time (s)",
-}
-
-
 class TestCampaign:
     def test_runs_with_common_random_numbers_are_paired(self, campaign):
         comparison = compare_folders([campaign])

@@ -294,16 +294,3 @@ def test_figures_of_many_missions_are_written_from_few_points():
     groups, _ = grouped(missions_of(pandas.concat([frame, frame.assign(manager="bt")])))
     for axes in draw_differences(groups).axes:
         assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
-
-
-def test_a_legend_of_long_names_stays_within_the_figure():
-    names = [f"a manager with a long name {number}" for number in range(4)]
-    frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
-    groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)))
-    for draw in (draw_differences, draw_distributions):
-        with style.publication():
-            figure = draw(groups)
-            figure.draw_without_rendering()
-        box = figure.legends[0].get_window_extent()
-        assert box.x0 >= 0.0
-        assert box.x1 <= figure.bbox.x1

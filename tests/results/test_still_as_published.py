@@ -116,18 +116,6 @@ def test_managers_without_missions_do_not_count():
     assert list(compare_with_paper(frame(bt=[150.0])).remarks())[1] == ("There are too few missions for any figure.")
 
 
-def test_what_could_be_chance_is_said_to_be_so():
-    values = {"none": [200.0, 150.0, 190.0], "random": [100.0, 300.0, 120.0], "metacontrol": [100.0, 90.0, 110.0]}
-    rows = [
-        {"manager": manager, "search_time_s": time_s, "distance_inspected_m": 0.0}
-        for manager, times_s in values.items()
-        for time_s in times_s
-    ]
-    found = compare_with_paper(pandas.DataFrame(rows))
-    (remark,) = (each for each in found.remarks() if "sooner" in each)
-    assert remark.endswith("than the others, on average; the difference from random could be chance.")
-
-
 LIMIT_S = 300.0
 
 

@@ -138,7 +138,3 @@ class TestSplitCheck:
         distance = table.loc["distance_inspected_m"]
         assert distance["difference_in_std"] == pytest.approx(-7 / np.std([10, 30], ddof=1))
         assert distance["within"]
-
-    def test_a_manager_without_simulated_missions_is_an_error(self, published, missions):
-        with pytest.raises(ValueError, match="manager none: 20 published and 0 simulated"):
-            split_check({"none": missions({"random": [(1, 1, 1)]})}, published)

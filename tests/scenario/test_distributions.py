@@ -75,15 +75,6 @@ def test_keys_of_a_shared_draw_are_shifted_alike_and_others_are_not():
         assert 30 <= shared[first] <= 50
 
 
-def test_a_shared_draw_is_another_one_in_each_run_and_under_another_name():
-    def first_time(run, name):
-        time = {"distribution": "uniform", "minimum": 0, "maximum": 200, "shared": name}
-        values = {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": time}]}
-        return drawn_in_run(run, values)["thruster_events.0.time_s"]
-
-    assert len({first_time(run, name) for run in (1, 2, 3) for name in ("a", "b")}) == 6
-
-
 def test_an_event_that_is_drawn_before_the_start_is_at_the_start():
     times = []
     for run in range(1, 9):

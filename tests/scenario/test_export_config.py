@@ -118,14 +118,8 @@ class TestWhatTheExemplarCannotExpress:
         assert lost_lines("release15").count("\n") == 0
         assert "no runner before 1.4" in lost_lines("seams2023")
         assert "signals.water_visibility: constant here, sinusoid in the exemplar" in lost_lines("planta_exp1")
-        for words in (
-            "revision.spiral.centre",
-            "knowledge.ontologies",
-            "modes_file",
-            "metrics",
-            "requirements.find_early",
-        ):
-            assert f"{words}: " in lost_lines("extended")
+        words = ("revision.spiral.centre", "knowledge.ontologies", "modes_file", "metrics", "requirements.find_early")
+        assert all(f"{word}: " in lost_lines("extended") for word in words)
 
     def test_is_named_for_another_revision(self):
         lost = lost_lines("seams2023", "1.5")

@@ -424,18 +424,6 @@ class TestExperiments:
         assert rows["mission_duration_s"].tolist() == pytest.approx([120, 120], abs=1.5)  # 200 s from full to empty
         assert not notes_about(imported_, "battery_constraint")
 
-    def test_a_battery_constraint_of_some_is_not_taken_over(self, imported):
-        constraint = '"experiment_launch": "l battery_constraint:=true battery_constraint_value:=0.4"'
-        first, second = (
-            '{"num_runs": 20, "adaptation_manager": "bt"}',
-            '{"num_runs": 20, "adaptation_manager": "none", %s}',
-        )
-        result = self.with_experiments(imported, first, second % constraint, revision="1.5")
-        assert mine().battery is None or mine().battery.mission_ends_at_level is None
-        assert notes_about(result, "battery_constraint_value 0.4: not all experiments have it")
-        off = constraint.replace("=true", "=false")
-        assert not notes_about(self.with_experiments(imported, second % off), "battery_constraint")
-
 
 STUDY_OF_2025 = """\
 suave_runner_node:

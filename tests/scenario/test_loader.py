@@ -11,7 +11,7 @@ from suave_des.campaign.campaign import run_campaign
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario.models import Calibration
-from suave_des.scenario.physical import ConstantSignal, TableSignal, ThrusterEvent
+from suave_des.scenario.physical import TableSignal, ThrusterEvent
 from suave_des.scenario.quantities import Normal
 from tests.helpers.command import command_here
 
@@ -86,11 +86,6 @@ def test_a_derived_scenario_is_called_after_its_file_unless_it_says_otherwise(wr
     assert load_scenario(write("slow_sea.yaml", HEAD)).scenario.name == "slow_sea"
     assert load_scenario(write("2 slow.seas.yaml", HEAD)).scenario.name == "_2_slow.seas"
     assert load_scenario(write("slow_sea.yaml", HEAD + "name: other\n")).scenario.name == "other"
-
-
-def test_a_signal_of_another_kind_replaces_the_base_s(write):
-    path = write("mine.yaml", HEAD + "signals: {water_visibility: {kind: constant, value: 2}}\n")
-    assert load_scenario(path).scenario.signals["water_visibility"] == ConstantSignal(kind="constant", value=2)
 
 
 def test_null_removes_a_signal_a_value_and_the_battery(write):

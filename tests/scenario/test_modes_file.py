@@ -71,19 +71,6 @@ def test_a_function_without_default_mode_gets_an_inactive_one(write):
     assert not table.mode("f_generate_search_path", "__DEFAULT__").active
 
 
-def test_a_system_of_systems_is_no_function(write):
-    group = """\
-suave:
-  ros__parameters:
-    type: system
-    parts:
-      f_generate_search_path
-    modes:
-      __DEFAULT__: {f_generate_search_path: active}
-"""
-    assert read_modes(write("m.yaml", group + SEARCH)).functions == ("f_generate_search_path",)
-
-
 def test_a_function_of_several_parts_is_active_when_one_is(write):
     table = read_modes(
         write(

@@ -37,14 +37,6 @@ def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, mana
     assert 170.0 + result.further["surfacing_time_s"] == pytest.approx(result.metrics.mission_duration_s, abs=0.2)
 
 
-def test_at_a_leak_the_task_is_given_up_at_once_and_so_is_the_way_to_the_station(fly):
-    result = fly(LEAK, "metacontrol")
-    given_up = [each for each in result.events if each.event == "task_cancelled"]
-    assert given_up[0].t_s == 170.0
-    after = {point.mode for point in result.trajectory if point.t_s > 175.0}
-    assert after == {"fd_surface"}
-
-
 def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves(fly):
     """With all thrusters lost, the vehicle drifts on: over a whole period the mean current, within it up and down."""
     lost = ", ".join(f'"({thruster},failure,0)"' for thruster in range(1, 7))

@@ -51,13 +51,6 @@ def test_nothing_else_moves_the_vehicle_on_the_way():
     assert all(later < earlier for earlier, later in pairwise(gaps_m[25::25]) if earlier > 2.0)
 
 
-@RECHARGES
-def test_the_battery_is_full_again_at_the_station(manager):
-    levels = [point.further["battery_level"] for point in flown(manager).trajectory]
-    rises = [later for earlier, later in pairwise(levels) if None not in (earlier, later) and later > earlier]
-    assert set(rises) == {1.0}
-
-
 def test_the_search_goes_on_around_the_same_centre():
     """With no pipeline to find, the vehicle comes back to where it was, and goes on outwards."""
     result = flown("metacontrol", pipeline__vertices_m=((500.0, 500.0, -20.0), (510.0, 500.0, -20.0)))

@@ -117,15 +117,6 @@ def test_mode_latency_is_drawn_anew_each_time(simulator):
     assert len(set(delays)) == len(delays) > 1 and all(0.2 <= delay <= 2.0 for delay in delays)
 
 
-def test_vehicle_starts_where_the_scenario_says_after_its_drift(simulator):
-    start = {"x_m": -16.0, "y_m": 3.0, "z_m": -17.0, "heading_rad": 1.0}
-    made = simulator(start=start, calibration={"drift_x_m": 0.0, "drift_y_m": -0.5})
-    result = made.run("none", 1, 1, record=True)
-    first = result.trajectory[0]
-    assert (first.x_m, first.y_m, first.z_m, first.yaw_rad) == pytest.approx((-16.0, 2.5, -17.0, 1.0))
-    assert (result.metrics.initial_x_m, result.metrics.initial_y_m) == (-16.0, 2.5)
-
-
 def test_a_failure_too_early_to_take_effect_is_published_all_the_same(simulator):
     def way(effective_from_s: float):
         failures = {"effective_from_s": effective_from_s}

@@ -5,7 +5,7 @@ import simpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.clock import Alarm, tick_at_or_after
+from suave_des.clock import Alarm, call_next, tick_at_or_after
 from suave_des.draws import Streams
 
 names = st.text(min_size=1, max_size=20)
@@ -69,15 +69,14 @@ def test_a_cancelled_alarm_does_not_ring():
     assert called == []
 
 
-def test_an_alarm_set_now_rings_before_all_else_of_its_time_but_not_at_once():
+def test_a_call_next_comes_before_all_else_of_its_time_but_not_at_once():
     env, called = simpy.Environment(), []
-    now = Alarm(env, lambda: called.append((env.now, "now")))
 
     def first() -> None:
-        now.set_now()
+        call_next(env, lambda: called.append((env.now, "next")))
         called.append((env.now, "first"))
 
     Alarm(env, first).set(4.0)
     Alarm(env, lambda: called.append((env.now, "second"))).set(4.0)
     env.run()
-    assert called == [(4.0, "first"), (4.0, "now"), (4.0, "second")]
+    assert called == [(4.0, "first"), (4.0, "next"), (4.0, "second")]

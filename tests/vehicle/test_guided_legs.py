@@ -63,13 +63,6 @@ def test_an_interrupted_leg_loses_the_integral():
     assert abs(vehicle.track[row_at(2.0) + 1, kernel.VELOCITY_INTEGRAL][0]) < 0.05
 
 
-def test_after_a_completed_leg_the_next_one_starts_at_the_last_set_point():
-    vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0)
-    vehicle.command(0.0, *TO_HALF_A_METRE)
-    vehicle.command(10.0, 1.0, 0.0, -18.0)
-    assert leg_start(vehicle, 10.1) == pytest.approx(TO_HALF_A_METRE)
-
-
 def test_sending_the_set_point_of_a_completed_leg_again_changes_nothing_of_its_motion():
     once, again = (Vehicle(BLUEROV2, Autopilot(), START, 30.0) for _ in range(2))
     for vehicle in (once, again):

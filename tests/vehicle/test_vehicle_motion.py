@@ -31,12 +31,6 @@ def test_vehicle_comes_to_rest_at_its_set_point(make_vehicle):
     assert nu(vehicle, 60.0) == pytest.approx((0.0,) * 6, abs=1e-3)
 
 
-def test_vehicle_turns_to_heading_zero_and_holds_it(make_vehicle):
-    vehicle = make_vehicle(Pose(*PLACE_M, 0.0, 0.0, 2.5))
-    vehicle.command(0.0, 5.0, 5.0, -18.0)
-    assert vehicle.pose(30.0).yaw_rad == pytest.approx(0.0, abs=0.01)
-
-
 def test_without_a_command_the_vehicle_stays(make_vehicle):
     assert make_vehicle().position(100.0) == pytest.approx(PLACE_M, abs=0.01)
 
@@ -106,11 +100,6 @@ def test_a_loss_is_not_felt_before_its_time(make_vehicle):
 ALL = (1, 2, 3, 4, 5, 6)
 
 
-def test_net_buoyancy_lets_it_rise_slowly(make_vehicle):
-    terminal_m_per_s = math.sqrt(NET_BUOYANCY_N / BLUEROV2.quadratic_drag[2])
-    assert nu(make_vehicle(lost=ALL), 100.0)[2] == pytest.approx(terminal_m_per_s, rel=0.01)
-
-
 def test_the_current_carries_it(make_vehicle):
     vehicle = make_vehicle(lost=ALL, current_m_per_s=(0.3, -0.1, 0.0))
     start, end = vehicle.position(100.0), vehicle.position(110.0)
@@ -154,12 +143,6 @@ def test_moving_while_turning_feels_the_coriolis_force(make_vehicle):
     net_buoyancy = np.array([0.0, 0.0, NET_BUOYANCY_N])
     pushed = v + STEP_S * (net_buoyancy / mass - np.cross(omega, v))
     assert nu(vehicle, STEP_S)[:3] == pytest.approx(pushed / (1.0 + STEP_S * drag * np.abs(v) / mass))
-
-
-def test_attitude_stays_a_unit_quaternion(make_vehicle):
-    vehicle = make_vehicle(lost=(1, 3))
-    time_to_go_s(vehicle, 90)
-    assert np.linalg.norm(vehicle.track[:, kernel.ATTITUDE], axis=1) == pytest.approx(np.ones(vehicle.last_row + 1))
 
 
 def test_slower_simulated_world_shows_the_same_motion_later(make_vehicle):

@@ -76,13 +76,6 @@ def test_first_detection_is_the_first_row_with_a_point_in_view():
     assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == expected
 
 
-def test_first_detection_looks_only_at_the_rows_asked_for():
-    track = line_of_positions(0.5)
-    visibility = np.array([0.0]), np.array([3.0])
-    row, _ = first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M)
-    assert first_detection(track, (0, row - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
-
-
 def test_first_detection_waits_for_the_visibility():
     track = line_of_positions(0.0)
     visibility = np.array([3.0, 250.0]), np.array([1.0, 2.5])

@@ -76,7 +76,7 @@ def explain(
     ] = "",
     at: At = None,
 ) -> None:
-    """Explain why a fact follows in a state, or why a design is chosen or not."""
+    """Explain why a fact follows, or why a design is chosen or not."""
     knowledge = options.knowledge()
     print(knowledge.explain(state_at(at, knowledge), question))
 
@@ -142,16 +142,16 @@ def query(
 def why_not(
     options: KnowledgeOptions,
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; by default all that do not fire.")
+        list[str] | None, typer.Argument(metavar="RULE", help="Rules; by default all that do not fire.")
     ] = None,
     at: At = None,
     facts: Annotated[
         list[str] | None,
-        typer.Option("--fact", metavar="FACT", help='Additional fact to assert, such as "Binding(b1)".'),
+        typer.Option("--fact", metavar="FACT", help='Additional fact, such as "Binding(b1)".'),
     ] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:
-    """Show why a rule does not fire: the first atom that fails, the value found and the value needed.
+    """Show why a rule does not fire: the first atom that fails.
 
     The exit status is 0 even if a rule fires.
     """

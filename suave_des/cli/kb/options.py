@@ -23,13 +23,11 @@ if TYPE_CHECKING:
 
 TimeLimitS = Annotated[
     float,
-    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit of the reasoner for a state, in seconds."),
+    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s."),
 ]
 MaxFailed = Annotated[
     int,
-    typer.Option(
-        "--max-failed", min=0, metavar="N", help="Include states with up to N components failed or recovered."
-    ),
+    typer.Option("--max-failed", min=0, metavar="N", help="States with up to N components failed or recovered."),
 ]
 
 
@@ -42,7 +40,7 @@ class KnowledgeOptions(KnowledgeFiles):
         typer.Option(
             "--scenario",
             metavar="SCENARIO",
-            help="Scenario that provides ontologies, values, measured attributes and revision.",
+            help="Scenario with the knowledge base.",
         ),
     ] = DEFAULT_SCENARIO
 
@@ -86,8 +84,8 @@ At = Annotated[
     typer.Option(
         "--at",
         metavar="WHAT",
-        help="Part of the state: NAME=VALUE of a quality attribute, a component or a function; a FUNCTION that has an "
-        "objective; a YAML file; or FOLDER@SECONDS of a recorded mission. Repeat it for several.",
+        help="Part of the state: NAME=VALUE, a FUNCTION with an objective, a YAML file, or FOLDER@SECONDS of a "
+        "mission; repeatable.",
     ),
 ]
 

@@ -39,7 +39,7 @@ class TestOptions(KnowledgeFiles):
 
     scenario: Annotated[
         str | None,
-        typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the one that the files name."),
+        typer.Option("--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name."),
     ] = None
     time_limit: TimeLimitS = 60.0
 
@@ -65,16 +65,14 @@ class MutationOptions:
 
     mutate: Annotated[
         bool,
-        typer.Option(
-            "--mutate", help="Mutation testing: seed small faults in rules; report those that no test detects."
-        ),
+        typer.Option("--mutate", help="Make small mistakes in rules; report those that no test notices."),
     ] = False
     mutants: Annotated[
-        int | None, typer.Option("--mutants", min=1, metavar="N", help="Maximum number of mutants; by default all.")
+        int | None, typer.Option("--mutants", min=1, metavar="N", help="Number of mutants; by default all.")
     ] = None
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeat it for several."),
+        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable."),
     ] = None
     max_failed: MaxFailed = 1
 
@@ -99,16 +97,14 @@ def test(
     junit_xml: Annotated[
         Path | None, typer.Option("--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML.")
     ] = None,
-    coverage: Annotated[
-        bool, typer.Option("--coverage", help="Show which rules, atoms and comparisons the tests cover.")
-    ] = False,
+    coverage: Annotated[bool, typer.Option("--coverage", help="Show what the tests cover.")] = False,
     from_mission: Annotated[
         Path | None,
-        typer.Option("--from-mission", metavar="DIR", help="Write the decisions of a recorded mission as tests."),
+        typer.Option("--from-mission", metavar="DIR", help="Write a recorded mission's decisions as tests."),
     ] = None,
     write: Annotated[
         Path | None,
-        typer.Option("--write", metavar="FILE", help="File to which --from-mission and --coverage write tests."),
+        typer.Option("--write", metavar="FILE", help="File for the tests."),
     ] = None,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
