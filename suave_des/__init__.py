@@ -13,7 +13,6 @@ if _TYPE_CHECKING:
     from suave_des.campaign.variation import read_ensemble
     from suave_des.errors import InputError, MissionError, SuaveDesError
     from suave_des.estimates import mean_of
-    from suave_des.interfaces.exec import messages_schema
     from suave_des.interfaces.gym import PipelineInspection
     from suave_des.interfaces.trees import PyTreesManager
     from suave_des.kb.knowledge_base import KnowledgeBase
@@ -40,7 +39,7 @@ __all__ += ["CampaignFrame", "read_ensemble", "resume_campaign", "run_campaign"]
 __all__ += ["CustomFunction", "ManagingSubsystem", "Metacontrol", "NoManager", "PyTreesManager", "Threshold"]
 __all__ += ["FAILED", "Kind", "PipelineInspection", "train"]
 __all__ += ["compare_folders", "compare_with_paper", "draw_folder", "mean_of", "read_real", "read_runs", "validate"]
-__all__ += ["InputError", "KnowledgeBase", "MissionError", "SuaveDesError", "find", "messages_schema"]
+__all__ += ["InputError", "KnowledgeBase", "MissionError", "SuaveDesError", "find"]
 
 _HOMES = {
     name: module
@@ -50,7 +49,6 @@ _HOMES = {
         "campaign.variation": ("read_ensemble",),
         "errors": ("InputError", "MissionError", "SuaveDesError"),
         "estimates": ("mean_of",),
-        "interfaces.exec": ("messages_schema",),
         "interfaces.gym": ("PipelineInspection",),
         "interfaces.trees": ("PyTreesManager",),
         "kb.knowledge_base": ("KnowledgeBase",),

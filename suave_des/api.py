@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from suave_des.arguments import plain_arguments
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.inputs import check_inputs, provenance
-from suave_des.campaign.progress import OnProgress
-from suave_des.campaign.spec import CampaignSpec, check_mission
+from suave_des.campaign.progress import OnProgress, is_live, shown
+from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, check_range
 from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.metrics.result import MissionResult
 from suave_des.records.knowledge import KNOWLEDGE_FILE
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from suave_des.results.compare import CampaignFrame
 
 
-_CALLER = 4
+_CALLER = 3
 """Stack level of who calls a function here, seen from `_frame_of`."""
 
 
@@ -60,7 +59,6 @@ class RecordedMission(MissionResult):
         return draw_mission(record_of(self, self.loaded), kind)
 
 
-@plain_arguments(lambda: Replacements.__annotations__)
 def run_mission(
     scenario: str | Path | LoadedScenario,
     manager: ManagerLike = "metacontrol",
@@ -99,7 +97,8 @@ def run_mission(
     folder = None if out is None else Path(out)
     if folder is not None:
         check_output_folder(folder, "mission", overwrite=overwrite)
-    check_mission(run, seed)
+    check_range("run", run, 1, RUNS_LIMIT)
+    check_range("seed", seed, 0, SEED_LIMIT)
     name = name_of(manager)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs([loaded], [name], replacements)
@@ -111,13 +110,6 @@ def run_mission(
     return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
 
 
-def _options() -> Mapping[str, object]:
-    """Return what else a campaign may be given; its own model says what is wrong with the values."""
-    own = ("replacements", "command", "folder")
-    return {name: Any for name in CampaignSpec.model_fields if name not in own} | Replacements.__annotations__
-
-
-@plain_arguments(_options)
 def run_campaign(
     scenario: str | Path | LoadedScenario,
     managers: ManagerLike | Iterable[ManagerLike] | None = None,
@@ -170,14 +162,12 @@ def run_campaign(
     return _frame_of(scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options))
 
 
-@plain_arguments()
 def resume_campaign(
     folder: str | Path,
     workers: int = 1,
     *,
     runs: int | None = None,
     scheduler: str | None = None,
-    managers: Sequence[str] = (),
     confirmed: bool = False,
     progress: bool | None = None,
 ) -> CampaignFrame:
@@ -188,7 +178,6 @@ def resume_campaign(
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
-        managers: those of the campaign's that are not installed; their code is run only if they are named here.
         confirmed: whether to run the code of all managers that the folder names.
         progress: whether to show progress; by default in a notebook and on a terminal.
 
@@ -196,7 +185,7 @@ def resume_campaign(
         InputError: there is no campaign, or something that determines results has changed; the error names it.
         WorkerError, StoreError: as run_campaign.
     """
-    changed: dict[str, Any] = {"runs": runs, "scheduler": scheduler, "managers": managers, "confirmed": confirmed}
+    changed: dict[str, Any] = {"runs": runs, "scheduler": scheduler, "confirmed": confirmed}
     return _frame_of(
         folder, progress, lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed)
     )
@@ -206,17 +195,12 @@ def _frame_of(
     named: str | Path | LoadedScenario, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
 ) -> CampaignFrame:
     """Run a campaign and show its progress; return its rows, with what else there is to know in attrs."""
-    from rich.console import Console
-
-    from suave_des.campaign.progress import shown
     from suave_des.results.compare import CampaignFrame
 
     label = named.scenario.name if isinstance(named, LoadedScenario) else str(named)
-    console = Console(stderr=True, highlight=False)
-    is_wanted = console.is_jupyter or console.is_terminal if progress is None else progress
     interrupted = False
     try:
-        with shown(label, console, quiet=not is_wanted) as show:
+        with shown(label, quiet=not (is_live() if progress is None else progress)) as show:
             result = run(show)
     except campaigns.CampaignInterrupted as stopped:
         if not hasattr(sys, "ps1"):  # neither a prompt nor a notebook

@@ -1,7 +1,7 @@
 """The user's cache folder, for what can be made again, and files in it that are checked before use.
 
-`inferences/` has what Pellet inferred, `numba/` machine code, `findings/` what `kb check` found.
-Each may be deleted at any time.
+`inferences/` has what Pellet inferred, `numba/` machine code, `findings/` what `kb check` found, `campaigns/` which
+campaigns with code of their own this user has begun. Each may be deleted at any time.
 """
 
 from __future__ import annotations
@@ -17,54 +17,36 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
+from platformdirs import user_cache_path
+
 _CACHE_VARIABLE: Final = "SUAVE_DES_CACHE_DIR"
-_DIGEST_BYTES: Final = hashlib.sha256().digest_size
 #: Entries of this size in all are kept in one file: with exact values there is no end to new ones.
 MAX_BYTES: Final = 16 * 2**20
 #: Files of a kind that are kept; the least recently used are removed.
 MAX_FILES: Final = 64
 
 
-def cache_folder() -> Path:
-    """The user's folder for what can be made again: SUAVE_DES_CACHE_DIR, or where the system keeps such things."""
-    chosen = os.environ.get(_CACHE_VARIABLE)
-    if chosen:
-        return Path(chosen)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "suave-des"
-    start = os.environ.get("XDG_CACHE_HOME")  # ignored unless absolute, as the XDG specification requires
-    return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
-
-
 def private_cache(kind: str) -> Path | None:
     """Make the part of the cache folder for one kind of content, if need be: a folder that only this user may enter.
 
-    Machine code and classes are kept there, which are run without a further look. Where the cache folder cannot be
-    used, as without a home folder, a temporary one takes its place, for this process and those that it starts; this is
-    said once. None if there is neither.
+    Machine code and classes are kept there, which are run without a further look. The cache folder is that of
+    SUAVE_DES_CACHE_DIR, or where the system keeps such things; where it cannot be used, as without a home folder, a
+    temporary one takes its place, for this process and those that it starts; this is said once. None if there is
+    neither.
     """
     try:
-        chosen = cache_folder()
-        return _private(chosen / kind)
+        chosen = os.environ.get(_CACHE_VARIABLE)
+        return _private((Path(chosen) if chosen else user_cache_path("suave-des", appauthor=False)) / kind)
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder
         reason = getattr(error, "strerror", None) or str(error)
+    folder = Path(tempfile.gettempdir()) / f"suave-des-{os.getuid()}"
     try:
-        folder = _temporary_folder()
-        private = _private(folder / kind)
+        private = _private(_private(folder) / kind)
     except OSError:
         return None
     os.environ[_CACHE_VARIABLE] = str(folder)
     print(f"suave-des: the cache folder cannot be used ({reason}); {folder} is used instead", file=sys.stderr)
     return private
-
-
-def _temporary_folder() -> Path:
-    """A folder of this user's alone that the next process finds, too; a new one if somebody else has made that."""
-    folder = Path(tempfile.gettempdir()) / f"suave-des-{os.getuid()}"
-    try:
-        return _private(folder)
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="suave-des-"))
 
 
 def _private(folder: Path) -> Path:
@@ -82,28 +64,6 @@ def _private(folder: Path) -> Path:
     if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
         raise PermissionError(None, f"{folder} cannot be written")
     return folder
-
-
-def remove_oldest(folder: Path, pattern: str, keep: int = MAX_FILES) -> None:
-    """Remove all but the most recently used files of a folder."""
-    with suppress(OSError):
-        for path in sorted(folder.glob(pattern), key=lambda path: path.stat().st_mtime)[:-keep]:
-            path.unlink(missing_ok=True)
-
-
-def with_checksum(content: bytes) -> bytes:
-    """Put the checksum before what a file is to hold; see `read_checked`."""
-    return hashlib.sha256(content).digest() + content
-
-
-def read_checked(path: Path) -> bytes | None:
-    """Read a file that `with_checksum` began; None if it is not there, or damaged."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    return content if hashlib.sha256(content).digest() == digest else None
 
 
 class SharedEntries:
@@ -155,7 +115,9 @@ class SharedEntries:
             finally:
                 os.close(handle)
             if size == 0:
-                remove_oldest(self._path.parent, "*.jsonl")
+                files = sorted(self._path.parent.glob("*.jsonl"), key=lambda path: path.stat().st_mtime)
+                for path in files[:-MAX_FILES]:
+                    path.unlink(missing_ok=True)
 
     def _checksum(self, text: bytes) -> bytes:
         return hashlib.sha256(self._salt + text).hexdigest()[:24].encode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import pickle
 from collections.abc import Callable
@@ -14,7 +15,7 @@ import numpy as np
 from numba.core import caching
 from numpy.typing import NDArray
 
-from suave_des.caches import private_cache, read_checked, with_checksum
+from suave_des.caches import private_cache
 from suave_des.imports import hidden
 
 # What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg, which takes 0.2 s and
@@ -26,6 +27,7 @@ arraymath._HAVE_BLAS = True
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+_DIGEST_BYTES = hashlib.sha256().digest_size
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
@@ -72,22 +74,25 @@ class _CheckedFile(caching.IndexDataCacheFile):
     """Index and data files of numba's cache, each with a checksum."""
 
     def _load_index(self) -> dict[Any, Any]:
-        content = read_checked(Path(self._index_path))
-        if content is None:
-            return {}
-        version, stamp, overloads = pickle.loads(content)
+        version, stamp, overloads = self._read(self._index_path) or ("", None, {})
         return dict(overloads) if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict[Any, Any]) -> None:
         self._write(self._index_path, (self._version, self._source_stamp, overloads))
 
     def _load_data(self, name: str) -> Any:
-        content = read_checked(Path(self._data_path(name)))
-        return None if content is None else pickle.loads(content)
+        return self._read(self._data_path(name))
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), data)
 
     def _write(self, path: str, data: Any) -> None:
         with self._open_for_write(path) as file:
-            file.write(with_checksum(self._dump(data)))
+            content = self._dump(data)
+            file.write(hashlib.sha256(content).digest() + content)
+
+    def _read(self, path: str) -> Any:
+        """Read a file; None if it is not there, or damaged."""
+        content = Path(path).read_bytes() if Path(path).is_file() else b""
+        digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        return pickle.loads(content) if hashlib.sha256(content).digest() == digest else None

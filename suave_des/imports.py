@@ -1,4 +1,4 @@
-"""Imports of a library, and starts of a process, without the parts that are not used here."""
+"""Imports of a library without the parts that are not used here."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
 from typing import Final
 
 _one_at_a_time: Final = threading.RLock()
@@ -24,15 +23,3 @@ def hidden(module: str) -> Iterator[None]:
             yield
         finally:
             del sys.modules[module]
-
-
-@contextmanager
-def main_hidden() -> Iterator[None]:
-    """Hide the main script from multiprocessing, which would import it, and so run it, in a new process."""
-    with _one_at_a_time:
-        main = sys.modules["__main__"]
-        sys.modules["__main__"] = ModuleType("__main__")
-        try:
-            yield
-        finally:
-            sys.modules["__main__"] = main

@@ -16,7 +16,6 @@ from suave_des.files import read_bytes
 FORMAT = 1
 _KEY = "suave_des_learned"
 _LIMIT_BYTES = 100_000_000
-_REMEDY = "give a file that suave-des train has written"
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,6 @@ class Learned:
         missions: number of missions, runs 1 to that.
         inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
         learned: what the manager's hook `recall` was given, and has changed.
-        earlier: scenario, seed and number of missions of each training that this one continued.
     """
 
     manager: str
@@ -39,12 +37,6 @@ class Learned:
     missions: int
     inputs_sha256: dict[str, str]
     learned: dict[str, Any]
-    earlier: tuple[tuple[str, int, int], ...] = ()
-
-    @property
-    def trainings(self) -> tuple[tuple[str, int, int], ...]:
-        """Scenario, seed and number of missions of all trainings that led to this result."""
-        return (*self.earlier, (self.scenario, self.seed, self.missions))
 
     def text(self) -> str:
         """Write the file's content.
@@ -55,10 +47,8 @@ class Learned:
         try:
             return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
         except (TypeError, ValueError) as error:
-            raise InputError(
-                f"what {self.manager} has learned cannot be written: {error}",
-                remedy="it may have text, finite numbers, True, False, None, lists, and dicts by text",
-            ) from None
+            remedy = "it may have text, finite numbers, True, False, None, lists, and dicts by text"
+            raise InputError(f"what {self.manager} has learned cannot be written: {error}", remedy=remedy) from None
 
 
 def read_file(path: Path) -> Learned:
@@ -67,15 +57,11 @@ def read_file(path: Path) -> Learned:
     Raises:
         InputError: it cannot be read, or is something else.
     """
-    try:
+    with suppress(AttributeError, TypeError, ValueError, RecursionError):
         content = json.loads(read_bytes(path, _LIMIT_BYTES))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"cannot be read: {error}", file=path, remedy=_REMEDY) from None
-    if isinstance(content, dict) and content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
-        with suppress(TypeError, ValueError):
-            earlier = tuple((str(name), int(seed), int(number)) for name, seed, number in content.pop("earlier", ()))
-            return Learned(**content, earlier=earlier)
-    raise InputError("is not a file of what a manager has learned", file=path, remedy=_REMEDY)
+        if content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
+            return Learned(**content)
+    raise InputError("is not a file that suave-des train has written", file=path, remedy="give one that is")
 
 
 def read_learned(path: Path) -> Mapping[str, Any]:

@@ -10,13 +10,15 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import entry_points
 from itertools import chain
 from math import inf, isnan
+from numbers import Real
 from pathlib import Path
 from sysconfig import get_path
-from traceback import FrameSummary, extract_tb, walk_tb
+from traceback import FrameSummary, extract_tb
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
@@ -33,7 +35,6 @@ from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Kind
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.models import Scenario
 
 if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
     from suave_des.managed.mode_manager import ModeManager
@@ -54,10 +55,10 @@ _BUILT_IN = {
     "oracle": "suave_des.managing.simple:Oracle",
 }
 _FAMILIES = {
-    "fixed": ("suave_des.managing.simple:fixed_mode", "fixed:MODE"),
-    "exec": ("suave_des.interfaces.exec:exec_manager", "exec:COMMAND"),
+    "fixed": ("suave_des.managing.simple:fixed_mode", "MODE"),
+    "exec": ("suave_des.interfaces.exec:exec_manager", "COMMAND"),
 }
-"""Managers that are named with an argument after a colon: what makes the class of one, and how it is written."""
+"""Managers that are named with an argument after a colon: what makes the class of one, and what the argument is."""
 _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
 _HOOKS = {
@@ -66,10 +67,6 @@ _HOOKS = {
         *("task_requested", "task_cancelled", "diagnostic", "adapt"),
     ),
     "CustomFunction": ("__init__", "configure", "activated", "deactivated"),
-}
-_PASSES = {
-    "ManagingSubsystem": "adapt may let time pass: with yield self.system.env.timeout(seconds)",
-    "CustomFunction": "what takes mission time is a process: self.env.process(self.another_method())",
 }
 _MAY_YIELD = ("adapt", "input_files")
 _checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
@@ -110,10 +107,9 @@ def name_of(manager: ManagerLike) -> str:
         raise InputError(problem, remedy="give a name, or a subclass of suave_des.ManagingSubsystem")
     target = f"{manager.__module__}:{manager.__qualname__}"
     if getattr(sys.modules.get(manager.__module__), manager.__qualname__, None) is not manager:
-        problem = f"manager {target!r} cannot be found by its name"
-        raise InputError(problem, remedy="define the class at the top level of a module, script or notebook cell")
-    named = (name for name, known in (_BUILT_IN | _registered()).items() if known == target)
-    return next(named, target)
+        remedy = "define the class at the top level of a module, script or notebook cell"
+        raise InputError(f"manager {target!r} cannot be found by its name", remedy=remedy)
+    return next((name for name, known in (_BUILT_IN | _registered()).items() if known == target), target)
 
 
 def manager_class(name: str) -> type[ManagingSubsystem]:
@@ -125,10 +121,9 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     """
     family, _, argument = name.partition(":")
     if family in _FAMILIES:
-        place, form = _FAMILIES[family]
         if not argument.strip():
-            raise InputError(f"there is no manager {family!r}", remedy=f"write {form}")
-        module, _, function = place.partition(":")
+            raise InputError(f"there is no manager {family!r}", remedy=f"write {family}:{_FAMILIES[family][1]}")
+        module, _, function = _FAMILIES[family][0].partition(":")
         make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
         return make(argument)
     target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
@@ -136,32 +131,6 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
         hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     return _load(f"manager {name!r}", target, ManagingSubsystem)
-
-
-def registered_functions() -> tuple[str, ...]:
-    """Names of the functions that other packages register, in alphabetical order."""
-    return tuple(sorted(_registered(FUNCTION_GROUP)))
-
-
-def function_class(function: str, name: str) -> type[CustomFunction]:
-    """Find the class of a user-defined function by module:Class, or a registered name; the function's is for errors.
-
-    Raises:
-        InputError: there is no such class, it is no subclass of CustomFunction, or a hook is wrong.
-    """
-    from suave_des.managed.node import CustomFunction  # loads the vehicle
-
-    target = name if ":" in name else _registered(FUNCTION_GROUP).get(name)
-    if target is None:
-        hint = did_you_mean(name, registered_functions(), "registered")
-        raise InputError(f"function {function}: no package registers {name!r}", remedy=f"{hint}; or give module:Class")
-    return _load(f"function {function}, {name!r}", target, CustomFunction)
-
-
-def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
-    """List the functions that the exemplar has, in a mission of this scenario."""
-    recharge = () if scenario.battery is None else (GENERATE_RECHARGE_PATH,)
-    return *MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,))
 
 
 def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
@@ -172,22 +141,29 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
     Raises:
         InputError: a function that the mission needs has no node, or a class cannot be used.
     """
-    scenario, registered = loaded.scenario, registered_functions()
-    built_in = built_in_functions(scenario)
+    scenario, registered = loaded.scenario, _registered(FUNCTION_GROUP)
+    recharge = () if scenario.battery is None else (GENERATE_RECHARGE_PATH,)
+    built_in = (*MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,)))
     types = {name: name for name in loaded.modes.functions if name in registered and name not in built_in}
     types |= {name: settings.node for name, settings in scenario.functions.items()}
     for name in scenario.needed_functions():
         if name not in built_in and name not in types:
+            remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
             if name == GENERATE_RECHARGE_PATH:
-                raise loaded.layer.error(f"{name} needs a battery", ("mission", "functions"), "add battery: {}")
-            remedy = (
-                f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package that registers "
-                f"it (entry point group {FUNCTION_GROUP})"
-            )
-            if registered:
-                remedy += f"; {did_you_mean(name, registered, 'registered')}"
+                remedy = "add battery: {}"
             raise loaded.layer.error(f"function {name} has no node", ("mission", "functions"), remedy)
-    return {name: function_class(name, node) for name, node in types.items()}
+    if not types:
+        return {}
+    from suave_des.managed.node import CustomFunction  # loads the vehicle
+
+    for name, node in types.items():
+        if ":" not in node and node not in registered:
+            remedy = f"{did_you_mean(node, sorted(registered), 'registered')}; or give module:Class"
+            raise InputError(f"function {name}: no package registers {node!r}", remedy=remedy)
+    return {
+        name: _load(f"function {name}, {node!r}", registered.get(node, node), CustomFunction)
+        for name, node in types.items()
+    }
 
 
 @cache
@@ -201,15 +177,13 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     found = getattr(module, attribute, None)
     if not (isinstance(found, type) and issubclass(found, base)):
         classes = {name for name, each in vars(module).items() if isinstance(each, type) and issubclass(each, base)}
-        raise InputError(
-            f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}",
-            remedy=(nearest(attribute, classes) if found is None else None)
-            or f"derive your class from suave_des.{base.__name__}",
-        )
+        problem = f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}"
+        raise InputError(problem, remedy=nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}")
     if found not in _checked and not module_name.startswith("suave_des."):
         _check_hooks(what, found, base)
-        if issubclass(found, ManagingSubsystem):
-            _check_subscriptions(what, found.subscribes_to)
+        if issubclass(found, ManagingSubsystem) and not _are_kinds(found.subscribes_to):
+            remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
+            raise InputError(f"{what}: subscribes_to is {shown(found.subscribes_to)}", remedy=remedy)
         _checked.add(found)
     return found
 
@@ -236,38 +210,27 @@ def _imported(what: str, module: str) -> ModuleType:
         raise InputError(problem, remedy=remedy) from error
 
 
-def _check_subscriptions(what: str, subscribed: Any) -> None:
-    is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
-    unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
-    if unknown or not (is_collection or isinstance(subscribed, property)):
-        remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
-        found = f"has {shown(unknown[0])}" if unknown else f"is {shown(subscribed)}"
-        raise InputError(f"{what}: subscribes_to {found}", remedy=remedy)
+def _are_kinds(subscribed: Any) -> bool:
+    if isinstance(subscribed, Collection) and not isinstance(subscribed, str):
+        return all(each in list(Kind) for each in subscribed)
+    return isinstance(subscribed, property)
 
 
 def _check_hooks(what: str, kind: type, root: type) -> None:
     """Check that hooks can be called as hooks are called, and that no method is most likely a misspelt one."""
-
-    def wrong(problem: str, remedy: str) -> InputError:
-        return InputError(f"{what}: {problem}", remedy=remedy)
-
-    hooks, lets_time_pass = _HOOKS[root.__name__], _PASSES[root.__name__]
-    forms = {name: _form(root, name) for name in hooks}
+    forms = {name: _form(root, name) for name in _HOOKS[root.__name__]}
     for hook, form in forms.items():
         function = getattr(kind, hook)
-        if not callable(function):
-            raise wrong(f"{hook} is not a method", f"write {form}")
+        never_runs = inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function)
         try:
             inspect.signature(function).bind(*inspect.signature(getattr(root, hook)).parameters)
-        except TypeError as error:
-            problem = f"{hook}{inspect.signature(function)} cannot be called as a hook: {error}"
-            raise wrong(problem, f"write {form}") from None
+        except TypeError:
+            never_runs = True
         except ValueError:  # no signature: compiled
             continue
-        if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
-            raise wrong(f"{hook} is async, and nothing would run it", f"write {form}; {lets_time_pass}")
-        if inspect.isgeneratorfunction(function) and hook not in _MAY_YIELD:
-            raise wrong(f"{hook} yields, and nothing would run it", f"return from {hook} at once; {lets_time_pass}")
+        if never_runs or (inspect.isgeneratorfunction(function) and hook not in _MAY_YIELD):
+            remedy = f"write {form}; only adapt may yield"
+            raise InputError(f"{what}: {hook} cannot be called as a hook", remedy=remedy)
     classes = kind.__mro__[: kind.__mro__.index(root)]
     for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
         for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
@@ -275,7 +238,7 @@ def _check_hooks(what: str, kind: type, root: type) -> None:
             inherits = any(hasattr(parent, each) for parent in base.__bases__)
             if near is not None and near not in vars(base) and not inherits and each not in _names_in(base):
                 remedy = f"did you mean {forms[near]}? give a method of your own a name that differs more"
-                raise wrong(f"{each} is not a hook, and nothing calls it", remedy)
+                raise InputError(f"{what}: {each} is not a hook, and nothing calls it", remedy=remedy)
 
 
 def _form(root: type, hook: str) -> str:
@@ -303,10 +266,10 @@ def checked_times(manager: ManagingSubsystem) -> tuple[float, float] | None:
     period_s, starts_s = manager.period_s, manager.starts_s
     if period_s is None:
         return None
-    if not (hasattr(period_s, "__float__") and 0.0 < period_s < inf):
-        raise ValueError(f"period_s is {period_s!r}; it must be a number above 0, or None")
-    if not (hasattr(starts_s, "__float__") and 0.0 <= starts_s < inf):
-        raise ValueError(f"starts_s is {starts_s!r}; it must be a number, 0 or above")
+    are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
+    if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
+        problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
+        raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
     return period_s, starts_s
 
 
@@ -319,47 +282,34 @@ def checked_dependencies(manager: ManagingSubsystem) -> Dependencies | None:
     declared = manager.depends_on if "depends_on" in vars(type(manager)) else None
     if declared is None:
         return None
-    try:
-        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
-        are_numbers = not any(map(isnan, chain(*found.values())))
-    except (AttributeError, TypeError, ValueError):
-        are_numbers = False
-    if not are_numbers:
-        form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}, or None"
-        raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}")
     known = _measured_somewhere(manager.system)
-    if unknown := sorted(found.keys() - set(known), key=str):
-        raise ValueError(
-            f"depends_on has {shown(unknown[0])}, which nothing measures ({did_you_mean(unknown[0], known)})"
-        )
-    return found
+    with suppress(AttributeError, TypeError, ValueError):
+        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
+        if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
+            return found
+    form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}"
+    raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None")
 
 
 def remarks(manager: ManagingSubsystem) -> Iterator[str]:
     """Yield probable mistakes of a manager's author that are no errors, as a mission has shown them."""
     author = next(base for base in type(manager).__mro__ if "adapt" in vars(base))
-    is_shipped = author.__module__.startswith("suave_des.")
-    if not is_shipped and manager.period_s is None and "adapt" not in _names_in(author):
+    is_own = not author.__module__.startswith("suave_des.")
+    if is_own and manager.period_s is None and "adapt" not in _names_in(author):
         yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
     known = _measured_somewhere(manager.system)
     for name in sorted(manager.system.unmeasured.difference(known), key=str):
         yield f"measured({shown(name)}) is always None: nothing measures it ({did_you_mean(name, known)})"
 
 
-def refusals(modes: ModeManager) -> dict[str, int]:
-    """Say why requests for modes were refused, and what would be right; with the number of requests for each reason."""
-    return {_why_refused(modes, *request): count for request, count in modes.refused.items()}
-
-
-def _why_refused(modes: ModeManager, function: str, mode: str) -> str:
-    if function not in modes.table:
-        if mode in modes.table:
-            return f"change_mode({shown(function)}, {shown(mode)}) has its arguments swapped (function, then mode)"
-        known = modes.table.functions
-        return f"the modes file has no function {shown(function)} ({did_you_mean(function, known)})"
-    if function not in modes.nodes:
-        return f"{function} has no node here (name its class under functions: in the scenario)"
-    return f"{function} has no mode {shown(mode)} ({did_you_mean(mode, modes.table.modes(function))})"
+def refusals(modes: ModeManager) -> Iterator[str]:
+    """Yield what was wrong with requests for modes that were refused, and what would be right."""
+    for function, mode in modes.refused:
+        if known := modes.available_modes(function):
+            yield f"{function} has no mode {shown(mode)} ({did_you_mean(mode, known)})"
+        else:
+            near = did_you_mean(function, modes.nodes, "functions")
+            yield f"there is no function {shown(function)} ({near}; name its class under functions: in the scenario)"
 
 
 def _measured_somewhere(system: System) -> list[str]:
@@ -371,13 +321,10 @@ def cause_of(error: BaseException, function: str = "") -> str:
     """Say what was raised, in which function, and where in the user's code: "ValueError: no plan (mine.py, line 7)".
 
     The text is the same in each run: it has no memory addresses.
-
-    Args:
-        error: the exception.
-        function: name of the user-defined function that raised it; if empty, that whose method is in the traceback.
+    `function` is the user-defined one that raised it.
     """
-    name = function or _function_that_raised(error)
-    text = re.sub(r" at 0x[0-9a-f]+", "", f"{f'function {name}: ' if name else ''}{type(error).__name__}: {error}")
+    of = f"function {function}: " if function else ""
+    text = re.sub(r" at 0x[0-9a-f]+", "", f"{of}{type(error).__name__}: {error}")
     frames = _users_frames(error)
     return f"{text} ({_line(frames[-1])})" if frames else text
 
@@ -399,14 +346,3 @@ def _users_frames(error: BaseException) -> list[FrameSummary]:
 def _line(frame: FrameSummary) -> str:
     file = Path(frame.filename)
     return f"{f'{file.name}, ' if file.is_file() else ''}line {frame.lineno}"
-
-
-def _function_that_raised(error: BaseException | None) -> str:
-    from suave_des.managed.node import CustomFunction  # loads the vehicle
-
-    while error is not None:
-        for frame, _ in walk_tb(error.__traceback__):
-            if isinstance(owner := frame.f_locals.get("self"), CustomFunction):
-                return owner.context.name
-        error = error.__cause__  # SimPy raises a copy of what a process has raised
-    return ""

@@ -15,8 +15,6 @@ from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
-from suave_des.scenario.quantities import AnyDistribution
 
 if TYPE_CHECKING:
     from suave_des.knowledge.checks import Subject
@@ -44,9 +42,7 @@ def open_base(loaded: LoadedScenario) -> Ontology:
 
 
 def read_base(
-    scenario: Scenario,
-    ontologies: Sequence[Path] | None = None,
-    rules: Sequence[Path] | None = None,
+    scenario: Scenario, ontologies: Sequence[Path] | None = None, rules: Sequence[Path] | None = None
 ) -> Ontology:
     """Read ontologies and rules with a scenario's values, and with what its revision assumes.
 
@@ -73,22 +69,6 @@ def read_base(
 def measured_attributes(scenario: Scenario) -> tuple[str, ...]:
     """Return the quality attributes that a scenario's monitors measure, sorted."""
     return tuple(sorted({*scenario.signals, *(() if scenario.battery is None else (BATTERY_LEVEL,))}))
-
-
-def measured_values(loaded: LoadedScenario, attribute: str) -> tuple[Sequence[AnyDistribution], AnyDistribution]:
-    """Return values between which all are that an attribute's monitor can measure, and the noise that is added."""
-    if attribute == BATTERY_LEVEL:
-        return (0.0, 1.0), 0.0
-    signal = loaded.scenario.signals[attribute]
-    match signal:
-        case SinusoidSignal():
-            return (signal.minimum, signal.maximum), signal.noise
-        case ConstantSignal():
-            return (signal.value,), signal.noise
-        case StepSignal():
-            return (signal.before, signal.after), signal.noise
-        case TableSignal():
-            return loaded.tables[attribute][1], signal.noise
 
 
 def subject_of(loaded: LoadedScenario) -> Subject:
@@ -128,9 +108,8 @@ def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     same = *knowledge, loaded.ontologies, loaded.rules, operators
     reasoner = _opened.get(same)
     if reasoner is None:
-        base = open_base(loaded)
         try:
-            reasoner = Reasoner(base, loaded.scenario.knowledge.reasoner)
+            reasoner = Reasoner(open_base(loaded), loaded.scenario.knowledge.reasoner)
         except KnowledgeError as error:
             raise loaded.located(error) from None
         if len(_opened) >= OPENED:
@@ -140,12 +119,8 @@ def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     functions = loaded.scenario.needed_functions()
     base.check(functions)
     for function in functions:
-        for design in base.designs(function):
-            if design not in loaded.modes.modes(function):
-                raise InputError(
-                    f"function {function} has no mode {design}, but the ontology has a function design of that name",
-                    file=loaded.modes_path,
-                    place=function,
-                    remedy="add the mode, or remove the design from the ontology",
-                )
+        if missing := [each for each in base.designs(function) if each not in loaded.modes.modes(function)]:
+            problem = f"function {function} has no mode {missing[0]}, but the ontology has such a design"
+            remedy = "add the mode, or remove the design from the ontology"
+            raise InputError(problem, file=loaded.modes_path, place=function, remedy=remedy)
     return reasoner

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.caches import SharedEntries, read_checked, remove_oldest, with_checksum
+from suave_des.caches import SharedEntries
 
 ENTRIES = {f"state {number}": [["fg_spiral_high", "fg_status", "str", f"IN_ERROR_{number}"]] for number in range(8)}
 
@@ -70,7 +70,7 @@ def test_several_processes_share_a_file(tmp_path):
 
 
 def test_only_the_latest_files_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr("suave_des.caches.remove_oldest", lambda folder, pattern: remove_oldest(folder, pattern, 2))
+    monkeypatch.setattr("suave_des.caches.MAX_FILES", 2)
     for number, digest in enumerate("abc"):
         SharedEntries(tmp_path, digest).add("key", digest)
         (tmp_path / f"{digest}.jsonl").touch()
@@ -82,13 +82,3 @@ def test_a_file_that_is_full_gets_no_more_entries(filled, monkeypatch):
     monkeypatch.setattr("suave_des.caches.MAX_BYTES", filled.stat().st_size)
     SharedEntries(filled.parent, "d").add("more", 1)
     assert dict(SharedEntries(filled.parent, "d").read()) == ENTRIES
-
-
-def test_a_file_with_a_checksum(tmp_path):
-    path = tmp_path / "code"
-    assert read_checked(path) is None
-    path.write_bytes(with_checksum(b"machine code"))
-    assert read_checked(path) == b"machine code"
-    for damaged in (b"", path.read_bytes()[:-1], path.read_bytes().replace(b"code", b"cold")):
-        path.write_bytes(damaged)
-        assert read_checked(path) is None

@@ -3,13 +3,12 @@
 import ast
 import os
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 
 import suave_des
-from suave_des.imports import hidden, main_hidden
+from suave_des.imports import hidden
 from tests.helpers.command import python
 
 COMPILING = """
@@ -69,26 +68,6 @@ def test_what_is_loaded_is_not_hidden():
     with hidden("os"):
         assert __import__("os") is os
     assert sys.modules["os"] is os
-
-
-def test_the_script_is_back_when_two_threads_have_hidden_it():
-    main = sys.modules["__main__"]
-    inside, leave = [threading.Event(), threading.Event()], [threading.Event(), threading.Event()]
-
-    def hide(number: int) -> None:
-        with main_hidden():
-            inside[number].set()
-            leave[number].wait(10.0)
-
-    threads = [threading.Thread(target=hide, args=(number,)) for number in (0, 1)]
-    threads[0].start()
-    assert inside[0].wait(10.0)
-    threads[1].start()
-    inside[1].wait(0.5)  # it has to wait for the first one
-    for number in (0, 1):
-        leave[number].set()
-        threads[number].join()
-    assert sys.modules["__main__"] is main
 
 
 KNOWN_CIRCLES = ()

@@ -18,12 +18,12 @@ from suave_des.campaign.inputs import (
     read_campaign,
     trained_on,
 )
-from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
+from suave_des.campaign.missions import Campaign, Executor, MissionRunner, Remark, WorkerError
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignSpec, read_campaign_file
 from suave_des.campaign.workers import LocalWorkers, in_process
-from suave_des.errors import InputError, SuaveDesError, did_you_mean
+from suave_des.errors import InputError, SuaveDesError
 from suave_des.files import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.records.store import (
     FILES,
@@ -83,18 +83,13 @@ def run_campaign(
     given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
     spec = CampaignSpec.of(named, **given, **options)
     if spec.out is not None:
-        _check_new(spec.out, overwrite=spec.overwrite)
+        check_output_folder(spec.out, "campaign", overwrite=spec.overwrite, left_over=is_left_over)
+        if not spec.overwrite and has_campaign(spec.out):
+            remedy = f"--resume {spec.out} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
+            raise InputError("the output folder is not empty: it has a campaign in it", file=spec.out, remedy=remedy)
     file = read_campaign_file(spec.scenario) if loaded is None else None
-
-    def read() -> Campaign:
-        campaign = read_campaign(spec, file, loaded)
-        if spec.suave_format and campaign.variation.sweep.points > 1:
-            remedy = "omit --format suave, or run a campaign for each point"
-            raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
-        return campaign
-
     with ExitStack() as stack:
-        return _run(stack, spec.with_file(file), read, None, on_progress)
+        return _run(stack, spec.with_file(file), lambda: read_campaign(spec, file, loaded), None, on_progress)
 
 
 def resume_campaign(
@@ -104,7 +99,6 @@ def resume_campaign(
     runs: int | None = None,
     on_progress: OnProgress | None = None,
     scheduler: str | None = None,
-    managers: Collection[str] = (),
     confirmed: bool = False,
 ) -> CampaignResult:
     """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it has.
@@ -120,7 +114,7 @@ def resume_campaign(
     changed = {"runs": runs, "workers": workers, "scheduler": scheduler, "out": Path(folder)}
     changed = {name: value for name, value in changed.items() if value is not None}
     with ExitStack() as stack:
-        store, campaign = stack.enter_context(_stored(Path(folder), changed, managers, confirmed=confirmed))
+        store, campaign = stack.enter_context(_stored(Path(folder), changed, confirmed=confirmed))
         return _run(stack, campaign.spec, lambda: campaign, store, on_progress)
 
 
@@ -144,7 +138,7 @@ def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: 
 
 @contextmanager
 def _stored(
-    folder: Path, changed: Mapping[str, Any], named: Collection[str], *, confirmed: bool
+    folder: Path, changed: Mapping[str, Any], named: Collection[str] = (), *, confirmed: bool
 ) -> Iterator[tuple[Store, Campaign]]:
     """Open the campaign in a folder, with options that differ from the stored ones; check that its code is trusted."""
     if not has_campaign(folder):
@@ -152,35 +146,11 @@ def _stored(
     with closing(Store(folder / STORE_FILE)) as store:
         with store.reading():
             stored = CampaignSpec.model_validate(store.about("request"))
-        request = CampaignSpec.read({**stored.stored(), **changed})
-        try:
-            with store.reading():
-                file = read_campaign_file(request.scenario)
-                campaign = read_campaign(request, file)
-            functions = (name for name in campaign.code() if name not in campaign.spec.managers)
-            known = (*stored.with_file(file).managers, *functions)
-            for name in named:
-                if name not in known:
-                    problem = f"the campaign has no manager {name!r}, and cannot be given new ones"
-                    remedy = f"{did_you_mean(name, known, 'its managers')}; {_MORE_MANAGERS}"
-                    raise InputError(problem, file=folder, remedy=remedy)
-            check_trusted(campaign, named, folder, confirmed=confirmed)
-        except InputError as error:
-            if str(Path.cwd()) == request.folder or error.file == str(folder):
-                raise
-            remedy = f"the campaign was started in {request.folder}: do this there"
-            raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+            request = CampaignSpec.read({**stored.stored(), **changed})
+            file = read_campaign_file(request.scenario)
+            campaign = read_campaign(request, file)
+        check_trusted(campaign, named, folder, confirmed=confirmed)
         yield store, campaign
-
-
-def _check_new(folder: Path, *, overwrite: bool) -> None:
-    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=is_left_over)
-    if not overwrite and has_campaign(folder):
-        raise InputError(
-            "the output folder is not empty: it has a campaign in it",
-            file=folder,
-            remedy=f"--resume {folder} continues it, --overwrite replaces it; {_MORE_MANAGERS}",
-        )
 
 
 def _run(
@@ -208,7 +178,7 @@ def _run(
     if spec.scheduler is not None:
         from suave_des.campaign.cluster import connected
 
-        executor = stack.enter_context(connected(spec.scheduler)).outcomes
+        executor = stack.enter_context(connected(spec.scheduler))
     folder, is_new = spec.out, store is None
     decides = deciding(campaign, inputs)
     about = {"request": campaign.request.stored(), "deciding": decides, "identity": identity(decides)}
@@ -260,22 +230,22 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
         store.begin(about)
         yield store  # whose result reads it
         return
-    with ExitStack() as stack:
-        if not folder.exists():
-            stack.callback(_remove_empty, folder)
+    was_there = folder.exists()
+    try:
         make_output_folder(folder)
         check_no_link(folder)
         store = Store(folder / STORE_FILE, replace=True)
-        stack.callback(store.close, keep_empty=False)
-        remove_parts(folder, FILES)
-        remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
-        store.begin(about)
-        yield store
-
-
-def _remove_empty(folder: Path) -> None:
-    with suppress(OSError):
-        folder.rmdir()
+        try:
+            remove_parts(folder, FILES)
+            remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
+            store.begin(about)
+            yield store
+        finally:
+            store.close(keep_empty=False)
+    finally:
+        if not was_there:
+            with suppress(OSError):  # it has results
+                folder.rmdir()
 
 
 def _work(
@@ -283,8 +253,7 @@ def _work(
 ) -> tuple[KeyboardInterrupt | SuaveDesError | None, list[Remark]]:
     """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
     with store.reading():
-        kept = store.about("remarks", default=[])
-        remarks = {(manager, text): int(count) for manager, text, count in kept if text != GIVEN_UP}
+        remarks = {Remark(manager, text) for manager, text, *_ in store.about("remarks", default=[])}
     done = failed = 0
     stopped: KeyboardInterrupt | SuaveDesError | None = None
     try:
@@ -297,7 +266,7 @@ def _work(
                 finished = []
                 for key, each in among:
                     if isinstance(each, Remark):
-                        remarks[each.manager, each.text] = remarks.get((each.manager, each.text), 0) + each.times
+                        remarks.add(each)
                     else:
                         finished.append((key, each))
                         failed += isinstance(each, MissionFailure)
@@ -308,7 +277,7 @@ def _work(
         store.commit()
     except (KeyboardInterrupt, SuaveDesError) as error:
         stopped = error
-    told = [Remark(manager, text, count) for (manager, text), count in sorted(remarks.items())]
+    told = sorted(remarks)
     with suppress(StoreError):  # which is reported when the files cannot be written either
         store.commit()
         if told:

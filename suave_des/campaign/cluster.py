@@ -6,7 +6,6 @@ worker is one process that runs one mission after the other (`dask worker --nwor
 
 from __future__ import annotations
 
-import asyncio
 import errno
 import faulthandler
 import importlib
@@ -17,19 +16,18 @@ import shutil
 import sys
 import tempfile
 import threading
-import time
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any
 
-import suave_des
 from suave_des.campaign.inputs import MAIN, code_versions, declared_files, user_modules
-from suave_des.campaign.missions import Campaign, Chunk, Finished, MissionRunner, WorkerError
+from suave_des.campaign.missions import Campaign, Chunk, Executor, Finished, MissionRunner, WorkerError
 from suave_des.campaign.workers import packed, unpacked
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.records.store import MissionKey
@@ -37,21 +35,22 @@ from suave_des.registry import custom_functions
 
 ANSWER_TIMEOUT_S = 10.0
 """Time for a scheduler to answer at all."""
-_AHEAD, _FEWEST_WORKERS = 3, 2
-"""Chunks for each worker: one under way and some to go on with; a cluster that grows with its work begins with none."""
-_CHUNK_S, _FIRST_CHUNK, _SHARES = 1.0, 10, 4
-"""Work in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets of what is left."""
+_AHEAD = 3
+"""Chunks for each worker: one under way and some to go on with."""
+_LARGEST_CHUNK, _SHARES = 50, 4
+"""Missions in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets of what is left."""
+_LOOK_S = 1.0
+"""How often to look whether the scheduler is there."""
 _EXIT_AFTER_S = 30.0
 """Missions that are so much over their time, in code that cannot be interrupted, end their worker."""
-_NOISY = ("distributed", "dask", "tornado", "asyncio")
 
 
 @contextmanager
-def connected(scheduler: str) -> Iterator[DaskCluster]:
+def connected(scheduler: str) -> Iterator[Executor]:
     """Connect to the cluster of a scheduler, such as tcp://127.0.0.1:8786, until it is no longer needed.
 
     Raises:
-        InputError: there is no such scheduler, or a worker cannot do what this machine would.
+        InputError: there is no such scheduler.
     """
     try:
         import distributed
@@ -59,116 +58,82 @@ def connected(scheduler: str) -> Iterator[DaskCluster]:
         remedy = "pip install 'suave-des[dask]'"
         raise InputError(f"a scheduler needs Dask, which is not installed ({error})", remedy=remedy) from None
 
-    async def answers() -> bool:
-        async with distributed.rpc(scheduler) as there:
-            identity = await asyncio.wait_for(there.identity(), ANSWER_TIMEOUT_S)
-            return bool(identity["type"] == "Scheduler")
-
-    with _silenced():
-        with ThreadPoolExecutor(1) as thread:  # a Client would wait for ever for one who is silent
-            try:
-                is_there = thread.submit(asyncio.run, answers()).result()
-            except Exception:
-                is_there = False
-        if not is_there:
-            problem = f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s"
-            raise InputError(problem, remedy="check that `dask scheduler` is running there")
-        with distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False) as client:
-            for address, there in sorted(client.run(code_versions, on_error="return").items()):
-                if isinstance(there, BaseException):
-                    problem = f"worker {address} cannot run missions: {type(there).__name__}: {there}"
-                    raise InputError(problem, remedy=f"install suave-des {suave_des.__version__} on all workers")
-                _check_same(code_versions(), there, address)
-            yield DaskCluster(client, scheduler)
+    with ExitStack() as stack:
+        for name in list(logging.root.manager.loggerDict):
+            if name.startswith(("distributed", "tornado", "asyncio")) and not logging.getLogger(name).disabled:
+                logging.getLogger(name).disabled = True  # relevant problems are reported as errors of suave-des
+                stack.callback(setattr, logging.getLogger(name), "disabled", False)
+        try:
+            client = stack.enter_context(distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False))
+        except Exception as error:
+            problem = f"scheduler: {scheduler} does not answer as a Dask scheduler: {error}"
+            raise InputError(problem, remedy="check that `dask scheduler` is running there") from None
+        yield partial(_outcomes, client, scheduler)
 
 
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Have Dask log nothing in the block: relevant problems are reported as errors of suave-des."""
-    names = [name for name in logging.root.manager.loggerDict if name.startswith(_NOISY)]
-    heard = [logger for logger in map(logging.getLogger, names) if not logger.disabled]
-    try:
-        for logger in heard:
-            logger.disabled = True
-        yield
-    finally:
-        for logger in heard:
-            logger.disabled = False
-
-
-def _check_same(here: Mapping[str, str], there: Mapping[str, str], worker: str) -> None:
-    for name, value in here.items():
-        if there.get(name) != value:
-            problem = f"{name} is {there.get(name, 'missing')} on worker {worker}, and {value} here"
-            raise InputError(f"{problem}, which could change results", remedy="install the same version everywhere")
-
-
-class DaskCluster:
-    """Runs chunks of missions on whatever workers the cluster has at the time; an Executor.
+def _outcomes(
+    client: Any, scheduler: str, campaign: Campaign, missions: Iterable[MissionKey], total: int
+) -> Iterator[list[Finished]]:
+    """Run chunks of missions on whatever workers the cluster has at the time; yield outcomes chunk by chunk.
 
     A worker that dies loses nothing: Dask gives its chunks to others. The missions of chunks with which workers die
     again and again are run alone, one after the other, and one with which they die even so has failed.
     """
+    from distributed import KilledWorker
 
-    def __init__(self, client: Any, scheduler: str) -> None:
-        self._client, self._scheduler = client, scheduler
+    token, remaining, left = uuid.uuid4().hex, iter(missions), total
+    under_way, suspects, ended = dict[Any, Chunk](), list[MissionKey](), SimpleQueue[Any]()
+    # As the result of a task, it can be made again wherever a worker died that had it, and is sent to each once.
+    parcel = client.submit(bytes, pack(campaign), key=f"suave_des_parcel-{token}")
 
-    def outcomes(self, campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
-        """Yield outcomes chunk by chunk; see Executor."""
-        from distributed import KilledWorker, as_completed
+    def submit(chunk: Chunk) -> Any:
+        limit_s = len(chunk) * campaign.spec.time_out_s + _EXIT_AFTER_S
+        return client.submit(run, token, code_versions(), parcel, chunk, limit_s, pure=False)
 
-        client, token, remaining, left = self._client, uuid.uuid4().hex, iter(missions), total
-        under_way, suspects, size = dict[Any, Chunk](), list[MissionKey](), _FIRST_CHUNK
-        # As the result of a task, it can be made again wherever a worker died that had it, and is sent to each once.
-        parcel = client.submit(bytes, pack(campaign), key=f"suave_des_parcel-{token}")
-        ended = as_completed(loop=client.loop)
-
-        def submit(chunk: Chunk) -> Any:
-            limit_s = len(chunk) * campaign.spec.time_out_s + _EXIT_AFTER_S
-            return client.submit(run, token, code_versions(), parcel, chunk, limit_s, pure=False)
-
-        try:
-            while True:
-                workers = len(client.scheduler_info()["workers"])
-                while len(under_way) < _AHEAD * max(workers, _FEWEST_WORKERS):
-                    fair = max(1, min(left // (_SHARES * max(workers, 1)), size))
-                    if not (chunk := tuple(islice(remaining, fair))):
-                        break
-                    under_way[future := submit(chunk)] = chunk
-                    ended.add(future)
-                if not under_way:
+    try:
+        while client.status == "running":
+            workers = max(2, len(client.scheduler_info()["workers"]))  # one that grows with its work begins with none
+            while len(under_way) < _AHEAD * workers:
+                size = max(1, min(left // (_SHARES * workers), _LARGEST_CHUNK))
+                if not (chunk := tuple(islice(remaining, size))):
                     break
-                future = next(ended)
-                chunk = under_way.pop(future)
-                left -= len(chunk)
-                try:
-                    seconds, finished = future.result()
-                except KilledWorker:
-                    suspects.extend(chunk)
-                    continue
-                size = int(_CHUNK_S * len(chunk) / max(seconds, 1e-6))
-                yield finished
-            for key in suspects:
-                try:
-                    yield submit((key,)).result()[1]
-                except KilledWorker as error:
-                    times = f"{error.allowed_failures + 1} times (killed, out of memory, or stuck?)"
-                    yield [campaign.failed(key, f"the cluster's worker died while running it, {times}")]
-        except SuaveDesError:
-            raise
-        except Exception as error:
-            if client.status != "running" or any(future.cancelled() for future in (parcel, *under_way)):
-                raise WorkerError(f"the connection to the scheduler {self._scheduler} is lost") from None
-            raise WorkerError(f"a task cannot be run on the cluster: {type(error).__name__}: {error}") from error
-        finally:
-            if client.status == "running":  # have the cluster forget the campaign, which may be over or not
-                with suppress(Exception):
-                    client.cancel([*under_way, parcel], force=True)
-                    client.run(forget, token, on_error="ignore")
+                under_way[future := submit(chunk)] = chunk
+                future.add_done_callback(ended.put)
+            if not under_way:
+                break
+            try:
+                future = ended.get(timeout=_LOOK_S)
+            except Empty:  # of one that is lost, Dask need not tell
+                continue
+            chunk = under_way.pop(future)
+            left -= len(chunk)
+            try:
+                yield future.result()
+            except KilledWorker:
+                suspects.extend(chunk)
+        else:
+            raise ConnectionError
+        for key in suspects:
+            try:
+                yield submit((key,)).result()
+            except KilledWorker as error:
+                times = f"{error.allowed_failures + 1} times (killed, out of memory, or stuck?)"
+                yield [campaign.failed(key, f"the cluster's worker died while running it, {times}")]
+    except SuaveDesError:
+        raise
+    except Exception as error:
+        if client.status != "running" or any(future.cancelled() for future in (parcel, *under_way)):
+            raise WorkerError(f"the connection to the scheduler {scheduler} is lost") from None
+        raise WorkerError(f"a task cannot be run on the cluster: {type(error).__name__}: {error}") from error
+    finally:
+        if client.status == "running":  # have the cluster forget the campaign, which may be over or not
+            with suppress(Exception):
+                client.cancel([*under_way, parcel], force=True)
+                client.run(forget, token, on_error="ignore")
 
 
 def pack(campaign: Campaign) -> bytes:
-    """Pack a campaign with the content of every file that it needs; a compiled module cannot be sent."""
+    """Pack a campaign with the content of every file that it needs."""
     from suave_des.knowledge.ontology_file import collect
 
     loaded, managers = campaign.loaded, campaign.spec.managers
@@ -178,9 +143,6 @@ def pack(campaign: Campaign) -> bytes:
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]
     modules = user_modules(managers, functions)
     modules.pop(MAIN, None)  # whose classes are sent by value
-    for path in modules.values():
-        if path.suffix != ".py":
-            raise InputError("is compiled, so it cannot be sent", file=path, remedy="install it there and here")
     files = {path: path.read_bytes() for path in (*loaded.ontologies, *loaded.rules, *loaded.manager_files.values())}
     sources = {place: path.read_bytes() for place, path in modules.items()}
     return pickle.dumps((packed(replace(campaign, loaded=loaded)), files, sources))
@@ -194,10 +156,8 @@ _lock = threading.Lock()
 """Missions run one at a time, however many threads a worker has: they need the process for themselves."""
 
 
-def run(
-    token: str, here: Mapping[str, str], parcel: bytes, chunk: Chunk, limit_s: float
-) -> tuple[float, list[Finished]]:
-    """Run missions in this process, which is a worker of a cluster; return the seconds that it took, and outcomes.
+def run(token: str, here: Mapping[str, str], parcel: bytes, chunk: Chunk, limit_s: float) -> list[Finished]:
+    """Run missions in this process, which is a worker of a cluster, and return their outcomes.
 
     Args:
         token: the campaign's.
@@ -211,8 +171,11 @@ def run(
     """
     from distributed import get_worker
 
-    worker, began_s = get_worker(), time.monotonic()
-    _check_same(here, code_versions(), worker.address)
+    worker, there = get_worker(), code_versions()
+    for name, value in here.items():
+        if there.get(name) != value:
+            problem = f"{name} is {there.get(name, 'missing')} on worker {worker.address}, and {value} here"
+            raise InputError(f"{problem}, which could change results", remedy="install the same version everywhere")
     with _lock, Path(os.devnull).open("w") as nowhere:
         faulthandler.dump_traceback_later(limit_s, exit=True, file=nowhere)
         try:
@@ -221,12 +184,11 @@ def run(
                     forget(other)
                 folder = Path(tempfile.mkdtemp(prefix="suave-des-", dir=worker.local_directory))
                 _current[token] = _prepared(parcel, folder)
-            finished = list(_current[token][0].each(chunk))
+            return list(_current[token][0].each(chunk))
         except MemoryError:
             os._exit(errno.ENOMEM)  # as if it had been killed for it: a new worker begins with little
         finally:
             faulthandler.cancel_dump_traceback_later()
-    return time.monotonic() - began_s, finished
 
 
 def _prepared(parcel: bytes, folder: Path) -> tuple[MissionRunner, ExitStack]:

@@ -12,10 +12,8 @@ import importlib.util
 import json
 import logging
 import platform
-import shlex
 import sys
 import sysconfig
-from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -25,14 +23,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import suave_des
-from suave_des.caches import private_cache, remove_oldest
+from suave_des.caches import SharedEntries, private_cache
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
 from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_ensemble
-from suave_des.errors import MISTAKES_LOGGER, InputError, shown
-from suave_des.findings import Level, ordered
+from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, shown
 from suave_des.learned import read_file
-from suave_des.registry import custom_functions, is_built_in, manager_class, takes_argument
+from suave_des.registry import cause_of, custom_functions, is_built_in, manager_class, takes_argument
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.yamlfile import InputFiles, sha256_of, shown_name
@@ -43,10 +40,6 @@ if TYPE_CHECKING:
 _TIME_OUTS_S = {"owlready2": 1800.0}
 """Time that a mission may take with a reasoner, if not the default: owlready2 takes some two minutes a mission."""
 _LIMIT_BYTES = 1_000_000_000
-_OWN_KEPT = 1000
-"""Notes of campaigns that this user has begun: so many of the last."""
-MISTAKES_SHOWN = 10
-"""Mistakes in the user's files that are reported one by one."""
 _told: set[Hashable] = set()
 """What this process has checked for mistakes, and reported: a script may run thousands of missions with the same."""
 
@@ -60,7 +53,7 @@ def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: Load
     spec = request.with_file(file)
     loaded = load_scenario(loaded or (spec.scenario if file is None else file.scenario), **spec.replacements)
     with _located(file):
-        loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
+        loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw)
     files = InputFiles()
     if spec.ensemble is not None:
         ensemble, path, digest = read_ensemble(spec.ensemble)
@@ -69,6 +62,9 @@ def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: Load
     if "time_out_s" not in spec.model_fields_set:
         time_out_s = _TIME_OUTS_S.get(loaded.scenario.knowledge.reasoner, spec.time_out_s)
         spec = spec.model_copy(update={"time_out_s": time_out_s})
+    if spec.suave_format and variation.sweep.points > 1:
+        remedy = "omit --format suave, or run a campaign for each point"
+        raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
     return Campaign(request, spec, loaded, variation, file, files.inputs)
 
 
@@ -95,32 +91,33 @@ def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, c
         return ":" in name and not takes_argument(name) and name.partition(":")[0] in sys.modules
 
     unknown = [name for name in campaign.code() if name not in named and not is_imported(name)]
-    own = [_own(folder, name) for name in unknown]
-    if confirmed or all(path is not None and path.exists() for path in own):
-        return
-    raise InputError(
-        f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
-        file=folder,
-        remedy=f"if you trust it, give --managers {shlex.quote(','.join(unknown))} or --yes",
-    )
+    begun = dict(_begun().read()) if unknown else {}
+    if not confirmed and any(_note(folder, name) not in begun for name in unknown):
+        raise InputError(
+            f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
+            file=folder,
+            remedy="if you trust it, give --yes",
+        )
 
 
 def note_own(campaign: Campaign, folder: Path) -> None:
     """Note, outside of its folder, that this user has begun a campaign with its code, see `check_trusted`."""
-    for path in (_own(folder, name) for name in campaign.code()):
-        if path is not None:
-            path.touch()
-            remove_oldest(path.parent, "*", _OWN_KEPT)
+    for name in campaign.code():
+        _begun().add(_note(folder, name), True)
 
 
-def _own(folder: Path, name: str) -> Path | None:
-    """Return the place of the note that this user has run code of this name from here, for this very folder.
+def _begun() -> SharedEntries:
+    return SharedEntries(private_cache("campaigns"), "begun")
+
+
+def _note(folder: Path, name: str) -> str:
+    """Return the note that this user has run code of this name from here, for this very folder.
 
     A folder from elsewhere has another number, and cannot bring such a note along.
     """
-    kept, real, found = private_cache("campaigns"), folder.resolve(), folder.stat()
-    place = json.dumps([str(real), found.st_dev, found.st_ino, str(Path.cwd()), name])
-    return None if kept is None else kept / hashlib.sha256(place.encode(errors="replace")).hexdigest()
+    found = folder.stat()
+    place = json.dumps([str(folder.resolve()), found.st_dev, found.st_ino, str(Path.cwd()), name])
+    return hashlib.sha256(place.encode(errors="replace")).hexdigest()
 
 
 def check_campaign(campaign: Campaign) -> dict[str, str]:
@@ -130,17 +127,13 @@ def check_campaign(campaign: Campaign) -> dict[str, str]:
         InputError: an input is invalid.
     """
     spec = campaign.spec
+    useless: dict[str, None] = {}
     with _located(campaign.file):
         check_drawn(campaign.loaded, campaign.variation)
-    points = sorted(set(campaign.variation.sweep.each_value()))
-    useless = Counter(
-        words
-        for point in points
-        for words in campaign.variation.scenario(campaign.loaded, point).scenario.without_effect()
-    )
-    for words, number in useless.items():
-        where = f", at {number} of {len(points)} swept values" if len(points) > 1 else ""
-        logging.getLogger(MISTAKES_LOGGER).warning("note: %s%s", words, where)
+    for point in sorted(set(campaign.variation.sweep.each_value())):
+        useless.update(dict.fromkeys(campaign.variation.scenario(campaign.loaded, point).scenario.without_effect()))
+    for words in useless:
+        logging.getLogger(MISTAKES_LOGGER).warning("note: %s", words)
     return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, spec.replacements)}
 
 
@@ -178,7 +171,11 @@ def check_inputs(
         for path in knowledge.base.files:
             files.ontology(path)
         report_mistakes(scenarios[0], knowledge.base)
-    code = code_files(managers, functions)
+    code = user_modules(managers, functions)
+    for module in _defining(managers, functions):  # of a class that a package has installed, its module
+        path = Path(getattr(sys.modules[module], "__file__", None) or "")
+        if path.is_file() and path not in code.values():
+            code[f"{module.replace('.', '/')}{path.suffix}"] = path
     for each in scenarios:
         for manager in managers:
             try:
@@ -186,9 +183,7 @@ def check_inputs(
             except InputError:
                 raise
             except Exception as error:  # whatever a manager's own code raises
-                problem = f"manager {manager}: check raised {type(error).__name__}: {error}"
-                remedy = "a manager that cannot work with a scenario raises suave_des.errors.InputError"
-                raise InputError(problem, remedy=remedy) from error
+                raise InputError(f"manager {manager}: check raised {cause_of(error)}") from error
     for path in declared_files(scenarios, managers).values():
         files.note(path, sha256_of(path, _LIMIT_BYTES))
     names = {place: place if place not in files.inputs else f"module {place}" for place in code}
@@ -224,10 +219,9 @@ def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     _told.add(checked)
     findings = ordered(findings_in(base, subject_of(loaded)))
     if lines := [str(each) for each in findings if each.level is not Level.INFO]:
-        for line in lines[:MISTAKES_SHOWN]:
+        for line in lines:
             logger.warning("%s", line)
-        more = f"{len(lines) - MISTAKES_SHOWN} more; " if len(lines) > MISTAKES_SHOWN else ""
-        logger.warning("note: %ssuave-des kb check, with the same files, looks for contradictions, too", more)
+        logger.warning("note: suave-des kb check, with the same files, looks for contradictions, too")
 
 
 def trained_on(campaign: Campaign) -> Iterator[str]:
@@ -236,8 +230,8 @@ def trained_on(campaign: Campaign) -> Iterator[str]:
     for manager in campaign.spec.managers:
         settings = [(each, each.manager_settings(manager).get("learned")) for each in campaign.scenarios()]
         files = {each.manager_file(manager, str(name)) for each, name in settings if name is not None}
-        trainings = [training for path in files for training in read_file(path).trainings]
-        if seen := [missions for scenario, seed, missions in trainings if (scenario, seed) == own]:
+        trainings = [read_file(path) for path in files]
+        if seen := [each.missions for each in trainings if (each.scenario, each.seed) == own]:
             last = min(campaign.spec.runs, max(seen))
             yield f"{manager}: runs 1 to {last} are missions that it was trained on; give a different --seed"
 
@@ -250,19 +244,6 @@ _INSTALLED = (
     *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
     Path(suave_des.__file__).resolve().parent,
 )
-
-
-def code_files(managers: Sequence[str], functions: Sequence[type]) -> dict[str, Path]:
-    """Find the files that decide what managers and functions do, and that are not the project's own.
-
-    They are those of user_modules, and of a class that a package has installed its module.
-    """
-    found = user_modules(managers, functions)
-    for module in _defining(managers, functions):
-        path = Path(getattr(sys.modules[module], "__file__", None) or "")
-        if path.is_file() and path not in found.values():
-            found[f"{module.replace('.', '/')}{path.suffix}"] = path
-    return found
 
 
 def _defining(managers: Iterable[str], functions: Iterable[type]) -> list[str]:

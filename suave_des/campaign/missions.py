@@ -32,8 +32,6 @@ NOT_REPEATABLE = (
     " to the next, or has its own source of randomness, so results depend on the number of workers."
     " To learn, use `suave-des train`; for random numbers, system.stream"
 )
-GIVEN_UP = "its first 3 missions here took too long, and none was finished, so the others were left out"
-_IN_VAIN = 3
 _REPEATED_AFTER = {2, *(4**power for power in range(1, 11))}
 """Missions of a manager in a process after which its first is run again, as its class may keep state"""
 _REPEAT_S = 1.0
@@ -41,15 +39,14 @@ _REPEAT_S = 1.0
 
 
 class Remark(NamedTuple):
-    """A remark about a manager for users, delivered among the outcomes; times is 0 where counting says nothing."""
+    """A remark about a manager for users, delivered among the outcomes."""
 
     manager: str
     text: str
-    times: int = 1
 
     def __str__(self) -> str:
         """Return it in one line."""
-        return f"manager {self.manager}: {self.text}{f' ({self.times} times)' if self.times > 1 else ''}"
+        return f"manager {self.manager}: {self.text}"
 
 
 Chunk = tuple[MissionKey, ...]
@@ -139,8 +136,7 @@ class MissionRunner:
         short_mission(campaign.loaded)
         self._point, self._simulators = -1, dict[int | None, "Simulator"]()
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
-        self._number: dict[int, int] = {}
-        self._too_long, self._in_time = Counter[int](), set[int]()
+        self._number = Counter[int]()
 
     def run(self, manager: str, run: int, point: int = 0) -> tuple[LoadedScenario, MissionResult]:
         """Run a mission of the campaign again, with its record; return its scenario and result.
@@ -161,31 +157,19 @@ class MissionRunner:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
         """
         for key in missions:
-            if self._is_given_up(key.manager):
-                continue
             manager = self.campaign.spec.managers[key.manager]
             outcome, remarks = self._outcome(key)
             yield key, outcome
-            if not (isinstance(outcome, MissionFailure) and not outcome.lasting):
-                self._in_time.add(key.manager)
-            else:
-                self._too_long[key.manager] += 1
-                if self._is_given_up(key.manager):
-                    yield key, Remark(manager, GIVEN_UP, 0)
             if not is_built_in(manager) and not isinstance(outcome, MissionFailure) and self._differs(key, outcome):
                 yield key, Remark(manager, NOT_REPEATABLE)
             for remark in remarks:
                 yield key, remark
 
-    def _is_given_up(self, manager: int) -> bool:
-        """Whether so many missions of a manager took too long, and none did not, that no others are begun."""
-        return manager not in self._in_time and self._too_long[manager] >= _IN_VAIN
-
     def _differs(self, key: MissionKey, outcome: Row | MissionFailure) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run again."""
         first, before = self._first.setdefault(key.manager, (key, outcome))
-        self._number[key.manager] = number = self._number.get(key.manager, 0) + 1
-        if number not in _REPEATED_AFTER:
+        self._number[key.manager] += 1
+        if self._number[key.manager] not in _REPEATED_AFTER:
             return False
         again, _ = self._outcome(first)
         return again != before and not (isinstance(again, MissionFailure) and not again.lasting)
@@ -209,8 +193,7 @@ class MissionRunner:
             swept = {variation.paths[name]: value for name, value in values.items()}
             known = mission_line(manager, key.point, key.run, result.knowledge, swept) if result.knowledge else ""
             row = (*row, known)
-        remarks = [Remark(manager, text, count) for text, count in result.refused.items()]
-        return row, [*remarks, *(Remark(manager, text, 0) for text in result.remarks)]
+        return row, [Remark(manager, text) for text in result.remarks]
 
     def _simulator(self, point: int, run: int) -> Simulator:
         """Return the simulator of a point and of a run's member of the ensemble; missions come point by point."""

@@ -1,18 +1,17 @@
-"""The progress of a campaign: shown on a terminal, in a notebook, or as log lines."""
+"""The progress of a campaign on standard error: one line, written over again, or lines in a log."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from importlib import import_module
+from datetime import timedelta
 from itertools import chain, repeat
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 _UPDATE_PERIOD_S = 0.25
 _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
@@ -37,74 +36,60 @@ class Progress:
 OnProgress = Callable[[Progress], None]
 
 
+def is_live() -> bool:
+    """Whether a line of standard error can be written over: on a terminal, and in a notebook."""
+    return "ipykernel" in sys.modules or (sys.stderr.isatty() and os.environ.get("TERM") != "dumb")
+
+
 @contextmanager
-def shown(label: str, console: Console, *, quiet: bool = False) -> Iterator[OnProgress | None]:
+def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
     """Show progress until the end, and yield what to give to a campaign as on_progress.
+
+    Elsewhere than on a terminal or in a notebook it is lines, the first after 10 s and then every 30 s.
 
     Args:
         label: name of the campaign.
-        console: where to show its progress: live if it is a terminal or a notebook, otherwise as lines, the first after
-            10 s and then every 30 s.
         quiet: show nothing.
     """
-    if quiet:
+    if quiet or sys.stderr is None:
         yield None
         return
-    text, over, drawn = _Text(label), threading.Event(), threading.Event()
-    is_live = console.is_jupyter or (console.is_terminal and not console.is_dumb_terminal)
-    waits_s: Iterable[float] = repeat(_UPDATE_PERIOD_S) if is_live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
-    with _drawing(text, console, is_live=is_live) as draw:
+    text, over, live, width = _Text(label), threading.Event(), is_live(), 0
+    waits_s: Iterable[float] = repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
 
-        def draw_until_over() -> None:
-            """Draw from a thread, so that it goes on during a long mission."""
-            for wait_s in waits_s:
-                if over.wait(wait_s):
-                    return
-                drawn.set()
-                draw()
+    def draw(*, end: str = "") -> None:
+        nonlocal width
+        line = text.line()[: shutil.get_terminal_size().columns - 1] if live else f"suave-des: {text.line()}\n"
+        with suppress(OSError):  # nobody reads it any more
+            sys.stderr.write(f"\r{line:<{width}}{end}" if live else line)
+            sys.stderr.flush()
+        width = len(line)
 
-        drawer = threading.Thread(target=draw_until_over, daemon=True)
-        drawer.start()
-        try:
-            yield text.take
-        finally:
-            over.set()
-            drawer.join()
-            if is_live or (drawn.is_set() and text.progress is not None):
-                draw()
+    def draw_until_over() -> None:
+        """Draw from a thread, so that it goes on during a long mission."""
+        for wait_s in waits_s:
+            if over.wait(wait_s):
+                return
+            draw()
 
-
-@contextmanager
-def _drawing(text: _Text, console: Console, *, is_live: bool) -> Iterator[Callable[[], None]]:
-    """Yield what draws a text: in one output of a notebook, which needs no widgets; with a bar; or as a line."""
-    # Rich is imported here alone: worker processes and scripts need none of it.
-    if console.is_jupyter:
-        notebook: Any = import_module("IPython.display")  # its functions have no types
-        handle: Any = notebook.display({"text/plain": text.line()}, raw=True, display_id=True)
-        yield lambda: handle.update({"text/plain": text.line()}, raw=True)
-    elif is_live:
-        from rich.progress import BarColumn, TextColumn
-        from rich.progress import Progress as Bars
-        from rich.table import Column
-
-        line = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
-        with Bars(line, BarColumn(20), console=console, auto_refresh=False, transient=True) as bars:
-            bar = bars.add_task(text.line(), total=None)
-
-            def draw() -> None:
-                done, total = (0, None) if text.progress is None else (text.progress.done, text.progress.total)
-                bars.update(bar, completed=done, total=total, description=text.line(), refresh=True)
-
-            yield draw
-    else:
-        yield lambda: console.print(f"suave-des: {text.line()}", soft_wrap=True, markup=False, highlight=False)
+    drawer = threading.Thread(target=draw_until_over, daemon=True)
+    drawer.start()
+    try:
+        yield text.take
+    finally:
+        over.set()
+        drawer.join()
+        if live:
+            draw(end="\n")
+        elif width and text.progress is not None:
+            draw()
 
 
 class _Text:
     """What is known of a campaign's progress, as a line of text."""
 
     def __init__(self, label: str) -> None:
-        self.label = label
+        self.label = "".join(char if char.isprintable() else "?" for char in label)
         self.progress: Progress | None = None
         self._began_s = self._first_s = self._last_s = time.monotonic()
         self._before = 0
@@ -121,7 +106,7 @@ class _Text:
         """Return missions that are done and failed, their rate, and the time that is left."""
         progress = self.progress
         if progress is None:
-            return f"{self.label}: starting, {_duration(time.monotonic() - self._began_s)} {_FIRST_TIME}"
+            return f"{self.label}: starting, {_time(time.monotonic() - self._began_s)} {_FIRST_TIME}"
         parts = [f"{progress.done} of {progress.total} missions"]
         if progress.failed:
             parts.append(f"{progress.failed} failed")
@@ -129,15 +114,9 @@ class _Text:
         if done and took_s > 0.0:
             rate = done / took_s
             parts.append(f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s")
-            parts += [f"{_duration(left / rate)} left"] if left else []
+            parts += [f"{_time(left / rate)} left"] if left else []
         return f"{self.label}: {', '.join(parts)}"
 
 
-def _duration(seconds: float) -> str:
-    """Return a human-readable duration: 8 s, 2 min 5 s, 3 h 20 min."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
+def _time(seconds: float) -> str:
+    return str(timedelta(seconds=round(seconds)))

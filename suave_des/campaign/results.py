@@ -134,13 +134,10 @@ class CampaignResult:
             **({"remarks": list(self.remarks)} if self.remarks else {}),
             "failures": [
                 {
-                    "manager": failure.manager,
-                    "run": failure.run,
-                    **self.variation.sweep.values(failure.point),
-                    "time_s": failure.time_s,
-                    "cause": failure.cause,
+                    **{"manager": each.manager, "run": each.run, **self.variation.sweep.values(each.point)},
+                    **{"time_s": each.time_s, "cause": each.cause},
                 }
-                for failure in self.failures
+                for each in self.failures
             ],
         }
 
@@ -199,15 +196,11 @@ class CampaignResult:
 
         scenario, runs, managers = self.loaded.scenario, self.spec.runs, self.spec.managers
         revision, limit_s = scenario.revision.name, scenario.mission.time_limit_s
-
-        def numbered(manager: int) -> Iterator[tuple[int, Row]]:
+        files = exemplar_names(managers, revision, has_battery=scenario.battery is not None)
+        for number, (file, name) in enumerate(files):
             # Each mission has its number in the campaign, from 1, whether or not all have a row.
-            return ((manager * runs + key.run, row) for key, row in self._kept() if key.manager == manager)
-
-        for number, (file, name) in enumerate(
-            exemplar_names(managers, revision, has_battery=scenario.battery is not None)
-        ):
-            yield f"{file}.csv", suave_pieces(revision, name, COLUMNS, numbered(number), limit_s)
+            rows = ((number * runs + key.run, row) for key, row in self._kept() if key.manager == number)
+            yield f"{file}.csv", suave_pieces(revision, name, COLUMNS, list(rows), limit_s)
 
 
 def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]) -> CampaignResult:

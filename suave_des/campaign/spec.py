@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Integral
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from suave_des.campaign.variation import plain
 from suave_des.errors import InputError, shown
 from suave_des.registry import is_built_in, manager_class
 from suave_des.resources import find
 from suave_des.scenario.loader import Replacements
-from suave_des.scenario.quantities import Real, Strict, wrong
+from suave_des.scenario.quantities import Real, Strict
 from suave_des.scenario.schema import problem_and_remedy, validated
 from suave_des.scenario.yamlfile import InputFiles, Layer, find_named
 
@@ -28,24 +28,8 @@ WORKERS_LIMIT = 256
 _WORKERS = 2
 _FEW_MISSIONS = 1000
 """So many take one process no longer than two, which first load the compiler and Java, or compile, each for itself."""
-_ADDRESS = re.compile(r"(?:tcp|tls)://(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:@\[\]]+):(\d{1,5})/?")
 
 Whole = Annotated[int, Field(strict=True)]
-
-
-def _version(number: int) -> int:
-    if number != 1:
-        problem = f"a campaign file of version {number}, and this suave-des reads version 1"
-        raise wrong(problem, "write campaign: 1, and see docs/guides/sweeps.md")
-    return number
-
-
-def _address(scheduler: str) -> str:
-    found = _ADDRESS.fullmatch(scheduler)
-    if found is None or not 0 < int(found[1]) < 65536:
-        problem = f"{shown(scheduler)} is not an address of a Dask scheduler"
-        raise wrong(problem, "give tcp://HOST:PORT, as `dask scheduler` prints it")
-    return scheduler
 
 
 class Option(NamedTuple):
@@ -68,9 +52,9 @@ class CampaignKeys(Strict):
     time_out_s: Annotated[Real, Field(gt=0, le=1e6), Option("SECONDS", "120; with the reasoner owlready2 1800")] = 120.0
     """Wall-clock limit for a mission, in s."""
     sweep: dict[str, Any] = Field(default_factory=dict)
-    """Lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the same), `zip`
-    (lists of which the first values go together, then the second) and `sample` (a sampled design), which are combined
-    with each other. Each parameter is a column of runs.csv."""
+    """Lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the same) and
+    `zip` (lists of which the first values go together, then the second), which are combined with each other. Each
+    parameter is a column of runs.csv."""
     perturbations: dict[str, Any] = Field(default_factory=dict)
     """Distributions by key path of the scenario: each run draws its own value, the same under all managers and at all
     points. Each is a column of runs.csv."""
@@ -83,7 +67,7 @@ class CampaignKeys(Strict):
 class CampaignSettings(CampaignKeys):
     """A campaign file."""
 
-    campaign: Annotated[Whole, AfterValidator(_version), Field(json_schema_extra={"const": 1})]
+    campaign: Literal[1]
     """Version of the format: 1. It marks a campaign file."""
     scenario: str
     """Scenario to start from: a file named relative to this one, or the name of a shipped one."""
@@ -107,7 +91,7 @@ class CampaignSpec(CampaignKeys):
     """Folder for result files."""
     workers: Annotated[Whole | None, Field(ge=1, le=WORKERS_LIMIT), Option(default="2, or 1 for few missions")] = None
     """Worker processes."""
-    scheduler: Annotated[Annotated[str, AfterValidator(_address)] | None, Option("tcp://HOST:PORT")] = None
+    scheduler: Annotated[str | None, Option("tcp://HOST:PORT")] = None
     """Run missions on the workers of this Dask scheduler."""
     overwrite: bool = False
     """Replace earlier results in the output folder."""
@@ -183,18 +167,8 @@ def check_range(what: str, number: int, least: int, greatest: int) -> None:
     Raises:
         InputError: it does not.
     """
-    if not least <= number <= greatest:
+    if not (isinstance(number, Integral) and least <= number <= greatest):
         raise InputError(f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}")
-
-
-def check_mission(run: int, seed: int) -> None:
-    """Check that a run's number, or that of the runs, and a seed fit into result files.
-
-    Raises:
-        InputError: they do not.
-    """
-    check_range("run", run, 1, RUNS_LIMIT)
-    check_range("seed", seed, 0, SEED_LIMIT)
 
 
 # Campaign files.

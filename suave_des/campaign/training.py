@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
-from suave_des.arguments import plain_arguments
 from suave_des.campaign.inputs import check_inputs
-from suave_des.campaign.spec import RUNS_LIMIT, check_mission, check_range
+from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, check_range
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
-from suave_des.learned import Learned, read_file
+from suave_des.learned import Learned
 from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.simulator import Simulator
@@ -20,7 +19,6 @@ TRAINING_SEED = 0
 """Not that of campaigns, so that a campaign has missions that training has not seen."""
 
 
-@plain_arguments(lambda: Replacements.__annotations__)
 def train(
     scenario: str | Path,
     manager: str,
@@ -28,7 +26,6 @@ def train(
     out: str | Path,
     *,
     seed: int = TRAINING_SEED,
-    start: str | Path | None = None,
     overwrite: bool = False,
     on_mission: Callable[[MissionMetrics], None] = lambda metrics: None,
     **replacements: Unpack[Replacements],
@@ -44,7 +41,6 @@ def train(
         missions: how many: runs 1 to that.
         out: file to write.
         seed: of everything that is random.
-        start: file of an earlier training to continue from; None: start from nothing.
         overwrite: whether the file may exist.
         on_mission: called with the metrics of each mission.
         replacements: as of load_scenario.
@@ -55,11 +51,10 @@ def train(
     """
     check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)
-    check_mission(1, seed)
+    check_range("seed", seed, 0, SEED_LIMIT)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs([loaded], [manager], {})
-    before = None if start is None else read_file(Path(start))
-    learned: dict[str, Any] = {} if before is None else dict(before.learned)
+    learned: dict[str, Any] = {}
     simulator = Simulator(loaded, training={manager: learned})
     for run in range(1, missions + 1):
         on_mission(simulator.run(manager, run, seed).metrics)
@@ -67,8 +62,7 @@ def train(
         remedy = "keep what it learns in the dict that the hook recall is given"
         raise InputError(f"manager {manager} has learned nothing", remedy=remedy)
     read = dict(sorted({**loaded.inputs, **inputs}.items()))
-    earlier = () if before is None else before.trainings
-    result = Learned(manager, loaded.scenario.name, seed, missions, read, learned, earlier)
+    result = Learned(manager, loaded.scenario.name, seed, missions, read, learned)
     write_files(Path(out).parent, {Path(out).name: result.text()})
     return result
 

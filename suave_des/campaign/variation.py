@@ -1,9 +1,8 @@
 """Differences between a campaign's missions apart from manager and run: a sweep, each run's draws, and an ensemble.
 
-The points of a sweep follow from the campaign's seed and their number, so that any worker finds the same. An ensemble
-has parameter sets that fit the real runs equally well: unknown parameters of the real vehicle and its software are not
-noise, but the same in all its missions. Each run has one of its members, the same under all managers, so that a
-difference between managers can be analysed member by member.
+An ensemble has parameter sets that fit the real runs equally well: unknown parameters of the real vehicle and its
+software are not noise, but the same in all its missions. Each run has one of its members, the same under all managers,
+so that a difference between managers can be analysed member by member.
 """
 
 from __future__ import annotations
@@ -13,16 +12,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import combinations, groupby, islice, product
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from suave_des.arguments import plain_arguments
-from suave_des.draws import Streams
 from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.estimates import known, mean_of, t_quantile
 from suave_des.files import as_number, read_csv
@@ -32,7 +28,7 @@ from suave_des.records.store import MissionKey
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, full_path, value_at, with_values
 from suave_des.scenario.models import MissionSettings
-from suave_des.scenario.quantities import Real, Strict, wrong
+from suave_des.scenario.quantities import Strict, wrong
 from suave_des.scenario.schema import problem_and_remedy
 
 ENSEMBLE_COLUMN = "ensemble_member"
@@ -45,61 +41,22 @@ ENSEMBLE_COLUMNS = (
 _NO_PARAMETERS = ("member", "loss")
 _ENSEMBLE_LIMIT_BYTES = 5_000_000
 _CHECKED_POINTS = 300
-"""Of sweeps with more points, so many are checked before anything runs."""
-
-
-def _each_once(values: Sequence[Any]) -> Sequence[Any]:
-    """Check that no value is there twice."""
-    seen = set()
-    for value in values:
-        if (text := json.dumps(value)) in seen:
-            raise wrong(f"{shown(value)} is given twice", "name each value once")
-        seen.add(text)
-    return values
-
-
-def _range(ends: tuple[float, float]) -> tuple[float, float]:
-    if not ends[0] < ends[1]:
-        raise wrong(f"{shown(list(ends))} is no range", "give [smallest, greatest]")
-    return ends
+"""Of sweeps with more values, so many are checked before anything runs."""
 
 
 Values = Annotated[tuple[Any, ...], Field(min_length=1)]
 
 
-class Sample(Strict):
-    """A sampled design: points that fill a box evenly."""
-
-    method: Literal["latin_hypercube", "sobol"]
-    """How."""
-    points: Annotated[int, Field(strict=True, ge=1, le=2**24)]
-    """How many; for sobol a power of 2, as its balance needs."""
-    ranges: Annotated[dict[str, Annotated[tuple[Real, Real], AfterValidator(_range)]], Field(min_length=1)]
-    """Smallest and greatest value by key path."""
-
-    @model_validator(mode="after")
-    def _is_balanced(self) -> Self:
-        if self.method == "sobol" and self.points & (self.points - 1):
-            lower = 1 << self.points.bit_length() - 1
-            problem = f"{self.points} is not a power of 2, as sobol needs"
-            raise wrong(problem, f"give {lower} or {2 * lower}", "points")
-        return self
-
-
 class Sweep(Strict):
-    """Every combination of a grid's values, the rows of a zip, and the points of a sampled design.
+    """Every combination of a grid's values and the rows of a zip.
 
     Points are counted from 0; what is named last changes fastest.
     """
 
-    grid: dict[str, Annotated[Values, AfterValidator(_each_once)]] = Field(default_factory=dict)
+    grid: dict[str, Values] = Field(default_factory=dict)
     """Values by key path; all combinations are used."""
     zip: dict[str, Values] = Field(default_factory=dict)
     """Values by key path, of equal number: the first values together, then the second, and so on."""
-    sample: Sample | None = None
-    """A sampled design, or none."""
-    seed: int = 0
-    """The campaign's, for the sampled design."""
 
     @model_validator(mode="after")
     def _rows_are_whole(self) -> Self:
@@ -111,7 +68,7 @@ class Sweep(Strict):
     @property
     def parameters(self) -> tuple[str, ...]:
         """Key paths of the parameters that are swept, as given."""
-        return (*self.grid, *self.zip, *(self.sample.ranges if self.sample else ()))
+        return (*self.grid, *self.zip)
 
     @property
     def points(self) -> int:
@@ -122,12 +79,9 @@ class Sweep(Strict):
         """Return the value of each parameter at a point."""
         import numpy as np
 
-        *grid, row, sampled = map(int, np.unravel_index(point, self._sizes()))
+        *grid, row = map(int, np.unravel_index(point, self._sizes()))
         values = {path: own[place] for (path, own), place in zip(self.grid.items(), grid, strict=True)}
-        values |= {path: column[row] for path, column in self.zip.items()}
-        if self.sample is not None:
-            values |= dict(zip(self.sample.ranges, self._sampled[sampled], strict=True))
-        return values
+        return values | {path: column[row] for path, column in self.zip.items()}
 
     def each_value(self) -> Iterator[int]:
         """Yield points that together have each value of the grid and each row of the zip."""
@@ -138,24 +92,10 @@ class Sweep(Strict):
 
     def plain(self) -> dict[str, Any]:
         """Return it as plain data, without parts that are not used."""
-        return {form: content for form, content in self.model_dump(mode="json", exclude={"seed"}).items() if content}
+        return {form: content for form, content in self.model_dump(mode="json").items() if content}
 
     def _sizes(self) -> tuple[int, ...]:
-        rows = len(next(iter(self.zip.values()), (None,)))
-        return (*map(len, self.grid.values()), rows, self.sample.points if self.sample else 1)
-
-    @cached_property
-    def _sampled(self) -> list[list[float]]:
-        import numpy as np
-        from scipy.stats import qmc  # takes half a second to import
-
-        assert self.sample is not None
-        engines = {"latin_hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}
-        bits = np.random.PCG64(Streams(self.seed, 0).stream("sweep").getrandbits(64))
-        engine = engines[self.sample.method](d=len(self.sample.ranges), rng=np.random.Generator(bits))
-        low, high = np.array(list(self.sample.ranges.values())).T
-        rows: list[list[float]] = (low + engine.random(self.sample.points) * (high - low)).tolist()
-        return rows
+        return (*map(len, self.grid.values()), len(next(iter(self.zip.values()), (None,))))
 
 
 def plain(given: Any) -> Any:
@@ -255,7 +195,7 @@ class Variation:
 
 
 def vary(
-    loaded: LoadedScenario, sweep: Mapping[str, Any], perturbations: Mapping[str, Any], runs_per_draw: int, seed: int
+    loaded: LoadedScenario, sweep: Mapping[str, Any], perturbations: Mapping[str, Any], runs_per_draw: int
 ) -> tuple[LoadedScenario, Variation]:
     """Put the distributions of perturbations into a scenario; return it with the variation.
 
@@ -281,13 +221,11 @@ def vary(
                 remedy = "such as {distribution: normal, mean: 1, std: 2}"
                 raise InputError(f"expected a distribution, got {shown(distribution)}", remedy=remedy)
             loaded = with_values(loaded, {path: dict(distribution)})
-    found, places = _sweep(sweep, seed)
+    found, places = _sweep(sweep)
     paths = {name: path_of(places[name], name) for name in found.parameters}
     variation = Variation(found, drawn, paths, runs_per_draw)
-    points = {*range(0, found.points, max(1, found.points // _CHECKED_POINTS))}
-    points.update(islice(found.each_value(), _CHECKED_POINTS))
     with _at(next(iter(places.values())) if len(places) == 1 else "sweep"):
-        for point in sorted(points):
+        for point in islice(found.each_value(), _CHECKED_POINTS):
             variation.scenario(loaded, point)
     return loaded, variation
 
@@ -301,19 +239,17 @@ def _at(place: str) -> Iterator[None]:
         raise InputError(error.problem, place=place, remedy=error.remedy) from None
 
 
-def _sweep(given: Mapping[str, Any], seed: int) -> tuple[Sweep, dict[str, str]]:
+def _sweep(given: Mapping[str, Any]) -> tuple[Sweep, dict[str, str]]:
     """Read a sweep; return it with the place of each parameter in what was given."""
-    forms = [form for form in ("grid", "zip", "sample") if form in given]
-    data = {**(given if forms else {"grid": given}), "seed": seed}
+    forms = [form for form in ("grid", "zip") if form in given]
+    data = dict(given) if forms else {"grid": given}
     try:
         sweep = Sweep.model_validate(data)
     except ValidationError as error:
-        (*keys, last), problem, remedy = problem_and_remedy(error, data, Sweep)
-        if forms and not keys and last not in ("grid", "zip", "sample"):
-            problem, remedy = f"cannot stand beside {forms[0]}", "put it under grid, zip or sample"
-        keys = [key for key in ("sweep", *keys, last) if forms or key != "grid"]
-        raise InputError(problem, place=".".join(map(str, keys)), remedy=remedy) from None
-    parts = {"grid.": sweep.grid, "zip.": sweep.zip, "sample.ranges.": sweep.sample.ranges if sweep.sample else {}}
+        keys, problem, remedy = problem_and_remedy(error, data, Sweep)
+        places = [key for key in ("sweep", *keys) if forms or key != "grid"]
+        raise InputError(problem, place=".".join(map(str, places)), remedy=remedy) from None
+    parts = {"grid.": sweep.grid, "zip.": sweep.zip}
     return sweep, {name: f"sweep.{part if forms else ''}{name}" for part, names in parts.items() for name in names}
 
 
@@ -341,7 +277,6 @@ def short_mission(loaded: LoadedScenario) -> MissionResult:
 # Ensembles.
 
 
-@plain_arguments()
 def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
     """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
 
@@ -358,19 +293,14 @@ def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
     path = find(name, "scenarios/ensembles")
     header, rows, digest = read_csv(path, _ENSEMBLE_LIMIT_BYTES, "a row for each member")
     paths = tuple(name for name in header if name not in _NO_PARAMETERS)
-    if not paths or not all(header):
-        raise line_error(path, 1, "has no columns of parameters", "name each by its key path in the scenario")
-    if repeated := next((each for each in header if header.count(each) > 1), None):
-        raise line_error(path, 1, f"has column {shown(repeated)} twice", "name each parameter once")
+    if not paths or not all(header) or len(set(header)) < len(header):
+        raise line_error(path, 1, "has no column for each parameter", "name each once, by its key path in the scenario")
     members = []
     for line, row in rows:
-        if len(row) != len(header):
-            problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
+        member = {name: as_number(cell) for name, cell in zip(header, row, strict=False) if name not in _NO_PARAMETERS}
+        if len(row) != len(header) or not all(map(math.isfinite, member.values())):
+            problem = f"expected {len(header)} numbers, got {', '.join(row)}"
             raise line_error(path, line, problem, "give each column one")
-        member = {name: as_number(cell) for name, cell in zip(header, row, strict=True) if name not in _NO_PARAMETERS}
-        if not all(map(math.isfinite, member.values())):
-            problem = f"expected numbers, got {', '.join(map(shown, row))}"
-            raise line_error(path, line, problem, "give each parameter a value")
         members.append(tuple(member.values()))
     if len(members) < 2:
         raise line_error(path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more")
@@ -438,18 +368,8 @@ def differences(
             members, half = len(means), math.nan
             if members > 1:
                 half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)
-            yield {
-                "first": managers[first],
-                "second": managers[second],
-                "metric": metric,
-                "n": len(by_run),
-                "difference": mean,
-                "ci95_low": known(interval.low),
-                "ci95_high": known(interval.high),
-                "members": members,
-                "members_above_0": sum(each > 0.0 for each in means),
-                "members_below_0": sum(each < 0.0 for each in means),
-                "range95_low": known(mean - half),
-                "range95_high": known(mean + half),
-                "point": point,
-            }
+            ends = (known(each) for each in (interval.low, interval.high))
+            signs = (sum(each > 0.0 for each in means), sum(each < 0.0 for each in means))
+            ranges = (known(mean - half), known(mean + half))
+            cells = (managers[first], managers[second], metric, len(by_run), mean, *ends, members, *signs, *ranges)
+            yield {**dict(zip(ENSEMBLE_COLUMNS, cells, strict=True)), "point": point}

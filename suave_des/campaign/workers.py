@@ -14,14 +14,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import islice, repeat
+from math import inf
 from multiprocessing import Pipe, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
+from types import ModuleType
 from typing import Any, Self
 
 from suave_des.campaign.missions import Campaign, Chunk, Finished, WorkerError
 from suave_des.errors import SuaveDesError
-from suave_des.imports import main_hidden
 from suave_des.interrupts import INTERRUPTS, signals_deferred
 from suave_des.records.store import MissionKey
 from suave_des.registry import is_built_in
@@ -37,7 +38,7 @@ _IN_A_ROW = 8
 _MARGIN_S = 60.0
 """Added to the time that a chunk's missions may take, such as for starting Java, before its worker is killed."""
 _START_S = 300.0
-"""The same while it is starting: Python, perhaps from a slow shared disk, and the compiler."""
+"""Time to start: Python, perhaps from a slow shared disk, and the compiler."""
 _STOP_TIMEOUT_S = 5.0
 _SAFE_PATH, _MAIN = "PYTHONSAFEPATH", "__main__:"
 _Task = tuple[Chunk, int]
@@ -71,6 +72,7 @@ class LocalWorkers:
     def __init__(self, managers: Sequence[str], workers: int) -> None:
         self._may_be_killed = all(map(is_built_in, managers))
         self._size, self._workers, self._is_done, self._in_a_row = workers, list[_Worker](), False, 0
+        self._again = deque[_Task]()
 
     def __enter__(self) -> Self:
         """Start the workers."""
@@ -84,41 +86,47 @@ class LocalWorkers:
     def __exit__(self, *_: object) -> None:
         """Stop the workers: at once, unless a user's manager may have files to close."""
         for worker in self._workers:
-            worker.stop(at_once=self._may_be_killed or not self._is_done)
+            if self._may_be_killed or not self._is_done:
+                worker.process.kill()
+            worker.connection.close()
         for worker in self._workers:
             worker.join()
 
     def outcomes(self, campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
         """Yield outcomes chunk by chunk; see Executor."""
         size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
-        remaining = iter(missions)
-        self._campaign, self._packed = campaign, packed(campaign)
-        self._tasks = zip(iter(lambda: tuple(islice(remaining, size)), ()), repeat(0))
-        self._again: deque[_Task] = deque()
+        remaining, content = iter(missions), packed(campaign)
+        tasks = zip(iter(lambda: tuple(islice(remaining, size)), ()), repeat(0))
         for worker in self._workers:
-            worker.send(self._packed)
-        self._hand_out()
-        while busy := [worker for worker in self._workers if worker.tasks]:
-            due_s = min(worker.due_s(campaign.spec.time_out_s) for worker in busy)
-            ready = wait([worker.connection for worker in busy], max(0.0, due_s - time.monotonic()))
-            for worker in (worker for worker in busy if worker.connection in ready):
+            worker.send(content)
+        while busy := [worker for worker in self._workers if worker.due_s < inf]:
+            wait_s = min(worker.due_s for worker in busy) - time.monotonic()
+            ready = wait([worker.connection for worker in busy], max(0.0, wait_s))
+            for worker in busy:
+                if worker.connection not in ready:
+                    if time.monotonic() >= worker.due_s:
+                        worker.is_overdue = True
+                        worker.process.kill()  # its pipe then ends
+                    continue
                 try:
                     found = worker.connection.recv()
                 except (EOFError, OSError):  # also in the middle of a message
-                    yield from self._replace(worker)
+                    yield from self._ended(worker, campaign)
+                    self._start().send(content)
                     continue
                 if isinstance(found, BaseException):
                     raise found
-                worker.since_s, worker.is_starting = time.monotonic(), False
                 if found is not None:
                     worker.tasks.popleft()
                     self._in_a_row = 0
-                    self._hand_out()
+                room = range(_AHEAD - len(worker.tasks))
+                for task in filter(None, (self._again.popleft() if self._again else next(tasks, None) for _ in room)):
+                    worker.tasks.append(task)
+                    worker.send(task[0])
+                limit_s = campaign.spec.time_out_s * len(worker.tasks[0][0]) + _MARGIN_S if worker.tasks else inf
+                worker.due_s = time.monotonic() + limit_s
+                if found is not None:
                     yield found
-            for worker in busy:
-                if worker.tasks and time.monotonic() >= worker.due_s(campaign.spec.time_out_s):
-                    worker.is_overdue = True
-                    worker.process.kill()  # its pipe then ends
         self._is_done = True
 
     def _start(self) -> _Worker:
@@ -129,46 +137,32 @@ class LocalWorkers:
                 process = SpawnProcess(target=work, args=(there,))
                 process.start()
                 there.close()
-                self._workers.append(worker := _Worker(process, here))
+                self._workers.append(worker := _Worker(process, here, time.monotonic() + _START_S))
             return worker
         except OSError as error:  # the system's limit of processes, files or memory
             problem = f"a worker process cannot be started: {error.strerror}"
             raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
 
-    def _hand_out(self) -> None:
-        """Give every worker its share while there are missions to run."""
-        for share in range(1, _AHEAD + 1):
-            for worker in self._workers:
-                if len(worker.tasks) < share:
-                    task = self._again.popleft() if self._again else next(self._tasks, None)
-                    if task is None:
-                        return
-                    if not worker.tasks:
-                        worker.since_s = time.monotonic()
-                    worker.tasks.append(task)
-                    worker.send(task[0])
-
-    def _replace(self, worker: _Worker) -> Iterator[list[Finished]]:
-        """Replace a worker that died; the first of its chunks was running."""
-        worker.stop(at_once=True)
+    def _ended(self, worker: _Worker, campaign: Campaign) -> Iterator[list[Finished]]:
+        """Have what a worker was running when it ended run again, one by one; or yield that it has failed."""
+        worker.process.kill()
+        worker.connection.close()
         status = worker.join()
         self._workers.remove(worker)
         self._in_a_row += 1
         if self._in_a_row >= _IN_A_ROW:
             what = f"{_IN_A_ROW} worker processes in a row ended before a mission was done"
             raise WorkerError(f"{what}, the last with status {status} (killed, or out of memory?)")
-        (suspects, died), *others = worker.tasks
+        (suspects, died), *others = worker.tasks or [((), 0)]
         attempts = died + 1
+        self._again.extend(others)
         if len(suspects) == 1 and worker.is_overdue:
-            yield [self._campaign.timed_out(suspects[0])]
+            yield [campaign.timed_out(suspects[0])]
         elif len(suspects) == 1 and attempts >= _ATTEMPTS:
             cause = f"its worker process ended with status {status}, {attempts} times (killed, or out of memory?)"
-            yield [self._campaign.failed(suspects[0], cause)]
+            yield [campaign.failed(suspects[0], cause)]
         else:
             self._again.extend(((key,), attempts) for key in suspects)
-        self._again.extend(others)
-        self._start().send(self._packed)
-        self._hand_out()
 
 
 @dataclass
@@ -179,32 +173,20 @@ class _Worker:
         process: the process.
         connection: this end of its pipe; it ends when the process does.
         tasks: what it was given, oldest first.
-        since_s: when the oldest began.
-        is_starting: whether it is not ready for them yet.
+        due_s: when it has to be done with the oldest; infinite if it has nothing to do.
         is_overdue: whether it was killed because it took too long.
     """
 
     process: SpawnProcess
     connection: Connection[Any, Any]
+    due_s: float
     tasks: deque[_Task] = field(default_factory=deque)
-    since_s: float = 0.0
-    is_starting: bool = True
     is_overdue: bool = False
 
     def send(self, message: object) -> None:
         """Send a message; a process that has ended is noticed when its pipe is read."""
         with suppress(OSError):
             self.connection.send(message)
-
-    def due_s(self, time_out_s: float) -> float:
-        """Return the time by which its oldest chunk must be done."""
-        return self.since_s + time_out_s * len(self.tasks[0][0]) + _MARGIN_S + self.is_starting * _START_S
-
-    def stop(self, *, at_once: bool) -> None:
-        """Stop the process: at once, or when it has finished its chunks."""
-        if at_once:
-            self.process.kill()
-        self.connection.close()
 
     def join(self) -> int | None:
         """Wait for the process to end, and return its exit status; it is killed if that takes long."""
@@ -221,19 +203,19 @@ def _quietly() -> Iterator[None]:
     It inherits that the signals are blocked. A file such as signal.py in the current folder would be taken for Python's
     own module of that name while Python starts.
     """
-    was_safe = os.environ.get(_SAFE_PATH)
+    was_safe, main = os.environ.get(_SAFE_PATH), sys.modules["__main__"]
     os.environ[_SAFE_PATH] = "1"
-    try:
-        resource_tracker.ensure_running()  # or the first start does it, which lets the signals through again
-        with main_hidden(), signals_deferred():
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
-            try:
-                yield
-            finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    finally:
-        if was_safe is None:
-            del os.environ[_SAFE_PATH]
+    resource_tracker.ensure_running()  # or the first start does it, which lets the signals through again
+    with signals_deferred():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = main
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            if was_safe is None:
+                del os.environ[_SAFE_PATH]
 
 
 def packed(campaign: Campaign) -> bytes:

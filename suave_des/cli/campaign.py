@@ -1,10 +1,10 @@
-"""suave-des campaign and reproduce: many missions, their result files, and their summary on the terminal."""
+"""suave-des run, campaign, reproduce, train and serve: missions, their result files, and summaries."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
-from itertools import groupby
+from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
 from textwrap import fill
@@ -12,26 +12,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.console import TEXT_WIDTH, errors, number, output, print_table, progress
+from suave_des.cli.console import TEXT_WIDTH, errors, number, output, print_table, print_timeline, progress
 from suave_des.cli.options import (
     Fields,
     Files,
     Given,
     ManagerOptions,
+    Overwrite,
     Quiet,
+    Scenario,
+    Seed,
     Trusted,
     check_no_use,
     command_line,
-    complete_scenarios,
     flags,
 )
 from suave_des.errors import InputError, number_of
-from suave_des.files import write_files
+from suave_des.files import FAMILIES, write_files
 from suave_des.resources import DEFAULT_SCENARIO
-from suave_des.tables import Table, broken_name
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
+    from suave_des.metrics.result import MissionMetrics
     from suave_des.records.store import MissionFailure
 
 _RUNS = 200
@@ -39,9 +42,7 @@ _RUNS = 200
 _FAILURES_SHOWN = 20
 _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
-_NARROW = 8
-"""A heading is broken into lines of about this width where the summary is too wide otherwise."""
-_MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
+_MAY_CHANGE = ("runs", "workers", "scheduler")
 """Options of a campaign that is resumed, too."""
 
 
@@ -58,15 +59,12 @@ def campaign(
             metavar="SCENARIO",
             help="A scenario or campaign file, or a shipped scenario.",
             show_default=False,
-            autocompletion=complete_scenarios,
         ),
     ] = None,
     *,
     options: Annotated[
         Given,
-        Fields(
-            ("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite"),
-        ),
+        Fields(("out", "managers", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite")),
     ],
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
@@ -110,7 +108,7 @@ def campaign(
             replaced = files.with_options(manager_option, managers)
             result = run_campaign(scenario, on_progress=show, command=command_line(), **settings, **replaced)
     console = output()
-    print_table(console, _summary(result, console.width))
+    print_table(console, _summary(result))
     if (sharing := result.variation.runs_sharing_draw) > 1:
         console.print(f"{sharing} runs share each draw: intervals treat draws as independent, not runs")
     if len(result.summary) > _ROWS_SHOWN:
@@ -124,36 +122,27 @@ def campaign(
     exit_telling_failures(result)
 
 
-def _summary(result: CampaignResult, width: int, *, is_narrow: bool = False) -> Table:
-    """The rows of summary.csv; where they do not fit, headings are broken into lines, and spreads left out."""
+def _summary(result: CampaignResult) -> Table:
+    """The rows of summary.csv."""
     from suave_des.estimates import percent
     from suave_des.records.metrics import METRICS, PAPER_METRICS
 
-    def figures(cells: Mapping[str, Any], metric: str) -> list[str]:
+    def figures(cells: Mapping[str, Any], metric: str) -> tuple[str, str]:
         mean, low, high, std = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std"))
         half = "" if low is None or high is None else f" ± {(high - low) / 2.0:.2f}"
-        return [f"{number(mean)}{half}", *([] if is_narrow else [number(std)])]
+        return f"{number(mean)}{half}", number(std)
 
-    parameters, style = result.variation.sweep.parameters, ".4g" if is_narrow else ".6g"
-    headings = [*parameters, "manager", "missions", "found"]
-    for metric in PAPER_METRICS:
-        headings += [METRICS[metric].brief] if is_narrow else [METRICS[metric].brief, "std"]
-    records = result.summary
+    parameters = result.variation.sweep.parameters
     rows = []
-    for cells in records if len(records) <= _ROWS_SHOWN else records[: _ROWS_SHOWN - 1]:
-        swept = (
-            f"{cells[name]:{style}}" if isinstance(cells[name], float) else str(cells[name]) for name in parameters
-        )
+    for cells in result.summary[: _ROWS_SHOWN if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1]:
+        swept = (f"{cells[name]:.6g}" if isinstance(cells[name], float) else str(cells[name]) for name in parameters)
         found = "" if cells["found_share"] is None else percent(cells["found_share"])
         measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
         rows.append([*swept, cells["manager"], str(cells["n"]), found, *measured])
     title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
-    align = f"{'r' * len(parameters)}l"
-    if is_narrow:
-        return Table([broken_name(heading, _NARROW, "") for heading in headings], rows, title, align)
-    table = Table(headings, rows, f"{title}, standard deviations", align)
-    is_too_wide = max(map(len, table.text(width).splitlines())) > width
-    return _summary(result, width, is_narrow=True) if is_too_wide else table
+    means = [heading for metric in PAPER_METRICS for heading in (METRICS[metric].brief, "std")]
+    headings = [*parameters, "manager", "missions", "found", *means]
+    return Table(headings, rows, f"{title}, standard deviations", f"{'r' * len(parameters)}l")
 
 
 def _differences(found: list[dict[str, Any]], parameters: Sequence[str]) -> Table:
@@ -185,12 +174,10 @@ def exit_telling_failures(result: CampaignResult) -> None:
     alike: dict[tuple[str, str], list[MissionFailure]] = {}
     for failure in result.failures:
         alike.setdefault((failure.manager, failure.cause), []).append(failure)
-    for first, *others in list(alike.values())[:_FAILURES_SHOWN]:
+    for first, *others in islice(alike.values(), _FAILURES_SHOWN):
         count = f" ({len(others) + 1} missions like this)" if others else ""
         console.print(f"suave-des: failed: {' '.join(str(first).split())}{count}")
-    if len(alike) > _FAILURES_SHOWN:
-        console.print("suave-des: failed: ... and others, see manifest.json")
-    console.print(f"suave-des: {len(result.failures)} of {result.planned} missions failed; the others are kept")
+    console.print(f"suave-des: {len(result.failures)} of {result.planned} missions failed, see manifest.json")
     raise typer.Exit(3)
 
 
@@ -235,3 +222,93 @@ def reproduce(
         write_files(result.folder, {FILE: comparison.markdown()})
         console.print(f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{FILE}")
     exit_telling_failures(result)
+
+
+def run(
+    scenario: Scenario,
+    *,
+    options: Annotated[
+        Given,
+        Fields(
+            ("seed", "out", "overwrite"),
+            {"out": "Folder for mission.json, events.csv, trajectory.csv, knowledge.jsonl."},
+        ),
+    ],
+    manager: Annotated[str, typer.Option(metavar="NAME", help="A manager's name, or module:Class.")] = "metacontrol",
+    run_number: Annotated[
+        int,
+        typer.Option("--run", metavar="K", help="Run number."),
+    ] = 1,
+    manager_option: ManagerOptions = None,
+    files: Files,
+) -> None:
+    """Run one mission and print its timeline."""
+    from suave_des.api import run_mission
+
+    replaced = files.with_options(manager_option, [manager])
+    result = run_mission(scenario, manager, run_number, command=command_line(), **options, **replaced)
+    for remark in result.remarks:
+        errors().print(f"suave-des: manager {manager}: {remark}")
+    console = output()
+    print_timeline(console, result)
+    if (out := options.get("out")) is not None:
+        *others, last = (name for name in FAMILIES["mission"] if (out / name).exists())
+        console.print(f"\n{', '.join(others)} and {last} are in {out}")
+
+
+def train(
+    manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
+    missions: Annotated[int, typer.Option(help="Number of training missions.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
+    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = DEFAULT_SCENARIO,
+    seed: Annotated[int, typer.Option(help="Training seed.")] = 0,
+    overwrite: Overwrite = False,
+    manager_option: ManagerOptions = None,
+    *,
+    files: Files,
+) -> None:
+    """Train a manager on missions that run in order, in one process.
+
+    A campaign uses the resulting file with --manager-option learned=FILE, and does not change it.
+    """
+    from suave_des.campaign.training import blocks
+    from suave_des.campaign.training import train as trained
+
+    times_s: list[float] = []
+    distances_m: list[float] = []
+
+    def note(metrics: MissionMetrics) -> None:
+        times_s.append(metrics.search_time_s)
+        distances_m.append(metrics.distance_inspected_m)
+
+    options = files.with_options(manager_option, [manager])
+    trained(scenario, manager, missions, out, seed=seed, overwrite=overwrite, on_mission=note, **options)
+    means = zip(blocks(times_s), blocks(distances_m), strict=True)
+    rows = [(f"{first} to {last}", f"{time_s:.2f}", f"{m:.2f}") for (first, last, time_s), (_, _, m) in means]
+    headings = ("missions", "search time, s", "distance, m")
+    console = output()
+    print_table(console, Table(headings, rows, f"{manager} on {scenario}, means"))
+    console.print(f"the training result is in {out}")
+
+
+def serve(
+    scenario: Scenario,
+    host: Annotated[str, typer.Option(help="Address.")] = ("127.0.0.1"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")] = 3000,
+    run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run of the first mission.")] = 1,
+    seed: Seed = 1,
+    real_time_factor: Annotated[
+        float, typer.Option(metavar="X", help="Mission seconds per second; 0: advance only on request.")
+    ] = 0.0,
+    *,
+    files: Files,
+) -> None:
+    """Serve a mission over HTTP, as UPISAS expects it of an exemplar."""
+    from suave_des.interfaces.serve import Server, Session
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.simulation.simulator import Simulator
+
+    session = Session(Simulator(load_scenario(scenario, **files.replacements)), run_number, seed, real_time_factor)
+    with Server(session, host, port) as server:
+        print(f"http://{host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
+        server.serve_forever(poll_interval=0.1)

@@ -1,16 +1,14 @@
 """Output of commands: styled on a terminal; elsewhere plain, and wide enough for the tables.
 
-Only characters that the terminal has reach it, and no control characters from files of others."""
+No control characters from files of others reach a terminal.
+"""
 
 from __future__ import annotations
 
-import codecs
 import logging
 import os
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -27,21 +25,6 @@ if TYPE_CHECKING:
 
 TEXT_WIDTH = 95
 """Columns of text at most, which is hard to read in longer lines."""
-_IN_ASCII = {"±": "+-", "–": "-", "—": "-", "…": "...", "×": "x", "≥": ">=", "≤": "<=", "−": "-", "→": "->", "█": "#"}
-_ERRORS = "suave-des-in-ascii"
-
-
-def _replaced(error: UnicodeError) -> tuple[str, int]:
-    assert isinstance(error, UnicodeEncodeError)  # it is registered for output alone
-    return "".join(_IN_ASCII.get(char, "?") for char in error.object[error.start : error.end]), error.end
-
-
-def write_what_the_terminal_has() -> None:
-    """Have characters that the terminal's encoding lacks written in others, instead of failing."""
-    codecs.register_error(_ERRORS, _replaced)
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
-            stream.reconfigure(errors=_ERRORS)
 
 
 def plain(text: str) -> str:
@@ -77,17 +60,7 @@ class PlainConsole(Console):
 
 
 _PLAIN_WIDTH = 120
-_TIME_WIDTH = 10
-"""Of a timeline."""
-_STYLES = {
-    **dict.fromkeys(("task_requested", "task_done", "mission_ended"), "bold"),
-    **dict.fromkeys(("component_status", "no_design_left", "refused"), "red"),
-    "pipeline_detected": "bold green",
-    "inferred": "magenta",
-    "adaptation": "yellow",
-    "mode_requested": "dim",
-}
-"""Of a timeline's events; one that is not here, such as an outside manager's, has none."""
+_NOT_FOUND = "not found: the time limit counts"
 _UNITS = {"_m2": " m2", "_s": " s"}
 """Of further metrics, by the end of a column."""
 
@@ -113,7 +86,7 @@ def progress(label: str, *, quiet: bool) -> Iterator[OnProgress | None]:
     logger = logging.getLogger(MISTAKES_LOGGER)
     logger.disabled = quiet
     try:
-        with shown(label, errors(), quiet=quiet) as show:
+        with shown(label, quiet=quiet) as show:
             yield show
     finally:
         logger.disabled = False
@@ -127,12 +100,9 @@ def counted(what: str, console: Console) -> Iterator[Callable[[int, int], None]]
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def print_table(console: Console, table: Table, marks: Mapping[str, str] = MappingProxyType({})) -> None:
-    """Print a table under its title, long names in it broken so that they fit; `marks` has styles of words in it."""
-    text = Text(table.text(console.width))
-    for word, style in marks.items():
-        text.highlight_words([word], style)
-    console.print(Text(table.title, "bold"), text, sep="\n")
+def print_table(console: Console, table: Table) -> None:
+    """Print a table under its title, long names in it broken so that they fit."""
+    console.print(Text(table.title, "bold"), table.text(console.width), sep="\n")
 
 
 def number(value: object) -> str:
@@ -152,9 +122,7 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     for event in result.events:
         source, name = event.source.replace("_", " "), event.event.replace("_", " ")
         detail = " ".join(event.detail.splitlines())  # one of a manager's own may have several
-        line = Text(f"{event.t_s:8.2f}  {source:<{sources}}  {name:<{names}}  {detail}")
-        line.stylize(_STYLES.get(event.event, ""), _TIME_WIDTH)
-        console.print(line)
+        console.print(f"{event.t_s:8.2f}  {source:<{sources}}  {name:<{names}}  {detail}")
     console.print()
     rows = list(_metrics_rows(metrics, result.further))
     names, values = (max(len(row[column]) for row in rows) for column in (0, 1))
@@ -165,16 +133,10 @@ def print_timeline(console: Console, result: MissionResult) -> None:
 def _metrics_rows(metrics: MissionMetrics, further: Mapping[str, float | int | None]) -> Iterator[tuple[str, str, str]]:
     """Name, value with its unit, and a remark on it."""
     reaction_s = metrics.mean_reaction_time_s
-    yield (
-        "search time",
-        f"{metrics.search_time_s:.1f} s",
-        "" if metrics.pipeline_found else "not found: the time limit counts",
-    )
+    no_reaction = ("none", "no reaction was completed")
+    yield "search time", f"{metrics.search_time_s:.1f} s", "" if metrics.pipeline_found else _NOT_FOUND
     yield "distance inspected", f"{metrics.distance_inspected_m:.2f} m", ""
-    if reaction_s is None:
-        yield "mean reaction time", "none", "no reaction was completed"
-    else:
-        yield "mean reaction time", f"{reaction_s:.2f} s", ""
+    yield "mean reaction time", *(no_reaction if reaction_s is None else (f"{reaction_s:.2f} s", ""))
     yield "adaptations", str(metrics.adaptations), ""
     yield "mission duration", f"{metrics.mission_duration_s:.1f} s", ""
     for column, value in further.items():

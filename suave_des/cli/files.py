@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -22,52 +20,29 @@ def scenarios() -> None:
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
-    rows = []
     files = sorted(folder.glob("*.yaml"))
-    modes = [path for path in files if path.stem.endswith("_modes")]
-    campaigns = [path for path in files if path.stem.endswith("_campaign")]
+    kinds = {kind: [path for path in files if path.stem.endswith(f"_{kind}")] for kind in ("campaign", "modes")}
+    rows = []
     for path in files:
-        if path not in (*modes, *campaigns):
+        if not any(path in others for others in kinds.values()):
             scenario = load_scenario(path).scenario
             rows.append((path.stem, scenario.revision.name, scenario.description))
     console = output()
     print_table(console, Table(("name", "revision", "what it is"), rows, "Scenarios", align="lll"))
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
-    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}")
-    console.print(f"Modes files: {', '.join(path.name for path in modes)}")
+    console.print(f"\nCampaign files: {', '.join(path.name for path in kinds['campaign'])}")
+    console.print(f"Modes files: {', '.join(path.name for path in kinds['modes'])}")
     console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}")
     console.print(f"They are in {folder.parent}: copy what you want to change.")
 
 
-class SchemaOf(StrEnum):
-    """What a JSON Schema is printed of."""
-
-    SCENARIO = "scenario"
-    EXEC = "exec"
-
-
-def schema(
-    what: Annotated[
-        SchemaOf,
-        typer.Argument(metavar="WHAT", help="scenario, or exec for messages of exec:COMMAND."),
-    ] = SchemaOf.SCENARIO,
-) -> None:
-    """Print the JSON Schema of scenario files, or of messages.
-
-    Editors and other tools use it to complete and check scenarios and the messages that your own programs exchange
-    with missions.
-    """
+def schema() -> None:
+    """Print the JSON Schema of scenario files, with which editors complete and check them."""
     import json
 
-    if what is SchemaOf.EXEC:
-        from suave_des.interfaces.exec import messages_schema
+    from suave_des.scenario.schema import scenario_schema
 
-        found = messages_schema()
-    else:
-        from suave_des.scenario.schema import scenario_schema
-
-        found = scenario_schema()
-    print(json.dumps(found, indent=2))
+    print(json.dumps(scenario_schema(), indent=2))
 
 
 def import_config(
@@ -87,10 +62,7 @@ def import_config(
     ] = None,
     runner_seed: Annotated[
         int | None,
-        typer.Option(
-            metavar="SEED",
-            help="Write the values that the exemplar's runner draws from this seed.",
-        ),
+        typer.Option(metavar="SEED", help="Write the values that the exemplar's runner draws from this seed."),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -102,28 +74,14 @@ def import_config(
     from suave_des.scenario.exemplar.importing import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
-    if campaign is not None and campaign.resolve() == out.resolve():
-        raise InputError(
-            "scenario and campaign cannot be one file", file=out, remedy="give --campaign a different name"
-        )
     for target in targets:
-        if target.resolve() in [file.resolve() for file in files]:
-            raise InputError("is one of the files to import", file=target, remedy="give the output a different name")
+        if target.resolve() in [file.resolve() for file in (*files, *targets) if file is not target]:
+            raise InputError("is one of the other files, too", file=target, remedy="give the output a different name")
         check_output_file(target, overwrite=overwrite)
-    imported = imported_from(
-        files,
-        out,
-        managers=manager_names(),
-        base=base,
-        revision=revision,
-        campaign=campaign,
-        runner_seed=runner_seed,
-    )
-    written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
+    given = {"base": base, "revision": revision, "campaign": campaign, "runner_seed": runner_seed}
+    imported = imported_from(files, out, managers=manager_names(), **given)  # type: ignore[arg-type]
     for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
-        written.setdefault(target.parent, {})[target.name] = text
-    for folder, contents in written.items():
-        write_files(folder, contents)
+        write_files(target.parent, {target.name: text})
     for note in imported.notes:
         print(plain(note))
     print(f"{out} is written, based on {imported.base}: {imported.why}")

@@ -16,8 +16,8 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from suave_des import __version__
-from suave_des.cli import campaign, files, missions, results, validate
-from suave_des.cli.console import plain, write_what_the_terminal_has
+from suave_des.cli import campaign, files, results, validate
+from suave_des.cli.console import plain
 from suave_des.cli.kb import commands as kb
 from suave_des.cli.options import CONTEXT, CommandsUnderHeadings, Headings, remember_command_line
 from suave_des.errors import InputError, SuaveDesError
@@ -35,7 +35,7 @@ class _Commands(CommandsUnderHeadings):
     """Handles interruptions before typer does, which would not report what is kept."""
 
     headings: ClassVar[Headings] = {
-        "Run missions": (campaign.reproduce, missions.run, campaign.campaign, missions.train, missions.serve),
+        "Run missions": (campaign.reproduce, campaign.run, campaign.campaign, campaign.train, campaign.serve),
         "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
         "Knowledge, rules and trees": (kb.app, files.tree),
         "Files": (files.import_config, files.export_config, files.scenarios, files.schema),
@@ -56,13 +56,6 @@ def _report(message: str, status: int) -> int:
     with suppress(BrokenPipeError):
         print("suave-des: " + plain(" ".join(message.splitlines())), file=sys.stderr)
     return status
-
-
-def _usage_line(error: Any) -> str:
-    context = getattr(error, "ctx", None)
-    path = context.command_path if context is not None else "suave-des"
-    names = "several names have commas between them, without blanks; " if "extra argument" in str(error) else ""
-    return f"{error.format_message().rstrip('.')} ({names}see {path} --help)"
 
 
 app = typer.Typer(
@@ -109,7 +102,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(arguments)
-    write_what_the_terminal_has()
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # ? for what the terminal's encoding lacks
     atexit.unregister(gc.freeze)  # as of an earlier call
     atexit.register(gc.freeze)  # a last collection of all that was imported would take a tenth of a second
     abandoned = _abandoned()
@@ -135,7 +130,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
         if not hasattr(error, "format_message"):
             raise
-        status = _report(_usage_line(error), BAD_INPUT)
+        context: Any = getattr(error, "ctx", None)
+        path = "suave-des" if context is None else context.command_path
+        status = _report(f"{error.format_message().rstrip('.')} (see {path} --help)", BAD_INPUT)
     _leave(status, by_force=_abandoned() > abandoned)
 
 

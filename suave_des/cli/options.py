@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from itertools import chain
 from pathlib import Path
@@ -16,49 +16,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args, get_type_h
 import typer
 from typer.core import TyperGroup
 
-from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.resources import shipped_folder
+from suave_des.errors import InputError, shown
 
 if TYPE_CHECKING:
     from suave_des.scenario.loader import Replacements
 
 
-def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """What a shell is offered for the last of several names with commas between them."""
-
-    def complete(incomplete: str) -> list[str]:
-        before, comma, begun = incomplete.rpartition(",")
-        return [f"{before}{comma}{name}" for name in names() if name.startswith(begun)]
-
-    return complete
-
-
-def _managers() -> Iterable[str]:
-    from suave_des.registry import manager_names
-
-    return manager_names()
-
-
-def _metrics() -> Iterable[str]:
-    from suave_des.records.metrics import METRICS
-
-    return METRICS
-
-
-def _scenarios() -> Iterable[str]:
-    return sorted(path.stem for path in shipped_folder("scenarios").glob("*.yaml") if "_modes" not in path.stem)
-
-
-complete_managers, complete_metrics, complete_scenarios = map(_completing, (_managers, _metrics, _scenarios))
-
-Scenario = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="A scenario file, or the name of a shipped one.",
-        autocompletion=complete_scenarios,
-    ),
-]
+Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
 Results = Annotated[
     list[Path],
     typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files."),
@@ -74,13 +38,7 @@ SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", sh
 """For commands that may go on from results, which have a seed already."""
 Workers = Annotated[int, typer.Option("--workers", help="Worker processes.")]
 ManagersInData = Annotated[
-    str | None,
-    typer.Option(
-        "--managers",
-        metavar="NAME,...",
-        help="Managers to compare; by default all in the data.",
-        autocompletion=complete_managers,
-    ),
+    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings.")]
 Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
@@ -127,7 +85,6 @@ class Fields:
                 metavar=shown_as.metavar,
                 help=self.help.get(name) or " ".join(texts[name].split()),
                 show_default=self.default.get(name) or shown_as.default or _written(declared.default) or False,
-                autocompletion=complete_managers if name == "managers" else None,
             )
             default, accepted = (False, bool) if kind is bool else (None, kind | None)
             yield _keyword(name, default, Annotated[accepted, given])
@@ -186,20 +143,15 @@ class KnowledgeFiles:
 
     @property
     def given(self) -> dict[str, object]:
-        """The options that are given, by name."""
-        values = {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
-        return {option: value for option, value in values.items() if _is_given(value)}
+        """The options by name, with what is given of them."""
+        return {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
 
     @property
     def replacements(self) -> Replacements:
         """What is given, as the loader takes it."""
         changed: Replacements = {"values": self.values} if self.values else {}
-        return {
-            "ontologies": self.ontology or (),
-            "rules": self.rules or (),
-            "disabled_rules": self.disable_rule or (),
-            **changed,
-        }
+        files = {"ontologies": self.ontology, "rules": self.rules, "disabled_rules": self.disable_rule}
+        return changed | {name: value or () for name, value in files.items()}  # type: ignore[return-value]
 
     @property
     def values(self) -> dict[str, Any]:
@@ -281,14 +233,10 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
     for word in words or ():
         named = max((name for name in managers if word.startswith(f"{name}.")), key=len, default=None)
         key, value = key_and_value(word.removeprefix(f"{named}."), "--manager-option")
-        if named is None and ":" in key:
-            remedy = did_you_mean(key.rpartition(".")[0], managers, "its managers")
-            raise InputError(f"{shown(key)} is for none of the managers", place="--manager-option", remedy=remedy)
         targets = [named] if named is not None else managers if len(managers) == 1 else own
-        if not targets:
-            remedy = f"give the manager too, for instance {managers[0]}.{word}" if managers else "name the managers"
-            problem = f"{shown(word)} applies only to managers that are not built in"
-            raise InputError(problem, place="--manager-option", remedy=remedy)
+        if not targets or (named is None and ":" in key):
+            remedy = f"write MANAGER.KEY=VALUE, with one of {', '.join(managers) or '--managers'}"
+            raise InputError(f"{shown(word)} is for none of the managers", place="--manager-option", remedy=remedy)
         for target in targets:
             settings.setdefault(target, {})[key] = value
     return settings
@@ -365,31 +313,26 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
-    grouped: list[inspect.Parameter] = []
+    last: list[inspect.Parameter] = []
     groups: dict[str, Callable[[dict[str, Any]], Any]] = {}
     for each in inspect.signature(command).parameters.values():
         hint = hints[each.name]
-        declared = next((part for part in get_args(hint) if isinstance(part, Fields)), None)
-        if declared is not None:
-            parameters += declared.parameters()
-            groups[each.name] = declared.taken
+        if declared := [part for part in get_args(hint) if isinstance(part, Fields)]:
+            parameters += declared[0].parameters()
+            groups[each.name] = declared[0].taken
         elif is_dataclass(hint):
             kinds = get_type_hints(hint, include_extras=True)
-            grouped += [_keyword(part.name, part.default, kinds[part.name]) for part in fields(hint)]
+            last += [_keyword(part.name, part.default, kinds[part.name]) for part in fields(hint)]
             groups[each.name] = functools.partial(_group, hint)
         else:
             parameters.append(each.replace(annotation=hint, kind=inspect.Parameter.KEYWORD_ONLY))
 
-    parameters += grouped
-
     @functools.wraps(command)
     def with_groups(**given: Any) -> None:
-        for name, take in groups.items():
-            given[name] = take(given)
-        command(**given)
+        command(**{name: take(given) for name, take in groups.items()}, **given)
 
-    vars(with_groups)["__signature__"] = inspect.Signature(parameters)
-    with_groups.__annotations__ = {each.name: each.annotation for each in parameters}
+    vars(with_groups)["__signature__"] = inspect.Signature([*parameters, *last])
+    with_groups.__annotations__ = {each.name: each.annotation for each in (*parameters, *last)}
     return with_groups
 
 

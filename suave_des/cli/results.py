@@ -16,8 +16,6 @@ from suave_des.cli.options import (
     Trusted,
     check_no_use,
     comma_separated,
-    complete_managers,
-    complete_metrics,
 )
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
@@ -65,7 +63,6 @@ def compare(
         typer.Option(
             metavar="COLUMN,...",
             help="Columns of runs.csv.",
-            autocompletion=complete_metrics,
             show_default="search time, distance, found, reaction time",
         ),
     ] = None,
@@ -236,7 +233,6 @@ def replay(
             metavar="NAME,...",
             help="One or two managers.",
             show_default="metacontrol; for a campaign, the last and the first",
-            autocompletion=complete_managers,
         ),
     ] = None,
     run_number: Annotated[

@@ -135,7 +135,7 @@ def validate(
     for line in [*notes, ""] if notes else ():
         console.print(line)
     for table in validation.tables(word):
-        print_table(console, table, {"NOT MET": "bold red"})
+        print_table(console, table)
         console.print()
     console.print("\n".join(validation.remarks(word)))
     if out is None:

@@ -1,8 +1,7 @@
 """Managers in other processes and languages: `exec:COMMAND` exchanges JSON lines with a program by stdin and stdout.
 
 Each message is a line, and gets a line as its answer; mission time stands still until then. The program is started once
-in each process that runs missions, and serves one mission after the other. The messages: docs/guides/other-programs.md
-and, as a JSON Schema, exec_messages.schema.json.
+in each process that runs missions, and serves one mission after the other. The messages: docs/guides/other-programs.md.
 """
 
 from __future__ import annotations
@@ -46,15 +45,6 @@ KINDS: Final = {
 _NAMES: Final = {kind: name for name, kind in KINDS.items()}
 _ANSWER: Final = ("modes", "log")
 _FIRST_ANSWER: Final = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
-
-
-def messages_schema() -> dict[str, Any]:
-    """Read the JSON Schema (draft 2020-12) of the messages and their answers.
-
-    Its definitions `message`, `first_answer` (to mission_started) and `answer` are those of single lines.
-    """
-    schema: dict[str, Any] = json.loads(Path(__file__).with_name("exec_messages.schema.json").read_text("utf-8"))
-    return schema
 
 
 class ProgramError(Exception):
@@ -117,11 +107,9 @@ class _Program:
         return line
 
     def _ended(self) -> ProgramError:
-        try:
-            status = self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            return ProgramError("closed its output")
-        return ProgramError(f"ended with status {status}")
+        with suppress(subprocess.TimeoutExpired):
+            return ProgramError(f"ended with status {self._process.wait(_END_S)}")
+        return ProgramError("closed its output")
 
     def end(self) -> None:
         """End the program: it sees the end of its input; then whatever is left of it and its children is killed."""
@@ -259,13 +247,9 @@ class ExecManager(ManagingSubsystem):
             self.system.log("says", str(line))
         for function, mode in modes.items():
             if not isinstance(mode, str) or not self.system.change_mode(function, mode):
-                known = self.system.modes.available_modes(function)
-                remedy = (
-                    did_you_mean(mode, known, "its modes")
-                    if known
-                    else did_you_mean(function, self.system.modes.nodes, "functions")
-                )
-                raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {remedy}")
+                known = {each: self.system.modes.available_modes(each) for each in self.system.modes.nodes}
+                near = did_you_mean(mode, known.get(function, known), "known")
+                raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
 
     def _error(self, problem: str) -> ProgramError:
         return ProgramError(f"{self._command[0]} {problem}")
@@ -279,10 +263,8 @@ def exec_manager(command: str) -> type[ManagingSubsystem]:
         InputError: the command is not a list of words.
     """
     try:
-        words = shlex.split(command)
+        shlex.split(command)
     except ValueError as error:
         raise InputError(f"exec:{command}: {error}", remedy="close the quotes") from None
-    if not words:
-        raise InputError("there is no manager 'exec'", remedy="write exec:COMMAND")
     answered = {name: property(attrgetter(f"_{name}")) for name in ("depends_on", "subscribes_to")}
     return type("ExecManager", (ExecManager,), {"command": command, **answered})

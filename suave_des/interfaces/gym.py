@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any, Final
@@ -14,40 +13,22 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from suave_des.domain import BATTERY_LEVEL, FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTER_NAMES
-from suave_des.errors import InputError
+from suave_des.errors import InputError, shown
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.resources import DEFAULT_SCENARIO
-from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import grounding_modes
-from suave_des.scenario.quantities import AnyDistribution, Exponential, Normal, support
-from suave_des.scenario_knowledge import measured_values
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
 NOT_MEASURED: Final = -1.0
+_LARGEST: Final = float(np.finfo(np.float32).max)
+"""Bound of what is measured: a signal may have any value."""
 SEED_LIMIT: Final = 2**31
-_SPREADS: Final = 6.0
-"""So many standard deviations are taken for the bounds of a normal distribution that has none."""
-
-
-@dataclass(frozen=True)
-class Reward:
-    """The reward of a step: a weighted sum over its events.
-
-    By default a metre of pipeline earns what 10 s of search cost; a mission then gives about -10 to 60.
-
-    Attributes:
-        inspected_per_m: for each metre that was inspected.
-        searched_per_s: for each second of search.
-        found: for finding the pipeline.
-        adaptation: for each adaptation.
-    """
-
-    inspected_per_m: float = 1.0
-    searched_per_s: float = -0.1
-    found: float = 0.0
-    adaptation: float = 0.0
+REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
+"""Weights of a step's events: a metre of pipeline that was inspected, a second of search, finding the pipeline, and an
+adaptation. A metre earns what 10 s of search cost; a mission gives about -10 to 60."""
 
 
 class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
@@ -73,8 +54,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     Args:
         scenario: path of a scenario file, name of a shipped one, or a Simulator, which several environments may share.
         period_s: mission time of a step.
-        reward: weights, see `Reward`.
-        render_mode: "rgb_array": `render` draws the vehicle's way so far and the pipeline, from above.
+        reward: weights by name in place of those in `REWARD`.
 
     Attributes:
         observation_names: names of the observation's entries.
@@ -84,23 +64,19 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         InputError: something given cannot be used, or an action is out of range.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012
-
     def __init__(
         self,
         scenario: str | Path | Simulator = DEFAULT_SCENARIO,
         period_s: float = 2.0,
-        reward: Reward | dict[str, float] | None = None,
-        render_mode: str | None = None,
+        reward: Mapping[str, float] = REWARD,
     ) -> None:
         if not 0.05 <= period_s < inf:
             raise InputError(f"period_s: {period_s} is out of range", remedy="give 0.05 s or more")
-        try:
-            self._weights = Reward(**(reward or {})) if not isinstance(reward, Reward) else reward
-        except TypeError as error:
-            raise InputError(f"reward: {error}", remedy=f"give {', '.join(Reward.__dataclass_fields__)}") from None
+        if not reward.keys() <= REWARD.keys():
+            raise InputError(f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}")
+        self._weights = REWARD | dict(reward)
         self._simulator = scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
-        self._period_s, self.render_mode = period_s, render_mode
+        self._period_s = period_s
         loaded, duration_s = self._simulator.loaded, self._simulator.duration_s
         self._limit_s = loaded.scenario.mission.time_limit_s
         has_battery = loaded.scenario.battery is not None
@@ -112,7 +88,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
         }
         entries = (
-            *((name, *_bounds(loaded, name)) for name in self._attributes),
+            *((name, -_LARGEST, _LARGEST) for name in self._attributes),
             *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
             ("distance_inspected_m", 0.0, 2.0 * sum(self._simulator.path.lengths_m)),
             ("time_share", 0.0, duration_s / self._limit_s),
@@ -144,7 +120,11 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         mission = self._mission
         if mission is None:
             raise InputError("there is no mission", remedy="call reset first")
-        wanted = _numbers(action, len(self.mode_names))
+        chosen = np.asarray(action)
+        if not self.action_space.contains(chosen):
+            remedy = f"for each function the index of a mode: {self.mode_names}"
+            raise InputError(f"action {shown(action)} is not possible", remedy=remedy)
+        wanted = chosen.tolist()
         if wanted != self._requested:
             self._request(mission, wanted)
         self._time_s += self._period_s
@@ -155,29 +135,6 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         reward = self._reward(mission)
         return self._observation(mission), reward, mission.is_over, False, self._info(mission)
 
-    def render(self) -> NDArray[np.uint8]:
-        """Draw the vehicle's way so far and the pipeline, from above.
-
-        Raises:
-            InputError: the environment was made without render_mode="rgb_array", or there is no mission.
-        """
-        if self.render_mode is None or self._mission is None:
-            raise InputError("there is nothing to draw", remedy='make it with render_mode="rgb_array", and call reset')
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(6.0, 4.0), dpi=100, layout="constrained")
-        axes = figure.add_subplot(aspect="equal", xlabel="x (east), m", ylabel="y (north), m")
-        way_m, pipeline_m, pose = self._mission.way_m(), self._simulator.points, self._mission.pose
-        axes.plot(pipeline_m[:, 0], pipeline_m[:, 1], color="0.6", linewidth=4.0, label="pipeline")
-        axes.plot(way_m[:, 0], way_m[:, 1], color="C0", label="vehicle")
-        axes.plot(pose.x_m, pose.y_m, "o", color="C0")
-        axes.set_title(f"{self._mission.now_s:.0f} s, {self._task.name if self._task else 'over'}")
-        axes.legend(loc="upper right")
-        canvas: Any = FigureCanvasAgg(figure)
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
     def close(self) -> None:
         """End the mission."""
         if self._mission is not None:
@@ -186,9 +143,6 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _request(self, mission: Mission, wanted: list[int]) -> None:
         for (function, modes), choice in zip(self.mode_names.items(), wanted, strict=True):
-            if not 0 <= choice < len(modes):
-                remedy = f"0 to {len(modes) - 1}: {', '.join(modes)}"
-                raise InputError(f"action {choice} for {function} is out of range", remedy=remedy)
             if function in self._needed:
                 mission.change_mode(function, modes[choice])
         self._requested = wanted
@@ -210,16 +164,16 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     def _reward(self, mission: Mission) -> float:
         weights, found_s = self._weights, mission.found_s
         searched_s = mission.now_s if found_s is None else found_s
-        reward = weights.searched_per_s * (searched_s - self._searched_s)
+        reward = weights["searched_per_s"] * (searched_s - self._searched_s)
         self._searched_s = searched_s
         if found_s is not None:
             distance_m = mission.distance_inspected_m
-            reward += weights.inspected_per_m * (distance_m - self._distance_m)
+            reward += weights["inspected_per_m"] * (distance_m - self._distance_m)
             self._distance_m = distance_m
             if not self._found:
-                reward, self._found = reward + weights.found, True
+                reward, self._found = reward + weights["found"], True
         adaptations = mission.mode_manager.adaptations
-        reward += weights.adaptation * (adaptations - self._adaptations)
+        reward += weights["adaptation"] * (adaptations - self._adaptations)
         self._adaptations = adaptations
         return float(reward)
 
@@ -233,39 +187,8 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _info(self, mission: Mission) -> dict[str, Any]:
         """Return mission time and task; at the end the metrics."""
-        info: dict[str, Any] = {
-            "time_s": min(self._time_s, mission.now_s),
-            "task": self._task.name if self._task else "",
-        }
-        if mission.is_over:
-            info["metrics"] = mission.metrics()
-        return info
+        now = {"time_s": min(self._time_s, mission.now_s), "task": self._task.name if self._task else ""}
+        return now | ({"metrics": mission.metrics()} if mission.is_over else {})
 
 
 gymnasium.register(id="suave_des/PipelineInspection-v0", entry_point=f"{__name__}:PipelineInspection")
-
-
-def _numbers(action: Any, count: int) -> list[int]:
-    rows = np.asarray(action)
-    if rows.shape != (count,) or rows.dtype.kind not in "iu":
-        raise InputError(f"action {action!r} is not {count} whole numbers", remedy="see action_space")
-    numbers: list[int] = rows.tolist()
-    return numbers
-
-
-def _bounds(loaded: LoadedScenario, attribute: str) -> tuple[float, float]:
-    """Return the least and the greatest value that can be observed of a quality attribute."""
-    values, noise = measured_values(loaded, attribute)
-    lows, highs = zip(*map(_span, values), strict=True)
-    less, more = _span(noise)
-    return min(NOT_MEASURED, min(lows) + less), max(highs) + more
-
-
-def _span(distribution: AnyDistribution) -> tuple[float, float]:
-    low, high = support(distribution)
-    if isinstance(distribution, Normal):
-        wide = _SPREADS * distribution.std
-        return max(low, distribution.mean - wide), min(high, distribution.mean + wide)
-    if isinstance(distribution, Exponential):
-        return low, low + _SPREADS**2 * distribution.mean
-    return low, high

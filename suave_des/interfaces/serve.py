@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -119,12 +120,8 @@ class Session:
         return {"time_s": round(self._mission.now_s, 6), "is_over": self._mission.is_over}
 
     def _advance(self, content: Any) -> Json:
-        wanted = _object(content, (_ADVANCE, "until_s"))
-        if len(wanted) != 1:
-            raise InputError("says nothing, or too much", remedy=f"give {_ADVANCE} or until_s")
-        now_s = self._mission.now_s
-        to_s = now_s + _seconds(wanted[_ADVANCE]) if _ADVANCE in wanted else _seconds(wanted["until_s"])
-        self._mission.advance(to_s)
+        wanted = _object(content, (_ADVANCE,))
+        self._mission.advance(self._mission.now_s + _seconds(wanted.get(_ADVANCE)))
         return self._monitor()
 
     def _start(self, content: Any) -> Json:
@@ -144,9 +141,8 @@ class Session:
         return _schema({**modes, _ADVANCE: {"type": ["number", "null"], "minimum": 0}}, required=False)
 
     def _options_schema(self) -> Json:
-        return _schema(
-            {name: {"type": "array", "items": {"type": "string"}} for name in self._options()}, required=True
-        )
+        modes = {"type": "array", "items": {"type": "string"}}
+        return _schema(dict.fromkeys(self._options(), modes), required=True)
 
 
 def _schema(properties: Json, *, required: bool) -> Json:
@@ -218,7 +214,10 @@ class _Handler(BaseHTTPRequestHandler):
     def _check_sender(self) -> None:
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
         known = {*_LOCAL, self.server.host, self.connection.getsockname()[0]}
-        if _hostname(host) not in known:
+        is_known = False
+        with suppress(ValueError):
+            is_known = urlsplit(f"//{host}").hostname in known
+        if not is_known:
             raise _RefusedError(HTTPStatus.MISDIRECTED_REQUEST, f"Host {shown(host)} is not this server's address")
         if origin is not None and origin != f"http://{host}":
             raise _RefusedError(HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server")
@@ -228,9 +227,8 @@ class _Handler(BaseHTTPRequestHandler):
         if not (length.isascii() and length.isdigit()) or self.headers.get("Transfer-Encoding"):
             raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body's length is not given (send a Content-Length)")
         if len(length) > _LENGTH_DIGITS or int(length) > BODY_LIMIT_BYTES:
-            raise _RefusedError(
-                HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the body has more than {BODY_LIMIT_BYTES:,} bytes"
-            )
+            problem = f"the body has more than {BODY_LIMIT_BYTES:,} bytes"
+            raise _RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, problem)
         if kind != _JSON:
             raise _RefusedError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"the body is {kind} (send Content-Type: {_JSON})")
         body = self.rfile.read(int(length))
@@ -238,14 +236,6 @@ class _Handler(BaseHTTPRequestHandler):
             return json.loads(body or b"{}")
         except (ValueError, RecursionError):
             raise InputError(f"the body is not JSON: {shown(body[:60].decode(errors='replace'))}") from None
-
-
-def _hostname(host: str) -> str | None:
-    """Return the address in a Host header, without its port; None if it is not one."""
-    try:
-        return urlsplit(f"//{host}").hostname
-    except ValueError:
-        return None
 
 
 class Server(ThreadingHTTPServer):

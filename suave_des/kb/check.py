@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
@@ -14,9 +13,8 @@ from typing import Final
 from rdflib import RDF, Graph, Namespace, URIRef
 from rdflib.term import Node
 
-from suave_des.caches import private_cache, read_checked, remove_oldest, with_checksum
-from suave_des.errors import InputError, KnowledgeError
-from suave_des.findings import Finding, Level, has_level, ordered
+from suave_des.caches import SharedEntries, private_cache
+from suave_des.errors import Finding, InputError, KnowledgeError, Level, has_level, ordered
 from suave_des.kb.space import (
     Scale,
     component_statuses,
@@ -127,15 +125,12 @@ def check_shapes(sources: Sequence[OntologyFile]) -> list[Finding]:
     total = hashlib.sha256(f"{version('pyshacl')}{Path(__file__).read_bytes()!r}{shapes!r}".encode())
     for source in sources:
         total.update(str(source.path).encode() + hashlib.sha256(source.content).digest())
-    folder = private_cache("findings")
-    path = None if folder is None else folder / total.hexdigest()
-    if path is not None and (content := read_checked(path)) is not None:
-        return [Finding(**each | {"level": Level(each["level"])}) for each in json.loads(content)]
-    found = list(_validate(sources, Graph().parse(data=shapes, format="turtle")))
-    if path is not None:
-        path.write_bytes(with_checksum(json.dumps([asdict(each) for each in found]).encode()))
-        remove_oldest(path.parent, "*")
-    return found
+    kept = SharedEntries(private_cache("findings"), total.hexdigest())
+    for _, found in kept.read():
+        return [Finding(**each | {"level": Level(each["level"])}) for each in found]
+    findings = list(_validate(sources, Graph().parse(data=shapes, format="turtle")))
+    kept.add("", [asdict(each) for each in findings])
+    return findings
 
 
 def _validate(sources: Sequence[OntologyFile], shapes: Graph) -> Iterator[Finding]:

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
-from suave_des.errors import KnowledgeError, nearest, similar, with_article
-from suave_des.findings import Finding, Level, relative_path
+from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar, with_article
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.ontology import OPERATORS, Model, Ontology, assumption, wrong_values
 from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of

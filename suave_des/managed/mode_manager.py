@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -30,7 +29,7 @@ class ModeManager:
         adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor
             the fd_unground at its end counts.
         requests: requests for a mode that differs from the previous one.
-        refused: how many requests were refused, by function and mode.
+        refused: functions and modes whose requests were refused.
     """
 
     env: simpy.Environment
@@ -42,7 +41,7 @@ class ModeManager:
     adaptation_listeners: list[Callable[[str, str, str], None]] = field(default_factory=list)
     adaptations: int = 0
     requests: int = 0
-    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
+    refused: dict[tuple[str, str], None] = field(default_factory=dict)
     _requested: dict[str, str] = field(default_factory=dict)
     _effect_due_s: dict[str, float] = field(default_factory=dict)
     _in_use: set[str] = field(default_factory=set)
@@ -68,7 +67,7 @@ class ModeManager:
             return True
         chosen = self.table.get(function, mode)
         if chosen is None or function not in self.nodes:
-            self.refused[function, mode] += 1
+            self.refused[function, mode] = None
             self.log("mode_manager", "refused", f"{function} -> {mode}")
             return False
         before, self._requested[function] = self._requested.get(function, ""), mode

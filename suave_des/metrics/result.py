@@ -97,12 +97,10 @@ class MissionResult:
     knowledge: tuple[KnowledgeRecord, ...] = ()
     drawn: dict[str, float] = field(default_factory=dict)
     """Values drawn for the scenario's distributions in this run, by key path."""
-    refused: dict[str, int] = field(default_factory=dict)
-    """How many requests of a mode were refused, by the reason."""
     further: dict[str, float | int | None] = field(default_factory=dict)
     """Further metrics and the satisfaction of requirements, if the scenario asks for them, by column."""
     remarks: tuple[str, ...] = ()
-    """What the manager's author should know, such as a name that it depends on and that nothing measures."""
+    """What the manager's author should know, such as a mode that was refused, or a name that nothing measures."""
 
     def __repr__(self) -> str:
         """Return the metrics as a table, and how much is recorded."""

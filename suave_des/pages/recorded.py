@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from suave_des.campaign.campaign import opened_campaign
 from suave_des.campaign.inputs import check_inputs
-from suave_des.campaign.spec import check_mission
+from suave_des.campaign.spec import RUNS_LIMIT, check_range
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.explain import LEFT_OUT, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
@@ -121,7 +121,7 @@ def missions_run(
         MissionError: a manager raised.
     """
     _check_number(len(managers))
-    check_mission(run, seed)
+    check_range("run", run, 1, RUNS_LIMIT)
     check_inputs([loaded], managers, {})
     simulator = Simulator(loaded)
     return [recorded_result(loaded, simulator.run(each, run, seed, record=True)) for each in managers]

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
 import numpy as np
 import pandas
 
-from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import Estimate, interval_names, known, share_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
@@ -82,7 +81,6 @@ class Choices(TypedDict, total=False):
     unpaired: bool
 
 
-@plain_arguments(lambda: Choices.__annotations__)
 def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> Comparison:
     """Compare the missions in folders or files of results.
 
@@ -126,7 +124,6 @@ class CampaignFrame(pandas.DataFrame):
             found.attrs[SHARING] = math.lcm(*known)
         return found
 
-    @plain_arguments(lambda: Choices.__annotations__)
     def compare(self, **choices: Unpack[Choices]) -> Comparison:  # type: ignore[override]
         """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
 
@@ -156,7 +153,6 @@ class CampaignFrame(pandas.DataFrame):
 
         return compare_assisted(real, self, population, managers=managers, metrics=metrics)
 
-    @plain_arguments()
     def figure(self, kind: str = "auto") -> Figure:
         """Draw the missions, as `suave-des figure` does.
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pandas
 from matplotlib.figure import Figure
 
-from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.results import campaign_figures, style
@@ -35,7 +34,6 @@ KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, HEAT_MAP)
 """All figures by their names."""
 
 
-@plain_arguments()
 def draw_folder(folder: str | Path, out: str | Path) -> None:
     """Draw the contents of a results folder, and write the picture; see draw_results."""
     draw_results([Path(folder)], Path(out))

@@ -369,7 +369,7 @@ def read_varied(campaign: str | Path, **replacements: Unpack[Replacements]) -> t
         return load_scenario(campaign, **replacements), Variation(), str(campaign)
     settings, loaded = file.settings, load_scenario(file.scenario, **replacements)
     try:
-        varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw, settings.seed)
+        varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw)
         check_drawn(*varied)
     except InputError as error:
         raise file.located(error) from None

@@ -33,13 +33,6 @@ def test_training_gives_the_same_file_each_time(learner, tmp_path):
     assert "learner.py" in content["inputs_sha256"]
 
 
-def test_training_goes_on_from_a_file(learner, tmp_path):
-    train("seams2023", learner, 9, "first.json")
-    more = train("seams2023", learner, 3, "second.json", start="first.json", seed=5)
-    assert sum(missions for missions, _ in more.learned.values()) == 12
-    assert more.trainings == (("seams2023", 0, 9), ("seams2023", 5, 3))
-
-
 @pytest.mark.usefixtures("quick_workers")
 def test_a_frozen_policy_gives_the_same_rows_for_any_number_of_workers(learner):
     train("seams2023", learner, 9, "policy.json")
@@ -52,12 +45,11 @@ def test_a_frozen_policy_gives_the_same_rows_for_any_number_of_workers(learner):
 
 @pytest.mark.parametrize(("runs", "seen"), [(4, 4), (12, 9)])
 @pytest.mark.parametrize("given", ["option", "sweep"])
-def test_a_campaign_on_missions_of_the_training_or_an_earlier_one_says_so(learner, given, runs, seen):
+def test_a_campaign_on_missions_of_the_training_says_so(learner, given, runs, seen):
     train("seams2023", learner, 9, "policy.json", seed=1)
     train("seams2023", learner, 2, "other.json", seed=8)
-    train("seams2023", learner, 3, "more.json", seed=5, start="policy.json")
-    files = {"option": {"manager_options": {learner: {"learned": "more.json"}}}}
-    files["sweep"] = {"sweep": {f"managers.{learner}.learned": ["other.json", "more.json"]}}
+    files = {"option": {"manager_options": {learner: {"learned": "policy.json"}}}}
+    files["sweep"] = {"sweep": {f"managers.{learner}.learned": ["other.json", "policy.json"]}}
     with pytest.warns(UserWarning, match=f"runs 1 to {seen} are missions that it was trained on"):
         run_campaign("seams2023", [learner], runs, **files[given])
     assert "remarks" not in run_campaign("seams2023", [learner], 1, seed=2, **files[given]).attrs
@@ -89,11 +81,11 @@ def test_a_class_that_keeps_nothing_and_reads_what_there_may_be_is_not():
         assert "remarks" not in run_campaign("seams2023", [manager], runs).attrs
 
 
-def test_modes_that_there_are_not_are_counted_and_reported(tmp_path):
+def test_modes_that_there_are_not_are_reported(tmp_path):
     with pytest.warns(UserWarning, match="f_generate_search_path has no mode 'fd_spiral_hihg' .did you mean"):
         run_campaign("seams2023", [f"{AWKWARD}:Misspells"], 5, out=tmp_path / "out")
     (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
-    assert remark.endswith("(5 times)")
+    assert remark.endswith("fd_spiral_high)")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -121,24 +113,24 @@ def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too():
         ("def __init__(self, system): self.mine = system", 3, "__init__ does not begin with super().__init__(system)"),
         ("def diagnostic(self, kind, value): pass", 2, "write def diagnostic(self, diagnostic)"),
         ("def task_request(self, task): pass", 2, "did you mean def task_requested(self, task)?"),
-        ("adapt = 3", 2, "adapt is not a method"),
+        ("adapt = 3", 2, "write def adapt(self)"),
         ("period_s = 1.0; adapt = endless", 3, "no mission time passed"),
-        ("def diagnostic(self, diagnostic): yield self.system.env.timeout(1.0)", 2, "diagnostic yields, and nothing"),
-        ("async def task_requested(self, task): pass", 2, "task_requested is async"),
+        ("def diagnostic(self, diagnostic): yield self.system.env.timeout(1.0)", 2, "only adapt may yield"),
+        ("async def task_requested(self, task): pass", 2, "write def task_requested(self, task)"),
         (
             "period_s = 1.0; adapt = lambda self: 'fd_spiral_low'",
             3,
             "adapt returned 'fd_spiral_low'; it may",
         ),
-        ("period_s = '2'; adapt = endless", 3, "period_s is '2'; it must be a number above 0"),
+        ("period_s = '2'; adapt = endless", 3, "period_s is '2', starts_s is 0.0; they must be numbers"),
         ("period_s = 1.0; starts_s = -50.0; adapt = endless", 3, "starts_s is -50.0"),
         (
             "period_s = 1.0; adapt = endless; depends_on = ['water_visibility']",
             3,
             "depends_on is ['water_visi",
         ),
-        ("depends_on = {'water_visiblity': (3.25,)}", 3, "which nothing measures (did you mean 'water_visibility'?"),
-        ("subscribes_to = ('visibility',)", 2, "subscribes_to has 'visibility'"),
+        ("depends_on = {'water_visiblity': (3.25,)}", 3, "depends_on is {'water_visiblity': (3.25,)}; it must be like"),
+        ("subscribes_to = ('visibility',)", 2, "subscribes_to is ('visibility',)"),
         ("def check(self, loaded): pass", 2, "write @classmethod def check(cls, loaded)"),
         ("input_files = classmethod(lambda cls, settings: [settings['table']])", 2, "--manager-option table=..."),
     ],

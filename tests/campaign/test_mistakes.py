@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from suave_des import run_campaign
-from suave_des.errors import MISTAKES_LOGGER
-from suave_des.findings import Finding
+from suave_des.errors import MISTAKES_LOGGER, Finding
 from suave_des.knowledge.checks import Subject, findings_in
 from suave_des.knowledge.ontology import Ontology
 from tests.helpers.command import command_here

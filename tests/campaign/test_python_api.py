@@ -117,23 +117,11 @@ class TestRunCampaign:
 
 
 class TestArguments:
-    @pytest.mark.parametrize(
-        ("call", "words"),
-        [
-            (lambda: suave_des.run_mission("seams2023", mananger="none"), "run_mission has no argument 'mananger'"),
-            (lambda: suave_des.run_mission(), "run_mission: missing a required argument: 'scenario'"),
-            (lambda: suave_des.run_mission(3), "scenario: expected a name, a path or a loaded scenario, got 3"),
-            (lambda: suave_des.run_mission("seams2023", "none", run="1"), "run: expected a whole number, got '1'"),
-            (lambda: suave_des.run_campaign("seams2023", rnus=3), "no argument 'rnus' .did you mean 'runs'"),
-            (lambda: suave_des.load_scenario("seams2023", rules="a.swrl"), "rules: expected a list, got 'a.swrl'"),
-            (lambda: suave_des.with_values("seams2023", {}), "loaded: expected a loaded scenario, got 'seams2023'"),
-            (lambda: suave_des.Mission("seams2023", sed=3), "Mission has no argument 'sed' .did you mean 'seed'"),
-            (lambda: suave_des.KnowledgeBase.load(rulez="x"), "KnowledgeBase.load has no argument 'rulez'"),
-        ],
-    )
-    def test_that_a_function_has_not_or_of_another_type_are_told_in_plain_words(self, call, words):
-        with pytest.raises(InputError, match=words):
-            call()
+    def test_that_a_campaign_has_not_or_that_are_no_numbers_are_told_in_plain_words(self):
+        with pytest.raises(InputError, match=r"rnus: unknown .*did you mean 'runs'"):
+            suave_des.run_campaign("seams2023", rnus=3)
+        with pytest.raises(InputError, match=r"run: '1' is out of range"):
+            suave_des.run_mission("seams2023", "none", run="1")
 
     def test_numbers_may_be_of_numpy(self, scenario):
         assert len(suave_des.run_campaign(scenario, "none", runs=np.int64(2), seed=np.uint8(3))) == 2
@@ -195,8 +183,6 @@ def test_arrays_in_the_forms_of_a_sweep_become_lists():
     design = np.array([[1.0, 2.0], [3.0, 4.0]])
     zipped = plain({"zip": {"start.x_m": design[:, 0], "start.y_m": design[:, 1]}})
     assert zipped == {"zip": {"start.x_m": [1.0, 3.0], "start.y_m": [2.0, 4.0]}}
-    sample = {"method": "sobol", "points": np.int64(4), "ranges": {"start.x_m": np.array([1.0, 2.0])}}
-    assert plain({"sample": sample})["sample"] == {**sample, "points": 4, "ranges": {"start.x_m": [1.0, 2.0]}}
 
 
 def test_a_loaded_scenario_runs_as_its_file_does_and_with_its_values():

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.variation import Sample, Sweep
+from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
 from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.scenario.loader import load_scenario, with_values
@@ -61,21 +61,6 @@ def test_points_with_each_value_have_each_value(sizes):
         assert {point[path] for point in met} == set(values)
 
 
-@pytest.mark.parametrize("method", ["latin_hypercube", "sobol"])
-def test_a_sampled_design_fills_each_range_evenly_and_repeats(method):
-    ranges = {"start.x_m": (-18.0, -16.0), "visibility.period_s": (40.0, 120.0)}
-
-    def sampled(seed: int) -> list[dict[str, Any]]:
-        sweep = Sweep(sample=Sample(method=method, points=16, ranges=ranges), seed=seed)
-        return [sweep.values(point) for point in range(16)]
-
-    points = sampled(3)
-    for path, (low, high) in ranges.items():
-        strata = [int((point[path] - low) / (high - low) * 16) for point in points]
-        assert sorted(strata) == list(range(16))
-    assert points == sampled(3) != sampled(4)
-
-
 def test_perturbations_are_the_same_for_all_managers_and_points_and_within_their_bounds(tmp_path):
     perturbations = f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n  visibility.shift_s: {UNIFORM % (-9, 9)}\n"
     path = write(tmp_path, HEAD + perturbations + "sweep:\n  visibility.period_s: [40, 120]\n")
@@ -118,9 +103,7 @@ def test_more_points_managers_or_noise_change_no_other_row(seed, periods):
 @pytest.mark.usefixtures("quick_workers")
 def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(tmp_path):
     text = HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n"
-    path = write(
-        tmp_path, text + "sweep:\n  sample: {method: sobol, points: 4, ranges: {visibility.period_s: [40, 90]}}\n"
-    )
+    path = write(tmp_path, text + "sweep: {visibility.period_s: [40, 50, 70, 90]}\n")
     run_campaign(path, workers=1, out=tmp_path / "one")
     run_campaign(path, workers=2, out=tmp_path / "two")
     run_campaign(path, runs=2, out=tmp_path / "resumed")
@@ -134,19 +117,15 @@ def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("campaign: 2\nscenario: seams2023\n", "line 1, campaign: a campaign file of version 2"),
+        ("campaign: 2\nscenario: seams2023\n", "line 1, campaign: "),
         ("campaign: 1\n", "scenario: is missing"),
         (HEAD + "sweeps: {}\n", "line 6, sweeps: unknown key 'sweeps' (did you mean 'sweep'?"),
         (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
         (HEAD + "sweep:\n  visibility.period_s: 40\n", "line 7, sweep.visibility.period_s: 40 should be a list"),
         (HEAD + "sweep:\n  visibility.period_s: [40, -3]\n", "line 7, sweep.visibility.period_s: at"),
         (HEAD + "sweep:\n  modes_file: [a.yaml]\n", "files were read with the scenario"),
-        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: cannot stand beside grid"),
+        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: unknown key"),
         (HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n", "start.x_m has 1, start.y_m has 2"),
-        (
-            HEAD + "sweep:\n  sample: {method: sobol, points: 8, ranges: {start.x_m: [2, 1]}}\n",
-            "[2.0, 1.0] is no range",
-        ),
         (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: expected a distribution, got 3"),
         (HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n", "is drawn at each use, not once"),
         (

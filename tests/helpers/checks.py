@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from suave_des.findings import Finding, Level, ordered
+from suave_des.errors import Finding, Level, ordered
 from suave_des.kb.check import check, check_shapes
 from suave_des.knowledge.checks import Subject, static_findings
 from suave_des.knowledge.ontology_file import collect

@@ -8,8 +8,7 @@ from decimal import Decimal
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.errors import KnowledgeError
-from suave_des.findings import Level
+from suave_des.errors import KnowledgeError, Level
 from suave_des.kb.check import Subject, check, states_to_ask
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet

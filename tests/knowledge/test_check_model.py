@@ -6,8 +6,7 @@ import pytest
 
 from suave_des.cli.main import main
 from suave_des.domain import THRUSTER_NAMES
-from suave_des.errors import KnowledgeError
-from suave_des.findings import Finding, Level
+from suave_des.errors import Finding, KnowledgeError, Level
 from suave_des.kb.check import check
 from suave_des.knowledge.checks import Subject
 from suave_des.monitor.diagnostics import REPORTED_STATUSES

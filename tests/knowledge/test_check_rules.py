@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.findings import Level, has_level
+from suave_des.errors import Level, has_level
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from tests.helpers.checks import OWL, SUAVE, SWRL, TOMASYS, errors, found, only
 

@@ -526,10 +526,10 @@ class TestCommand:
         [
             (["missing.yaml", "--out", "mine.yaml"], "no such file"),
             (["mission.yaml", "--out", "there.yaml"], "exists already"),
-            (["mission.yaml", "--out", "mission.yaml", "--overwrite"], "one of the files to import"),
+            (["mission.yaml", "--out", "mission.yaml", "--overwrite"], "one of the other files, too"),
             (["mission.yaml", "--out", "nowhere/mine.yaml"], "no folder nowhere"),
             (["mission.yaml", "--out", "."], "is a folder"),
-            (["runner.yaml", "--out", "mine.yaml", "--campaign", "mine.yaml"], "cannot be one file"),
+            (["runner.yaml", "--out", "mine.yaml", "--campaign", "mine.yaml"], "one of the other files, too"),
             (["runner.yaml", "--out", "mine.yaml", "--campaign", "there.yaml"], "exists already"),
             (["mission.yaml"], "--out"),
             (["--out", "mine.yaml"], "FILE"),

@@ -196,7 +196,7 @@ def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[
 
 
 def _place(file: Path, line: int | None = None) -> str:
-    from suave_des.findings import relative_path
+    from suave_des.errors import relative_path
 
     shipped = shipped_folder("ontology")
     if file.is_relative_to(shipped):

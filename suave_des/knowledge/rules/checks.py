@@ -10,8 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from suave_des.errors import KnowledgeError, nearest, with_article
-from suave_des.findings import Finding, Level
+from suave_des.errors import Finding, KnowledgeError, Level, nearest, with_article
 from suave_des.knowledge.rdf import (
     LANGUAGE_NAMESPACES,
     MROS,
