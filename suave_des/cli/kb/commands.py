@@ -54,7 +54,7 @@ def check(
 
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
-    from suave_des.findings import Finding, Level, has_level, ordered, summary
+    from suave_des.errors import Finding, Level, has_level, ordered, summary
     from suave_des.kb.check import check as run_checks
     from suave_des.scenario.loader import load_scenario
     from suave_des.scenario.yamlfile import shown_name
