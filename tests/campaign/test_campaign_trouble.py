@@ -107,15 +107,14 @@ def test_missions_run_in_as_many_processes_as_asked_for():
     assert 1 <= len(processes) <= 2
 
 
-class TestRefusedBeforeAnythingIsWritten:
-    def test_overwriting_replaces_results_and_leaves_other_files(self, tmp_path):
-        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
-        (tmp_path / "out" / "notes.txt").write_text("mine")
-        run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
-        assert len(rows_of(tmp_path / "out")) == 2
-        assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-            *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv"),
-        ]
+def test_overwriting_replaces_results_and_leaves_other_files(tmp_path):
+    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
+    assert len(rows_of(tmp_path / "out")) == 2
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv"),
+    ]
 
 
 def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path, monkeypatch):

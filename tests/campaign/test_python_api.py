@@ -127,12 +127,11 @@ class TestArguments:
         assert len(suave_des.run_campaign(scenario, "none", runs=np.int64(2), seed=np.uint8(3))) == 2
 
 
-class TestFigures:
-    def test_a_mission_draws_itself(self):
-        mission = suave_des.run_mission("seams2023", "none", run=1, seed=8)
-        assert [len(mission.figure(kind).axes) for kind in ("map", "timeline")] == [3, 3]
-        with pytest.raises(InputError, match=r"there is no figure 'mapp' of a mission .did you mean 'map'"):
-            mission.figure("mapp")
+def test_a_mission_draws_itself():
+    mission = suave_des.run_mission("seams2023", "none", run=1, seed=8)
+    assert [len(mission.figure(kind).axes) for kind in ("map", "timeline")] == [3, 3]
+    with pytest.raises(InputError, match=r"there is no figure 'mapp' of a mission .did you mean 'map'"):
+        mission.figure("mapp")
 
 
 FAILURE_S = "thruster_events.0.time_s"

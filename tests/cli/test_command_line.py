@@ -35,17 +35,16 @@ class Raises(NoManager):
 """
 
 
-class TestHelp:
-    def test_imports_nothing_heavy(self):
-        code = (
-            "import sys\n"
-            "from suave_des.cli.main import main\n"
-            "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
-            "heavy = {'numpy', 'numba', 'pandas', 'scipy', 'matplotlib', 'simpy', 'pydantic_core', 'yaml',"
-            " 'owlready2', 'rdflib', 'jpype', 'multiprocessing'}\n"
-            "print(sorted(heavy & set(sys.modules)), file=sys.stderr)\n"
-        )
-        assert python("-c", code).stderr.strip() == "[]"
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from suave_des.cli.main import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'numba', 'pandas', 'scipy', 'matplotlib', 'simpy', 'pydantic_core', 'yaml',"
+        " 'owlready2', 'rdflib', 'jpype', 'multiprocessing'}\n"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)\n"
+    )
+    assert python("-c", code).stderr.strip() == "[]"
 
 
 def test_a_folder_with_brackets_is_named_as_it_is(command):
@@ -54,23 +53,22 @@ def test_a_folder_with_brackets_is_named_as_it_is(command):
     assert ended.out.endswith(f"\n1 mission is in {folder}/runs.csv\n")
 
 
-class TestProgress:
-    @pytest.mark.parametrize("quiet", [(), ("--quiet",)])
-    @pytest.mark.parametrize(
-        "arguments",
-        [
-            ("campaign", "seams2023", "--managers", "none", "--out", "out"),
-            ("reproduce",),
-            ("validate", "--managers", "none"),
-        ],
-        ids=lambda arguments: arguments[0],
-    )
-    def test_is_on_stderr_unless_quiet(self, arguments, quiet, command, monkeypatch):
-        monkeypatch.setattr("suave_des.campaign.progress._FIRST_LINE_S", 0.0)
-        ended = command(*arguments, "--runs", "2", "--workers", "1", *quiet)
-        assert ended.status == 0
-        assert ("missions" in ended.err) == (not quiet)
-        assert not re.search(r"\d of \d+ missions", ended.out)
+@pytest.mark.parametrize("quiet", [(), ("--quiet",)])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("campaign", "seams2023", "--managers", "none", "--out", "out"),
+        ("reproduce",),
+        ("validate", "--managers", "none"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_progress_is_on_stderr_unless_quiet(arguments, quiet, command, monkeypatch):
+    monkeypatch.setattr("suave_des.campaign.progress._FIRST_LINE_S", 0.0)
+    ended = command(*arguments, "--runs", "2", "--workers", "1", *quiet)
+    assert ended.status == 0
+    assert ("missions" in ended.err) == (not quiet)
+    assert not re.search(r"\d of \d+ missions", ended.out)
 
 
 class TestRun:
@@ -136,20 +134,19 @@ def _matches(text: str, pattern: str) -> bool:
     return re.match(pattern, text) is not None
 
 
-class TestCampaign:
-    def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, command, tmp_path):
-        (tmp_path / "clumsier.py").write_text(MANAGER)
-        managers = "clumsier:Raises,none"
-        arguments = ("--managers", managers, "--runs", "2", "--workers", "1", "--quiet", *OUT)
-        ended = command("campaign", "seams2023", *arguments)
-        assert ended.status == 3
-        lines = ended.err.splitlines()
-        assert lines[0].startswith("suave-des: failed: manager clumsier:Raises, run 1, mission time ")
-        assert lines[0].endswith("(2 missions like this)")
-        assert lines[-1] == "suave-des: 2 of 4 missions failed, see manifest.json"
-        rows = rows_of(tmp_path / "out" / "runs.csv")
-        assert [row["run"] for row in rows if row["manager"] == "none"] == ["1", "2"]
-        assert len(rows) == 2
+def test_a_campaign_lists_failures_keeps_the_others_and_ends_with_status_3(command, tmp_path):
+    (tmp_path / "clumsier.py").write_text(MANAGER)
+    managers = "clumsier:Raises,none"
+    arguments = ("--managers", managers, "--runs", "2", "--workers", "1", "--quiet", *OUT)
+    ended = command("campaign", "seams2023", *arguments)
+    assert ended.status == 3
+    lines = ended.err.splitlines()
+    assert lines[0].startswith("suave-des: failed: manager clumsier:Raises, run 1, mission time ")
+    assert lines[0].endswith("(2 missions like this)")
+    assert lines[-1] == "suave-des: 2 of 4 missions failed, see manifest.json"
+    rows = rows_of(tmp_path / "out" / "runs.csv")
+    assert [row["run"] for row in rows if row["manager"] == "none"] == ["1", "2"]
+    assert len(rows) == 2
 
 
 @pytest.mark.parametrize("terminal", [False, True])

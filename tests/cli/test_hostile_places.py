@@ -104,17 +104,16 @@ class TestCacheFolder:
         assert (tmp_path / "java").stat().st_mode & 0o777 == 0o700
 
 
-class TestCurrentFolder:
-    def test_files_named_like_python_s_own_modules_are_not_run_by_workers(self, tmp_path):
-        for name in ("signal", "types", "re", "random", "numpy", "suave_des"):
-            (tmp_path / f"{name}.py").write_text(f"open('ran-{name}', 'w')\nraise RuntimeError\n")
-        (tmp_path / "mine.py").write_text(
-            "from suave_des.managing.simple import NoManager\n\n\nclass Mine(NoManager):\n    pass\n"
-        )
-        managers = ["campaign", "seams2023", "--managers", "none,mine:Mine", "--runs", "2", "--workers", "2"]
-        done = run(*managers, "--out", "out", "--quiet", cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
-        assert not list(tmp_path.glob("ran-*"))
+def test_files_named_like_python_s_own_modules_are_not_run_by_workers(tmp_path):
+    for name in ("signal", "types", "re", "random", "numpy", "suave_des"):
+        (tmp_path / f"{name}.py").write_text(f"open('ran-{name}', 'w')\nraise RuntimeError\n")
+    (tmp_path / "mine.py").write_text(
+        "from suave_des.managing.simple import NoManager\n\n\nclass Mine(NoManager):\n    pass\n"
+    )
+    managers = ["campaign", "seams2023", "--managers", "none,mine:Mine", "--runs", "2", "--workers", "2"]
+    done = run(*managers, "--out", "out", "--quiet", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert not list(tmp_path.glob("ran-*"))
 
 
 class TestStopped:

@@ -68,11 +68,10 @@ class TestScale:
         assert list(scale.values([2, 2])) == [(1, 1)]
 
 
-class TestInterchangeableComponents:
-    def test_combinations_count_what_they_stand_for(self):
-        found = list(component_reports([["a", "b", "c"], ["d"]], ["FALSE", "RECOVERED"], 2))
-        # of 4 components none, one or two report one of two words
-        assert sum(each.combinations for each in found) == 1 + 4 * 2 + 6 * 4
+def test_combinations_count_what_they_stand_for():
+    found = list(component_reports([["a", "b", "c"], ["d"]], ["FALSE", "RECOVERED"], 2))
+    # of 4 components none, one or two report one of two words
+    assert sum(each.combinations for each in found) == 1 + 4 * 2 + 6 * 4
 
 
 class TestPolicy:
@@ -156,22 +155,21 @@ class TestPolicy:
             make_policy(knowledge.base, ManagingSettings(), knowledge.outcome, 9, many)
 
 
-class TestFiles:
-    def test_the_csv_file_has_every_cell(self, command, tmp_path, policy):
-        file, picture = tmp_path / "policy.csv", tmp_path / "policy.png"
-        status, text, _ = command("policy", "--max-failed", "1", "--csv", file, "--png", picture)
-        assert status == 0
-        rows = list(csv.DictReader(io.StringIO(file.read_text())))
-        assert sum(int(row["states"]) for row in rows) == policy.states
-        row = next(
-            row
-            for row in rows
-            if (row["water_visibility"], row[f"{SEARCH}_now"]) == ("2.25", "fd_spiral_high") and not row["components"]
-        )
-        assert row[f"{SEARCH}_then"] == "fd_spiral_medium"
-        assert picture.read_bytes().startswith(b"\x89PNG")
-        assert f"{policy.states} states in {len(policy.cases)} equivalence classes" in text
-        assert not list(tmp_path.glob(".*"))
+def test_the_csv_file_has_every_cell(command, tmp_path, policy):
+    file, picture = tmp_path / "policy.csv", tmp_path / "policy.png"
+    status, text, _ = command("policy", "--max-failed", "1", "--csv", file, "--png", picture)
+    assert status == 0
+    rows = list(csv.DictReader(io.StringIO(file.read_text())))
+    assert sum(int(row["states"]) for row in rows) == policy.states
+    row = next(
+        row
+        for row in rows
+        if (row["water_visibility"], row[f"{SEARCH}_now"]) == ("2.25", "fd_spiral_high") and not row["components"]
+    )
+    assert row[f"{SEARCH}_then"] == "fd_spiral_medium"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert f"{policy.states} states in {len(policy.cases)} equivalence classes" in text
+    assert not list(tmp_path.glob(".*"))
 
 
 OF_TWO = "isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ isQAtype(?p, battery_level) ^ hasValue(?p, ?w)"

@@ -184,14 +184,11 @@ class TestSweep:
         assert found.conclusion.startswith("time_s 400; time_s 500: ")
 
 
-class TestHeadlines:
-    """What a headline says beside the difference: of how many tests, and what the test does not show."""
-
-    def test_that_most_missions_did_not_find_the_pipeline_comes_first(self):
-        lost = [300.0] * 15 + [120.0] * 5
-        found = compare_frame(runs(a=[130.0] * 11 + [300.0] * 9, b=lost))
-        assert found.conclusion.startswith("The pipeline was not found by b in 15 of 20 missions; ")
-        assert not compare_frame(runs(a=[100.0] * 20, b=[130.0] * 11 + [300.0] * 9)).conclusion.startswith("The pipe")
+def test_that_most_missions_did_not_find_the_pipeline_comes_first():
+    lost = [300.0] * 15 + [120.0] * 5
+    found = compare_frame(runs(a=[130.0] * 11 + [300.0] * 9, b=lost))
+    assert found.conclusion.startswith("The pipeline was not found by b in 15 of 20 missions; ")
+    assert not compare_frame(runs(a=[100.0] * 20, b=[130.0] * 11 + [300.0] * 9)).conclusion.startswith("The pipe")
 
 
 def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(campaign):

@@ -112,29 +112,27 @@ def test_a_target_holds_at_its_limits(published, place, met):
     assert found.loc[0, ["kind", "met"]].tolist() == ["mean", met]
 
 
-class TestFiles:
-    def test_every_table_is_written_and_the_json_has_them_all(self, good):
-        files = good.texts({"seed": 1})
-        content = json.loads(files[JSON_FILE])
-        assert content["provenance"] == {"seed": 1}
-        assert content["targets_summary"] == {"met": 28, "not_met": 0, "not_judged": 0}
-        assert [len(content[name]) for name in ("cells", "pairs", "targets")] == [6, 6, 28]
-        assert [cell["manager"] for cell in content["cells"][:3]] == list(MANAGERS)
-        assert len(files[TABLES["cells"]].splitlines()) == 7
-        assert len(files[TABLES["pairs"]].splitlines()) == 7
-        assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
+def test_every_table_is_written_and_the_json_has_them_all(good):
+    files = good.texts({"seed": 1})
+    content = json.loads(files[JSON_FILE])
+    assert content["provenance"] == {"seed": 1}
+    assert content["targets_summary"] == {"met": 28, "not_met": 0, "not_judged": 0}
+    assert [len(content[name]) for name in ("cells", "pairs", "targets")] == [6, 6, 28]
+    assert [cell["manager"] for cell in content["cells"][:3]] == list(MANAGERS)
+    assert len(files[TABLES["cells"]].splitlines()) == 7
+    assert len(files[TABLES["pairs"]].splitlines()) == 7
+    assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
 
 
-class TestSplitCheck:
-    def test_predicted_means_are_told_in_published_standard_deviations(self, missions):
-        published = missions({"none": [(100, 10, 0), (120, 30, 0)], "random": [(50, 5, 0), (60, 6, 0)]})
-        fitted = {"none": missions({"none": [(120, 12, 0), (130, 14, 0)], "random": [(0, 0, 0)]})}
-        table = split_check(fitted, published).set_index("metric")
-        search = table.loc["search_time_s"]
-        assert (search["left_out"], search["published_mean"], search["predicted_mean"]) == ("none", 110, 125)
-        assert search["difference"] == 15
-        assert search["difference_in_std"] == pytest.approx(15 / np.std([100, 120], ddof=1))
-        assert not search["within"]
-        distance = table.loc["distance_inspected_m"]
-        assert distance["difference_in_std"] == pytest.approx(-7 / np.std([10, 30], ddof=1))
-        assert distance["within"]
+def test_predicted_means_are_told_in_published_standard_deviations(missions):
+    published = missions({"none": [(100, 10, 0), (120, 30, 0)], "random": [(50, 5, 0), (60, 6, 0)]})
+    fitted = {"none": missions({"none": [(120, 12, 0), (130, 14, 0)], "random": [(0, 0, 0)]})}
+    table = split_check(fitted, published).set_index("metric")
+    search = table.loc["search_time_s"]
+    assert (search["left_out"], search["published_mean"], search["predicted_mean"]) == ("none", 110, 125)
+    assert search["difference"] == 15
+    assert search["difference_in_std"] == pytest.approx(15 / np.std([100, 120], ddof=1))
+    assert not search["within"]
+    distance = table.loc["distance_inspected_m"]
+    assert distance["difference_in_std"] == pytest.approx(-7 / np.std([10, 30], ddof=1))
+    assert distance["within"]
