@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -76,7 +75,7 @@ class Recorder:
             self._modes.append((float(self.env.now), mode.name))
 
     def trajectory(
-        self, vehicle: Vehicle, visibility: Measurements, further: Mapping[str, Measurements]
+        self, vehicle: Vehicle, visibility: Measurements, battery: Measurements | None
     ) -> tuple[TrajectoryPoint, ...]:
         """The vehicle's path so far: at each point the mode in force, the visibility, and the battery's level."""
         if not self.enabled:
@@ -86,6 +85,6 @@ class Recorder:
         for row in range(0, int(self.env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
             t_s = round(row * STEP_S, 6)
             mode = self._modes[bisect_right(mode_times, t_s) - 1][1]
-            others = {name: measured.value(t_s) for name, measured in further.items()}
-            points.append(TrajectoryPoint(t_s, *vehicle.pose(t_s), mode, visibility.value(t_s), others))
+            further = {} if battery is None else {battery.key: battery.value(t_s)}
+            points.append(TrajectoryPoint(t_s, *vehicle.pose(t_s), mode, visibility.value(t_s), further))
         return tuple(points)

@@ -13,7 +13,7 @@ import simpy
 
 from suave_des import domain
 from suave_des.clock import advance, stop_at
-from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
+from suave_des.domain import WATER_VISIBILITY, Task
 from suave_des.draws import Draws
 from suave_des.errors import InputError, MissionError, MissionTimeOut, SuaveDesError, did_you_mean, shown
 from suave_des.managed.coordinator import MissionCoordinator
@@ -41,7 +41,6 @@ from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.prepared import PreparedScenario, draw_start
 from suave_des.vehicle.model import Pose
 
-_ARGUMENTS = ("scenario", "manager", "run", "seed", "record")
 CALLER = "caller"
 """Name, in the metrics, of a managing subsystem that is the program which advances the mission."""
 
@@ -122,11 +121,10 @@ class Mission:
         self._track = prepared.take_track()
         self._vehicle = prepared.make_vehicle(draws, self._start_m, self._track, manager_type.needs_knowledge)
         self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, recorder.log)
-        signals = {each.key: each for each in measure_signals(loaded, draws, prepared.duration_s)}
-        self._visibility = signals[WATER_VISIBILITY]
         self._battery = measure_battery(described, draws, prepared.duration_s)
-        self._battery_only: Mapping[str, Measurements] = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
-        self._measurements: Mapping[str, Measurements] = {**signals, **self._battery_only}
+        measured = [*measure_signals(loaded, draws, prepared.duration_s), *filter(None, [self._battery])]
+        self._measurements: Mapping[str, Measurements] = {each.key: each for each in measured}
+        self._visibility = self._measurements[WATER_VISIBILITY]
 
         # The managed subsystem.
         seen = prepared.detection_points, prepared.view_tangent
@@ -437,7 +435,7 @@ class Mission:
         return MissionResult(
             metrics,
             tuple(recorder.events),
-            recorder.trajectory(self._vehicle, self._visibility, self._battery_only),
+            recorder.trajectory(self._vehicle, self._visibility, self._battery),
             tuple(recorder.knowledge),
             self._draws.drawn,
             further,
