@@ -1,13 +1,12 @@
-"""Whether intervals from few real missions, assisted by simulated ones, hold; what they gain; and what plans rest on.
+"""Whether intervals from few real missions, assisted by simulated ones, hold, and what they gain.
 
 Coverage: sets of parameters that fit the real runs equally well play the real system in turn, and the shipped ones the
 simulator, or a biased or a useless one; missions are drawn from 150 conditions, 8 under each, 500 times. Gains:
-the real missions of 2025 (exp1), all 30 of each manager and parts of them. Deviations of these missions from simulated
-ones, by manager and metric, go to scenarios/published, where `suave-des compare --plan` finds them.
+the real missions of 2025 (exp1), all 30 of each manager and parts of them.
 
     python analysis/assisted.py [--out DIR] [--runs N] [--workers N]
 
-`--runs` are the simulated missions under each condition of the real ones, and of the deviations.
+`--runs` are the simulated missions under each condition of the real ones.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ import studies
 from numpy.typing import NDArray
 
 from suave_des import load_scenario, run_campaign
-from suave_des.results.assisted import assisted_mean, compare_assisted, deviations
+from suave_des.results.assisted import assisted_mean, compare_assisted
 from suave_des.results.statistics import mean_interval
 
 SCENARIO = "planta_exp1"
@@ -193,8 +192,6 @@ def main() -> None:
     )
     gained = gains(same, population)
     gained.to_csv(chosen.out / "gains.csv", index=False, float_format="%.4g", lineterminator="\n")
-    seen = deviations(compare_assisted([REAL], same, population, metrics=METRICS).conditions)
-    seen.to_csv(REAL.with_name("planta_exp1_deviations.csv"), index=False, float_format="%.4f", lineterminator="\n")
     conclusion = conclude(*(pandas.read_csv(chosen.out / name) for name in ("coverage.csv", "gains.csv")))
     (chosen.out / "conclusion.md").write_text(conclusion + "\n", encoding="utf-8")
     print(conclusion)

@@ -97,6 +97,9 @@ class Parameter:
 
 def words_of(kind: Any) -> Iterator[str]:
     """The words that an option takes, if it takes only some."""
+    if typing.get_origin(kind) is typing.Literal:
+        yield "|".join(typing.get_args(kind))
+        return
     for each in typing.get_args(kind) or (kind,):
         if isinstance(each, type) and issubclass(each, Enum):
             yield "|".join(str(word.value) for word in each)

@@ -16,8 +16,7 @@ from suave_des.campaign.progress import OnProgress, is_live, shown
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, check_range
 from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.metrics.result import MissionResult
-from suave_des.records.knowledge import KNOWLEDGE_FILE
-from suave_des.records.mission_folder import mission_files, record_of
+from suave_des.records.mission_folder import KNOWLEDGE_FILE, mission_files, record_of
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 

@@ -12,7 +12,9 @@ from typing import Any
 import pandas
 import yaml
 
-from suave_des import InputError, find, read_real, with_values
+from suave_des import InputError, find, load_scenario, read_real, with_values
+from suave_des.campaign.spec import read_campaign_file
+from suave_des.campaign.variation import Variation, vary
 from suave_des.resources import shipped_folder
 from suave_des.results.real import (
     CONDITION,
@@ -21,9 +23,9 @@ from suave_des.results.real import (
     Share,
     count,
     published_for,
-    read_varied,
     targets_of,
 )
+from suave_des.scenario.loader import LoadedScenario
 
 FOLDER = Path(__file__).parent
 """Where files of free parameters are."""
@@ -115,7 +117,7 @@ def _files_of(given: str, data: Sequence[str], *, only: bool) -> list[Path]:
 
 
 def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
-    loaded, variation, base = read_varied(given)
+    loaded, variation, base = _read_varied(given)
     points = [variation.sweep.values(point) for point in range(variation.sweep.points)]
     if len(points) == 1:
         loaded, real = variation.scenario(loaded, 0), read_real(files)
@@ -135,6 +137,16 @@ def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
     digests = {file.path.name: file.sha256 for file in real.files}
     name = Path(given).stem.removesuffix("_campaign")
     return Case(name, loaded, frame, made, shares, base, digests, real.notes)
+
+
+def _read_varied(given: str) -> tuple[LoadedScenario, Variation, str]:
+    """Read a scenario, what its campaign file sweeps, and the scenario's own file as another can name it."""
+    file = read_campaign_file(given)
+    if file is None:
+        return load_scenario(given), Variation(), given
+    settings = file.settings
+    varied = vary(load_scenario(file.scenario), settings.sweep, settings.perturbations, settings.runs_per_draw)
+    return *varied, str(file.scenario)
 
 
 def _counted(shares: Sequence[Share], real: pandas.DataFrame) -> tuple[tuple[Share, float], ...]:

@@ -18,8 +18,8 @@ from suave_des.campaign.variation import Variation, cell_of, short_mission
 from suave_des.errors import MissionError, MissionTimeOut, SuaveDesError
 from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
-from suave_des.records.knowledge import mission_line
 from suave_des.records.metrics import Row, further_of, row_of
+from suave_des.records.mission_folder import mission_line
 from suave_des.records.store import MissionFailure, MissionKey
 from suave_des.registry import is_built_in, is_installed, place_of
 from suave_des.scenario.loader import LoadedScenario

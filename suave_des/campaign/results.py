@@ -15,8 +15,8 @@ from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
 from suave_des.files import csv_text, json_text
-from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
+from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.records.store import (
     ENSEMBLE_FILE,
     MANIFEST_FILE,

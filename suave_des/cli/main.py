@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from suave_des import __version__
-from suave_des.cli import campaign, files, results, validate
+from suave_des.cli import campaign, files, results
 from suave_des.cli.console import plain
 from suave_des.cli.kb import commands as kb
 from suave_des.cli.options import CONTEXT, CommandsUnderHeadings, Headings, remember_command_line
@@ -36,7 +36,7 @@ class _Commands(CommandsUnderHeadings):
 
     headings: ClassVar[Headings] = {
         "Run missions": (campaign.reproduce, campaign.run, campaign.campaign, campaign.train, campaign.serve),
-        "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
+        "Look at results": (results.compare, results.figure, results.report, results.replay, results.validate),
         "Knowledge, rules and trees": (kb.app, files.tree),
         "Files": (files.import_config, files.export_config, files.scenarios, files.schema),
     }

@@ -1,52 +1,41 @@
-"""suave-des compare, figure, replay and report: results as tables, pictures, and pages for a browser."""
+"""suave-des compare, validate, figure, replay and report: results as tables, pictures, and pages for a browser."""
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from suave_des.cli.console import TEXT_WIDTH, output
+from suave_des.cli.campaign import exit_telling_failures
+from suave_des.cli.console import TEXT_WIDTH, output, print_table, progress
 from suave_des.cli.options import (
+    Fields,
     Files,
+    Given,
+    ManagersInData,
+    Quiet,
     Results,
     SeedIfNew,
     Trusted,
     check_no_use,
     comma_separated,
+    command_line,
 )
 from suave_des.errors import InputError
-from suave_des.files import check_output_file, write_files
+from suave_des.files import check_output_file, check_output_folder, make_output_folder, write_files
+from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
+    from suave_des.campaign.campaign import CampaignResult
     from suave_des.records.mission_folder import MissionRecord
-    from suave_des.results.assisted import AssistedComparison
-    from suave_des.results.comparison import Comparison
+    from suave_des.results.comparison import Written
     from suave_des.results.mission_figures import Rules
 
 
-class CompareFormat(StrEnum):
-    """How a comparison is printed."""
-
-    TABLE = "table"
-    CSV = "csv"
-    JSON = "json"
-    MARKDOWN = "markdown"
-    LATEX = "latex"
-
-
-AssistedBy = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="DIR... are real missions; this is a campaign under the same conditions."),
-]
-Population = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many such conditions."),
-]
+CompareFormat = Literal["table", "csv", "json", "markdown", "latex"]
+FigureKind = Literal["auto", "map", "timeline", "distributions", "sweep"]
+"""As in results.figures, which is not imported for --help."""
 
 
 def compare(
@@ -74,16 +63,15 @@ def compare(
         typer.Option(metavar="METRIC:VALUE", help="Estimate the runs needed for an interval this narrow; repeatable."),
     ] = None,
     unpaired: Annotated[bool, typer.Option("--unpaired", help="Treat runs as independent.")] = False,
-    assisted_by: AssistedBy = None,
-    population: Population = None,
-    plan: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="METRIC:VALUE",
-            help="Plan real missions for intervals this narrow.",
-        ),
+    assisted_by: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="DIR... are real missions; this is a campaign under the same conditions."),
     ] = None,
-    as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = CompareFormat.TABLE,
+    population: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many such conditions."),
+    ] = None,
+    as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = "table",
     out: Annotated[
         Path | None,
         typer.Option(
@@ -95,19 +83,27 @@ def compare(
     """Compare managers by their results.
 
     Runs that share their random numbers are compared in pairs, which takes fewer missions. A few real missions can be
-    assisted by simulated ones, and planned.
+    assisted by simulated ones.
     """
     from suave_des.results.compare import compare_folders
     from suave_des.results.comparison import ENDINGS
 
     if out is not None:
-        _check_out(out, ENDINGS)
+        if out.suffix.lower() not in ENDINGS:
+            problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
+            raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
+        check_output_file(out, overwrite=True)
     names, columns = comma_separated(managers), comma_separated(metrics)
-    comparison: Comparison | AssistedComparison
-    if assisted_by is not None or population is not None or plan:
+    if (assisted_by is None) != (population is None):
+        remedy = "give both: suave-des campaign makes them"
+        raise InputError("--assisted-by and --population are needed together", remedy=remedy)
+    comparison: Written
+    if assisted_by is not None and population is not None:
+        from suave_des.results.assisted import compare_assisted
+
         unused = {"--by": by, "--against": against, "--half-width": half_width, "--unpaired": unpaired}
-        check_no_use(unused, "with --assisted-by or --plan")
-        comparison = _assisted(results, assisted_by, population, plan or (), names, columns)
+        check_no_use(unused, "with --assisted-by")
+        comparison = compare_assisted(results, assisted_by, population, managers=names, metrics=columns)
     else:
         comparison = compare_folders(
             results,
@@ -118,64 +114,164 @@ def compare(
             half_widths=half_width or (),
             unpaired=unpaired,
         )
+    emit(comparison, as_format, out)
+
+
+def emit(result: Written, as_format: CompareFormat, out: Path | None) -> None:
+    """Print a result, or write it into a file, whose ending says how."""
+    from suave_des.results.comparison import ENDINGS
+
     if out is not None:
-        write_files(out.parent, {out.name: getattr(comparison, ENDINGS[out.suffix.lower()])()})
+        write_files(out.parent, {out.name: getattr(result, ENDINGS[out.suffix.lower()])()})
         print(f"compared in {out}")
-    elif as_format is CompareFormat.TABLE:
-        print(comparison.text(min(output().width, TEXT_WIDTH)), end="")
+    elif as_format == "table":
+        print(result.text(min(output().width, TEXT_WIDTH)), end="")
     else:
-        print(getattr(comparison, as_format.value)(), end="")
+        print(getattr(result, as_format)(), end="")
 
 
-def _assisted(
-    results: Sequence[Path],
-    same: Path | None,
-    population: Path | None,
-    plan: Sequence[str],
-    managers: Sequence[str],
-    metrics: Sequence[str],
-) -> AssistedComparison:
-    """Compare real missions, assisted by simulated ones, or plan them."""
-    from suave_des.results.assisted import compare_assisted, planned
+# Validation
 
-    both = _both(same, population)
-    if both is not None:
-        return compare_assisted(results, *both, managers=managers, metrics=metrics, half_widths=plan)
-    check_no_use({"--metrics": metrics or None}, "with --plan, which names its own")
-    return planned(results, plan, managers=managers)
+TARGETS_NOT_MET = 1
+"""Exit status with --strict."""
+_RUNS = 2000
 
 
-def _both(same: Path | None, population: Path | None) -> tuple[Path, Path] | None:
-    """Return the two campaigns that assist real missions; None without.
+def validate(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SCENARIO",
+            help="A scenario or campaign file, or a shipped scenario.",
+            show_default=DEFAULT_SCENARIO,
+        ),
+    ] = None,
+    data: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Real missions; repeatable. By default those published for the scenario, or else the"
+            " 60 of the SUAVE paper.",
+            show_default=False,
+        ),
+    ] = None,
+    runs_file: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Compare this runs.csv; nothing is simulated.")
+    ] = None,
+    managers: ManagersInData = None,
+    targets: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."),
+    ] = None,
+    *,
+    options: Annotated[
+        Given,
+        Fields(
+            ("runs", "workers", "seed", "out", "overwrite"),
+            {
+                "runs": "Missions for each manager; with a campaign file, under each condition.",
+                "out": "Folder for tables and validation.json.",
+            },
+            {"runs": f"{_RUNS}, over all conditions"},
+        ),
+    ],
+    strict: Annotated[
+        bool, typer.Option("--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met.")
+    ] = False,
+    quiet: Quiet = False,
+    files: Files,
+) -> None:
+    """Compare simulated missions with real ones: distributions, clusters, conclusions.
 
-    Raises:
-        InputError: only one of them is given.
+    With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
-    if same is not None and population is not None:
-        return same, population
-    if same is not None or population is not None:
-        given, lacking = ("--assisted-by", "--population") if population is None else ("--population", "--assisted-by")
-        raise InputError(f"{given} is given without {lacking}", remedy="give both: suave-des campaign makes them")
-    return None
+    from suave_des import __version__
+    from suave_des.results.real import CONDITION, read_conditions, read_real, targets_of
+    from suave_des.results.validation import FILES
+    from suave_des.results.validation import validate as compare
+
+    name = scenario or DEFAULT_SCENARIO
+    out, seed, overwrite = options.get("out"), options.get("seed", 1), "overwrite" in options
+    if runs_file is not None:
+        check_no_use(files.given, "with --runs-file", "leave one of them out")
+    wants_conditions = runs_file is None or scenario is not None
+    conditions = read_conditions(name, **files.replacements) if wants_conditions else None
+    real = read_real(_data_files(name, data), conditions)
+    chosen = real.choose(comma_separated(managers))
+    shares, limits, targets_paths = targets_of(real, targets)
+    word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
+
+    campaign: CampaignResult | None = None
+    sources: dict[str, object] = {
+        "data": [{"file": _shown(file.path), "sha256": file.sha256} for file in real.files],
+        "targets": [_shown(path) for path in targets_paths],
+        "seed": seed,
+    }
+    if runs_file is not None:
+        from suave_des.records.runs import read_runs
+
+        recorded = read_runs(runs_file, () if conditions is None else conditions.names)
+        recorded.check_simulated(chosen)
+        if out is not None:
+            check_output_folder(out, "campaign", overwrite=overwrite)
+            make_output_folder(out)
+        simulated = recorded.frame
+        sources |= {"runs_file": {"file": _shown(recorded.path), "sha256": recorded.sha256}}
+    else:
+        from suave_des.campaign.campaign import run_campaign
+
+        runs = -(-_RUNS // len(conditions or "1"))
+        settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
+        with progress(name, quiet=quiet) as show:
+            campaign = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
+        simulated = campaign.frame()
+        sources |= {"scenario": campaign.loaded.scenario.name, "runs": settings["runs"]}
+        if not set(campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
+            exit_telling_failures(campaign)
+    if conditions is not None:
+        simulated = simulated.assign(**{CONDITION: conditions.numbers(simulated)})
+    validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
+    console = output()
+    notes = list(real.notes)
+    if conditions is not None:
+        notes += [f"Condition {number}: {conditions.text(number)}" for number in range(1, len(conditions) + 1)]
+    for line in [*notes, ""] if notes else ():
+        console.print(line)
+    for table in validation.tables(word):
+        print_table(console, table)
+        console.print()
+    console.print("\n".join(validation.remarks(word)))
+    if out is None:
+        console.print("\nNo files were written; --out DIR keeps the tables.")
+    else:
+        about = {"version": __version__, "command": command_line(), **sources}
+        write_files(out, validation.texts(about), stale=FILES)
+        console.print(f"\nTables and validation.json are in {out}")
+    if campaign is not None:
+        exit_telling_failures(campaign)
+    if strict and not validation.all_met:
+        raise typer.Exit(TARGETS_NOT_MET)
 
 
-def _check_out(out: Path, endings: Iterable[str]) -> None:
-    if out.suffix.lower() not in endings:
-        problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
-        raise InputError(problem, file=out, remedy=f"one of {', '.join(endings)}")
-    check_output_file(out, overwrite=True)
+def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
+    """Return the files of real missions: those given, or those published for the scenario, or the paper's."""
+    from suave_des.results.real import PAPERS_RUNS, published_for
+
+    if given:
+        return [find(each, "scenarios/published") for each in given]
+    return [published_for(scenario) or find(PAPERS_RUNS, "scenarios/published")]
 
 
-class FigureKind(StrEnum):
-    """What is drawn; as in report.figures, which is not imported for --help."""
+def _shown(path: Path) -> str:
+    """Name a file as it goes into a result: a shipped one without where it is installed."""
+    return f"shipped/{path.name}" if _is_shipped(path) else path.as_posix()
 
-    AUTO = "auto"
-    MAP = "map"
-    TIMELINE = "timeline"
-    DISTRIBUTIONS = "distributions"
-    DIFFERENCES = "differences"
-    SWEEP = "sweep"
-    HEATMAP = "heatmap"
+
+def _is_shipped(path: Path) -> bool:
+    return path.is_relative_to(shipped_folder("scenarios/published"))
+
+
+# Pictures and pages
 
 
 def figure(
@@ -183,11 +279,8 @@ def figure(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
     kind: Annotated[
         FigureKind,
-        typer.Option(
-            help="For a mission: map, timeline; for a campaign: distributions, differences;"
-            " for a sweep: sweep, heatmap."
-        ),
-    ] = FigureKind.AUTO,
+        typer.Option(help="Of a mission: map, timeline; of a campaign: distributions; of a sweep: sweep."),
+    ] = "auto",
     parameters: Annotated[
         str | None, typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all")
     ] = None,
@@ -203,13 +296,10 @@ def figure(
 
         return adaptation_rules(record)
 
-    draw_results(folders, out, kind.value, comma_separated(parameters), rules_of)
+    draw_results(folders, out, kind, comma_separated(parameters), rules_of)
     print(f"drawn in {out}")
 
 
-_SEED, _RUN, _POINT = 1, 1, 0
-_PATHS, _MOST_PATHS = 12, 100
-"""Defaults as in suave_des.pages, which is not imported for --help."""
 Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser.")]
 
 
@@ -237,11 +327,11 @@ def replay(
     ] = None,
     run_number: Annotated[
         int | None,
-        typer.Option("--run", metavar="K", help="Run number.", show_default=str(_RUN)),
+        typer.Option("--run", metavar="K", help="Run number.", show_default="1"),
     ] = None,
     seed: SeedIfNew = None,
     point: Annotated[
-        int | None, typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default=str(_POINT))
+        int | None, typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default="0")
     ] = None,
     out: Annotated[
         Path | None,
@@ -256,7 +346,6 @@ def replay(
 
     It needs no network, and shows the vehicle, what its camera sees, and what its manager knew, inferred and decided.
     """
-    from suave_des.files import check_output_file
     from suave_des.pages.page import write_page
     from suave_des.pages.recorded import missions_in, missions_run
     from suave_des.pages.replay import replay_page
@@ -271,14 +360,14 @@ def replay(
     else:
         check_no_use({"--point": point}, "without a campaign's folder")
     page_file = out or (folders[0] if folders else Path()) / "replay.html"
-    names, run = comma_separated(managers), _RUN if run_number is None else run_number
+    names, run = comma_separated(managers), 1 if run_number is None else run_number
     if out is not None or not folders:
         check_output_file(page_file, overwrite=True)
     if scenario is not None:
         loaded = load_scenario(scenario, **files.replacements)
-        missions = missions_run(loaded, names or ("metacontrol",), run, _SEED if seed is None else seed)
+        missions = missions_run(loaded, names or ("metacontrol",), run, 1 if seed is None else seed)
     else:
-        missions = missions_in(folders, names, run, point or _POINT, confirmed=yes)
+        missions = missions_in(folders, names, run, point or 0, confirmed=yes)
     write_page(page_file, replay_page(missions), show=show)
     print(f"{' and '.join(each.record.name for each in missions)}: {page_file}")
 
@@ -286,34 +375,24 @@ def replay(
 def report(
     results: Results,
     paths: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="Runs of each manager with path and timeline.",
-            show_default=str(_PATHS),
-        ),
-    ] = None,
+        int,
+        typer.Option(metavar="N", min=0, max=100, help="Runs of each manager with path and timeline."),
+    ] = 12,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR")
     ] = None,
-    assisted_by: AssistedBy = None,
-    population: Population = None,
     show: Open = False,
 ) -> None:
     """Make a page about a campaign: conclusion, tables, charts.
 
     It is one file that needs no network.
     """
-    from suave_des.files import check_output_file
     from suave_des.pages.page import write_page
     from suave_des.pages.report import report_page
 
-    runs = _PATHS if paths is None else paths
-    if not 0 <= runs <= _MOST_PATHS:
-        raise InputError(f"--paths: {runs} is out of range", remedy=f"give 0 to {_MOST_PATHS}")
-    assisting, first = _both(assisted_by, population), results[0]
+    first = results[0]
     page_file = out or (first if first.is_dir() else first.parent) / "report.html"
     if out is not None:
         check_output_file(page_file, overwrite=True)
-    write_page(page_file, report_page(results, runs, assisting), show=show)
+    write_page(page_file, report_page(results, paths), show=show)
     print(f"the report is {page_file}")

@@ -22,7 +22,7 @@ from suave_des.knowledge.rules.checks import Vocabulary, fatal_problems
 from suave_des.knowledge.rules.files import RulesFile, read_rule
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, ObjectiveState
-from suave_des.records.knowledge import (
+from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
     RecordedMission,

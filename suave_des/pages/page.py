@@ -25,14 +25,10 @@ def asset(name: str) -> str:
     return files("suave_des.pages").joinpath("assets", name).read_text(encoding="utf-8")
 
 
-def script_text(text: str) -> str:
-    """Make text safe inside a script element, whatever names it contains: nothing in it can end the element."""
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-
-
 def data_text(content: Any) -> str:
-    """Write plain data as JSON that may stand inside a script element."""
-    return script_text(json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False))
+    """Write plain data as JSON that may stand inside a script element: nothing in it can end the element."""
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def compressed(text: str) -> str:

@@ -14,7 +14,6 @@ from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded, explain_cycles
 from suave_des.results.mission import adaptations, details, mode_spans
-from suave_des.scenario.models import Scenario
 from suave_des.world.pipeline import sample_points
 
 _DECIMALS: Final = 3
@@ -29,7 +28,7 @@ def replay_page(missions: Sequence[Recorded]) -> str:
         missions: of scenarios with the same pipeline; two of the same seed and run had the same random numbers.
     """
     first = missions[0]
-    scenario = first.scenario
+    scenario, battery = first.scenario, first.scenario.battery
     content = {
         "version": __version__,
         "scenario": {
@@ -42,7 +41,7 @@ def replay_page(missions: Sequence[Recorded]) -> str:
             "sea_bed_z_m": SEA_BED_Z_M,
             "view_tangent": scenario.vehicle.camera.tangent,
             "thrusters": len(THRUSTER_NAMES),
-            "station": _station(scenario),
+            "station": battery and [battery.station_x_m, battery.station_y_m, battery.station_radius_m],
         },
         "missions": [mission_on_page(each) for each in missions],
     }
@@ -85,11 +84,6 @@ def mission_on_page(mission: Recorded) -> dict[str, Any]:
         "seen": None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
         "cycles": explain_cycles(mission),
     }
-
-
-def _station(scenario: Scenario) -> list[float] | None:
-    battery = scenario.battery
-    return None if battery is None else [battery.station_x_m, battery.station_y_m, battery.station_radius_m]
 
 
 def _rounded(values: Sequence[Any]) -> list[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from itertools import groupby
@@ -25,9 +25,8 @@ from suave_des.metrics.result import MissionResult
 from suave_des.pages.page import compressed, page
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.store import read_manifest
-from suave_des.results.assisted import compare_assisted
 from suave_des.results.compare import compare
-from suave_des.results.comparison import Written, capital
+from suave_des.results.comparison import capital
 from suave_des.results.missions import Missions, grouped, read_missions
 from suave_des.results.style import looks
 
@@ -48,25 +47,18 @@ _CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
 """Metrics in charts."""
 
 
-_FACTS: Final = ("scenario", "managers", "runs", "seed", "reasoner", "machine")
-
-
-def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[Path, Path] | None = None) -> str:
+def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
     """Make the report of campaigns, or of other results that `compare` reads.
 
     Args:
         folders: of campaigns, or with the exemplar's own CSV files; or single files.
         runs: how many runs of each manager to run again for their ways and timelines; 0: none.
-        assisted_by: campaigns that assist real missions: under their conditions, and under many others.
 
     Raises:
         InputError: results cannot be read or compared, or an extra is not installed.
     """
     library = plotly_script()
     missions = read_missions(folders)
-    results = _results(missions)
-    if assisted_by is not None:
-        results["sections"] = [*_assisted(folders, *assisted_by), *results["sections"]]
     note = "Paths and timelines are in the report of one campaign's folder only"
     ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": note}
     if len(folders) == 1 and folders[0].is_dir() and missions.frame["run"].notna().all():
@@ -80,7 +72,7 @@ def report_page(folders: Sequence[Path], runs: int = PATHS, assisted_by: tuple[P
         "title": ", ".join(scenarios) or ", ".join(str(folder) for folder in folders),
         "folders": [str(folder) for folder in folders],
         "made": [_made(folder) for folder in folders],
-        "results": results,
+        "results": _results(missions),
         "ways": ways,
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
@@ -116,32 +108,18 @@ def _results(missions: Missions) -> dict[str, Any]:
     return {
         "conclusion": found.conclusion,
         "notes": found.notes,
-        "sections": _sections(found),
+        "sections": [
+            {
+                "title": capital(title),
+                "tables": [(each.title, each.headings, each.rows) for each in tables],
+                "conclusions": list(sentences),
+                "below": below,
+            }
+            for title, tables, sentences, below in found.sections()
+        ],
         "remarks": found.remarks(),
         "drawn": chart_columns(missions),
     }
-
-
-def _sections(found: Written) -> list[dict[str, Any]]:
-    return [
-        {
-            "title": capital(title),
-            "tables": [(each.title, each.headings, each.rows) for each in tables],
-            "conclusions": list(sentences),
-            "below": below,
-        }
-        for title, tables, sentences, below in found.sections()
-    ]
-
-
-def _assisted(real: Sequence[Path], same: Path, population: Path) -> list[dict[str, Any]]:
-    """Return a section for each metric of real missions that simulated ones assist."""
-    found = compare_assisted(real, same, population)
-    sections = _sections(found)
-    for section in sections:
-        section["title"] += ", real missions assisted by simulated ones"
-    sections[-1]["conclusions"] += found.remarks()
-    return sections
 
 
 def chart_columns(missions: Missions) -> dict[str, Any]:
@@ -193,29 +171,18 @@ def _plain(column: pandas.Series) -> list[Any]:
 
 def _made(folder: Path) -> dict[str, Any]:
     """Read how the campaign in a folder was made; little is known of other folders."""
-    known: dict[str, Any] = {"folder": str(folder), "facts": [], "command": "", "inputs": {}, "versions": {}}
     try:
         manifest = read_manifest(folder)
-        return known | {
-            "facts": list(_facts(manifest)),
-            "command": shlex.join(map(str, manifest.get("command", ()))),
-            "inputs": dict(manifest.get("inputs_sha256", {})),
-            "versions": dict(manifest.get("versions", {})),
-        }
-    except (InputError, ValueError, AttributeError, TypeError):
-        return known
-
-
-def _facts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for key in _FACTS:
-        if key in manifest:
-            value = manifest[key]
-            yield key, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-    missions = manifest.get("missions", {})
-    yield "missions", ", ".join(f"{number} {what.replace('_', ' ')}" for what, number in missions.items())
-    for key in ("sweep", "perturbations"):
-        if manifest.get(key):
-            yield key, json.dumps(manifest[key])
+    except InputError:
+        manifest = {}
+    command = manifest.pop("command", ())
+    return {
+        "folder": str(folder),
+        "command": shlex.join(map(str, command)) if isinstance(command, list) else "",
+        "manifest": {
+            key: value if isinstance(value, dict) else json.dumps(value).strip('"') for key, value in manifest.items()
+        },
+    }
 
 
 # Ways

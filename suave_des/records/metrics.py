@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import csv
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from operator import attrgetter
+from pathlib import Path
 
 from suave_des.estimates import Estimate
 from suave_des.files import rounded
@@ -99,76 +101,15 @@ class Metric:
         return f"{self.scale * value:.{self.decimals}f} {unit}".strip()
 
 
-_METRICS = (
-    Metric(
-        SEARCH_TIME,
-        "search time",
-        "s",
-        -1,
-        less="finds the pipeline {} sooner than",
-        more="finds the pipeline {} later than",
-        most="finds the pipeline soonest",
-        half_width=5.0,
-    ),
-    Metric(
-        DISTANCE,
-        "distance inspected",
-        "m",
-        1,
-        less="inspects {} less than",
-        more="inspects {} more than",
-        most="inspects most of the pipeline",
-        half_width=2.0,
-        short="distance",
-    ),
-    Metric(
-        FOUND,
-        "share that found the pipeline",
-        "",
-        1,
-        less="finds the pipeline in {} less of its missions than",
-        more="finds the pipeline in {} more of its missions than",
-        most="finds the pipeline most often",
-        half_width=0.05,
-        decimals=1,
-    ),
-    Metric(
-        REACTION_TIME,
-        "mean reaction time",
-        "s",
-        -1,
-        less="reacts {} faster than",
-        more="reacts {} slower than",
-        most="reacts fastest",
-        half_width=0.5,
-        interval_decimals=2,
-        short="reaction",
-    ),
-    Metric("adaptations", "adaptations", less="makes {} fewer adaptations than", more="makes {} more adaptations than"),
-    Metric("mission_duration_s", "mission duration", "s"),
-    Metric(
-        "detection_time_s",
-        "time of the first sight",
-        "s",
-        -1,
-        less="first sees the pipeline {} sooner than",
-        more="first sees the pipeline {} later than",
-        most="first sees the pipeline soonest",
-    ),
-    Metric("detection_x_m", "x of the first sight", "m"),
-    Metric("detection_y_m", "y of the first sight", "m"),
-    Metric("initial_x_m", "x of the start", "m"),
-    Metric("initial_y_m", "y of the start", "m"),
-    Metric("adaptations_undone", "adaptations undone"),
-    Metric("configurations", "configurations"),
-    Metric("reasoning_time_s", "reasoning time", "s"),
-    Metric("area_covered_m2", "area covered", "m2"),
-    Metric("operational_thrusters", "operational thrusters"),
-    Metric("battery_level", "battery level", decimals=3, interval_decimals=3),
-    Metric("recharges", "recharges"),
-    Metric("surfacing_time_s", "surfacing time", "s"),
-)
-METRICS: Mapping[str, Metric] = {metric.name: metric for metric in _METRICS}
+def _read() -> Iterator[Metric]:
+    """Read metrics.csv, beside this module."""
+    types = {"better": int, "half_width": float, "decimals": int, "interval_decimals": int}
+    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            yield Metric(**{name: types.get(name, str)(text) for name, text in row.items()})
+
+
+METRICS: Mapping[str, Metric] = {metric.name: metric for metric in _read()}
 """Metrics by name: those of every mission, and those that a scenario may ask for."""
 PAPER_METRICS = (SEARCH_TIME, DISTANCE)
 """Those of the paper's table."""

@@ -19,8 +19,8 @@ from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, write_files
-from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE
 from suave_des.records.metrics import COLUMNS, Row
+from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 
 STORE_FILE = "campaign.sqlite"
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"

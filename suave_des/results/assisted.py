@@ -20,7 +20,6 @@ import pandas
 from suave_des.errors import InputError, did_you_mean, number_of
 from suave_des.estimates import STUDENT, Estimate, t_quantile
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
-from suave_des.resources import find
 from suave_des.results import missions, statistics
 from suave_des.results.comparison import Row, Section, Written, capital, difference_claim, estimate_in, rows_of
 from suave_des.results.missions import Missions
@@ -33,12 +32,8 @@ Source = pandas.DataFrame | str | Path | Sequence[Path]
 LEAST_CONDITIONS = 3
 LEAST_TO_WEIGH = 10
 """Conditions from which on the weight is estimated: with fewer, its own error costs more than it gains."""
-DEVIATIONS = "planta_exp1_deviations.csv"
-"""How far the real missions of 2025 are from simulated ones, in scenarios/published."""
 _NOTICEABLE = 0.1
 """Least weight, and least gain of an interval's width, with which the simulation is said to help."""
-_RUNS_EACH = (1, 5)
-"""Runs under each condition that plans are made for: the fewest missions, and the exemplar's usual random_interval."""
 
 
 def assisted_mean(
@@ -80,7 +75,7 @@ def assisted_mean(
 
 @dataclass(frozen=True)
 class AssistedComparison(Written):
-    """What real missions show, alone and assisted by simulated ones; or a plan of real missions.
+    """What real missions show, alone and assisted by simulated ones.
 
         found = compare_assisted("real.csv", "same", "population")
         found.estimates[["group", "other", "assisted", "narrower", "conclusion"]]
@@ -91,28 +86,22 @@ class AssistedComparison(Written):
             their intervals), weight, narrower (how many times as wide the interval of the real missions alone is),
             equal_runs (real missions, as many in each condition, that would give the assisted interval), helps, and
             conclusion.
-        plan: a row for each metric, manager and number of runs in each condition: half_width, runs_each, conditions and
-            runs that it takes, and runs_alone, without the simulation; none: over ten million, or the population has
-            too few draws.
         notes: what a reader should know about the data.
         metrics: that are compared.
-        conditions: means, variances and numbers of real and simulated missions by metric, manager and condition.
         conclusion: of all; empty, as each estimate has its own.
     """
 
     estimates: pandas.DataFrame
-    plan: pandas.DataFrame
     notes: tuple[str, ...]
     metrics: tuple[Metric, ...] = field(repr=False)
-    conditions: pandas.DataFrame = field(repr=False, default_factory=pandas.DataFrame)
     conclusion: str = field(repr=False, default="")
 
     def frames(self) -> dict[str, pandas.DataFrame]:
-        """Return the estimates and the plan."""
-        return {"estimates": self.estimates, "plan": self.plan}
+        """Return the estimates."""
+        return {"estimates": self.estimates}
 
     def sections(self) -> Iterator[Section]:
-        """Yield a table for each metric, and one of the plan."""
+        """Yield a table for each metric."""
         headings: tuple[str, ...] = (
             "mean",
             "n",
@@ -123,15 +112,10 @@ class AssistedComparison(Written):
             "weight",
             "equals",
         )
-        for metric in self.metrics if len(self.estimates) else ():
+        for metric in self.metrics:
             own = rows_of(self.estimates[self.estimates["metric"] == metric.name])
             table = Table(headings, [_cells(row, metric) for row in own])
             yield Section(capital(metric.heading), [table], [row["conclusion"] for row in own])
-        if len(self.plan):
-            of_plan = ("manager", "half-width", "runs in each", "conditions", "real runs", "not assisted")
-            by_name = {metric.name: metric for metric in self.metrics}
-            rows = [_plan_cells(row, by_name[row["metric"]]) for row in rows_of(self.plan)]
-            yield Section("Real missions needed", [Table(of_plan, rows, align="ll")])
 
     def remarks(self) -> list[str]:
         """Describe the numbers, and what to know about the data."""
@@ -139,7 +123,7 @@ class AssistedComparison(Written):
             "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
             "equals: real missions that would give the assisted interval alone, as many in each condition as now.",
         )
-        return [*(how if len(self.estimates) else ()), *(f"Note: {note}." for note in self.notes)]
+        return [*how, *(f"Note: {note}." for note in self.notes)]
 
 
 def _cells(row: Row, metric: Metric) -> tuple[str, ...]:
@@ -151,12 +135,6 @@ def _cells(row: Row, metric: Metric) -> tuple[str, ...]:
 
 def _name(row: Row) -> str:
     return f"{row['group']} - {row['other']}" if row["other"] else str(row["group"])
-
-
-def _plan_cells(row: Row, metric: Metric) -> tuple[str, ...]:
-    counts = (row[name] for name in ("runs_each", "conditions", "runs", "runs_alone"))
-    cells = ("not reached" if count is None else f"{count:,.0f}" for count in counts)
-    return row["manager"], f"{metric.title} ±{metric.scale * row['half_width']:g}", *cells
 
 
 # What is compared
@@ -175,7 +153,6 @@ def compare_assisted(
     *,
     managers: Sequence[str] = (),
     metrics: Sequence[str] = (),
-    half_widths: Sequence[str] = (),
 ) -> AssistedComparison:
     """Estimate each manager's means, and the differences between managers, from real missions and simulated ones.
 
@@ -188,7 +165,6 @@ def compare_assisted(
         population: a campaign under many conditions, drawn as those of the real missions were.
         managers: names; empty: all that have real missions.
         metrics: columns of runs.csv; empty: search time and distance inspected.
-        half_widths: METRIC:HALF_WIDTH of intervals for which a plan is made, with the deviations seen here.
 
     Raises:
         InputError: results cannot be read, do not belong together, or are too few.
@@ -196,7 +172,6 @@ def compare_assisted(
     ours, theirs, many = _read(real), _read(same), _read(population)
     groups, notes = missions.grouped(replace(ours, frame=ours.frame.assign(source="")), managers, averages=False)
     chosen = missions.chosen_metrics(metrics or PAPER_METRICS, groups)
-    wanted = missions.read_half_widths(half_widths, chosen)
     names = [group.name for group in groups]
     frames = [pandas.concat([group.frame for group in groups]), theirs.frame, many.frame]
     horizon_s = _check(dict(zip(("real missions", "assisted by", "population"), frames, strict=True)), names, chosen)
@@ -204,19 +179,16 @@ def compare_assisted(
         each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=horizon_s)})
         for each in (*matched(frames[0], theirs.frame, theirs.swept), _with_draws(many))
     )
-    rows, parts = [], []
+    rows = []
     for metric in chosen:
         sides = [_means(frame, CONDITION, metric.name, name) for frame, name in ((in_real, "real"), (in_same, "same"))]
         conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
         draws, shared = _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
-        parts.append(conditions.assign(metric=metric.name))
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
             rows.append(_estimate(both, metric, conditions, draws, shared))
-    of_all = pandas.concat(parts).reset_index()
-    plan = pandas.DataFrame(_plan(drawn, wanted, deviations(of_all), names) if wanted else ())
     notes = [*ours.notes, *theirs.notes, *many.notes, *notes]
-    notes += [*missions.caveats(groups, chosen), *_unlike(theirs, many.frame)]
-    return AssistedComparison(pandas.DataFrame(rows), plan, tuple(notes), chosen, of_all)
+    notes += missions.caveats(groups, chosen)
+    return AssistedComparison(pandas.DataFrame(rows), tuple(notes), chosen)
 
 
 def _check(frames: Mapping[str, pandas.DataFrame], names: Sequence[str], metrics: Sequence[Metric]) -> float:
@@ -259,18 +231,6 @@ def _with_draws(population: Missions) -> pandas.DataFrame:
     frame = population.frame
     drawn = frame.assign(draw=missions.first_alike(frame, missions.runs_sharing_draw(frame)))
     return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
-
-
-def _unlike(same: Missions, population: pandas.DataFrame) -> Iterator[str]:
-    """Say where the population cannot be what the conditions of the real missions were drawn from."""
-    for name in same.swept:
-        if same.frame[name].nunique() > 1 and (name not in population or population[name].nunique() < 2):
-            yield f"the population does not vary {name}, in which the conditions of the real missions differ"
-        elif name in population and pandas.api.types.is_numeric_dtype(population[name]):
-            low, high = population[name].min(), population[name].max()
-            if outside := [f"{value:g}" for value in same.frame[name].unique() if not low <= value <= high]:
-                are = f"{low:.4g} to {high:.4g} in the population, and {missions.listed(outside)} for real missions"
-                yield f"{name} is {are}: they do not seem to be drawn from it"
 
 
 # Estimates
@@ -346,76 +306,3 @@ def _conclusion(row: Row, metric: Metric) -> str:
         return f"{claim}; the simulation does not help."
     equal = f", as that of {row['equal_runs']:,} real missions alone" if row["equal_runs"] is not None else ""
     return f"{claim}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
-
-
-# Plans
-
-
-def deviations(conditions: pandas.DataFrame) -> pandas.DataFrame:
-    """Return how far real missions are from simulated ones under the same conditions.
-
-    Args:
-        conditions: as of AssistedComparison.
-
-    Returns:
-        A row for each manager and metric: manager, metric, conditions, runs, deviation_mean and deviation_std (real -
-        simulated, between conditions, without the chance within), chance_std (of a real mission within a condition).
-    """
-    rows = []
-    for (metric, manager), part in conditions.groupby(["metric", "manager"], sort=False, observed=True):
-        off, within = part["real"] - part["same"], part["real_var"].fillna(part["same_var"])
-        chance = float((within / part["real_n"] + part["same_var"] / part["same_n"]).mean())
-        row = {"manager": manager, "metric": metric, "conditions": len(part), "runs": int(part["real_n"].sum())}
-        row |= {"deviation_mean": off.mean(), "deviation_std": math.sqrt(max(0.0, float(off.var()) - chance))}
-        rows.append(row | {"chance_std": math.sqrt(float(within.mean()))})
-    return pandas.DataFrame(rows)
-
-
-def planned(
-    population: Source,
-    half_widths: Sequence[str],
-    *,
-    managers: Sequence[str] = (),
-    seen: pandas.DataFrame | None = None,
-) -> AssistedComparison:
-    """Plan real missions: how many are needed under how many conditions, with the simulation's help and without.
-
-    Args:
-        population: a campaign under many conditions, drawn as those of the real missions will be.
-        half_widths: METRIC:HALF_WIDTH of the intervals that the means are to have.
-        managers: names; empty: all of the campaign.
-        seen: how far real missions are from simulated ones, as of deviations; None: as those of 2025 (exp1) are.
-
-    Raises:
-        InputError: results cannot be read, or a name is not there.
-    """
-    many = _read(population)
-    groups, notes = missions.grouped(many, managers, averages=False)
-    metrics = missions.chosen_metrics([text.partition(":")[0].strip() for text in half_widths], groups)
-    wanted, names = missions.read_half_widths(half_widths, metrics), [group.name for group in groups]
-    if seen is None:
-        seen = pandas.read_csv(find(DEVIATIONS, "scenarios/published"))
-        notes.append("real missions are taken to be as far from simulated ones as those of 2025 (exp1) are")
-    known = set(zip(seen["manager"], seen["metric"], strict=True))
-    lacking = [f"{metric} of {name}" for metric in wanted for name in names if (name, metric) not in known]
-    if lacking:
-        notes.append(f"how far real missions are from simulated ones is not known for {missions.listed(lacking)}")
-    rows = pandas.DataFrame(_plan(_with_draws(many), wanted, seen, names))
-    return AssistedComparison(pandas.DataFrame(), rows, (*many.notes, *notes), metrics)
-
-
-def _plan(
-    drawn: pandas.DataFrame, wanted: Mapping[str, float], seen: pandas.DataFrame, managers: Sequence[str]
-) -> Iterator[dict[str, Any]]:
-    for row in seen[seen["metric"].isin(list(wanted)) & seen["manager"].isin(managers)].to_dict("records"):
-        draws = _means(drawn[drawn["manager"] == row["manager"]], "draw", row["metric"], "draw")
-        spread, half_width, chance = float(draws["draw"].var()), wanted[row["metric"]], row["chance_std"] ** 2
-        between = max(0.0, spread - chance / float(draws["draw_n"].mean()))
-        fixed = math.sqrt(spread / len(draws))
-        for each in _RUNS_EACH:
-            within = math.hypot(row["deviation_std"], math.sqrt(chance / each))
-            assisted = statistics.runs_for(within, half_width, fixed, LEAST_CONDITIONS) or math.nan
-            apart = math.sqrt(between + chance / each)
-            alone = statistics.runs_for(apart, half_width, least=LEAST_CONDITIONS) or math.nan
-            names = {"manager": row["manager"], "metric": row["metric"], "half_width": half_width, "runs_each": each}
-            yield names | {"conditions": assisted, "runs": each * assisted, "runs_alone": each * alone}

@@ -16,7 +16,7 @@ import numpy as np
 import pandas
 
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.estimates import Estimate, interval_names, known, share_of
+from suave_des.estimates import Estimate, interval_names, share_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.results import statistics
 from suave_des.results.comparison import Comparison, Row, conclusion, overall_conclusion
@@ -27,7 +27,6 @@ from suave_des.results.missions import (
     caveats,
     chosen_metrics,
     counted,
-    first_and_last,
     grouped,
     missions_of,
     mostly_lost,
@@ -211,7 +210,8 @@ def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapp
             continue
         apart = (x - y).dropna()
         if apart.any():
-            ends = first_and_last(apart)
+            runs = apart.index.get_level_values("run")
+            ends = [(float(apart.iloc[at]), int(runs[at])) for at in (int(apart.argmin()), int(apart.argmax()))]
             cells = (text for value, run in ends for text in (metric.number(value), str(run)))
             rows.append((f"{first.name} - {second.name}", *cells))
             firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
@@ -232,16 +232,13 @@ def _conclusions(
     points = dict.fromkeys(group.point for group in groups)
     if len(points) == 1 or len(points) == len(groups):
         points = {"": None}
-    at: dict[str, list[str]] = {}
     for point in points:
         own = [group for group in groups if not point or group.point == point]
         names = [group.name for group in own]
         text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
         if metric.name == SEARCH_TIME:
             text = mostly_lost(own) + text
-        at.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
-    for text, where in at.items():
-        yield f"{'; '.join(where)}: {text}" if where[0] else text
+        yield f"{point.removeprefix(', ')}: {text.replace(point, '')}" if point else text
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:
@@ -319,8 +316,7 @@ def _difference(
     else:
         difference, test = statistics.difference_interval(x, y), statistics.rank_sum_test(x, y)
     row |= _with_method("difference", difference.cut(-1.0, 1.0) if metric.name == FOUND else difference)
-    row |= {"test": test.name, "p": test.p, "p_less": known(test.p_less), "p_greater": known(test.p_greater)}
-    row |= {"effect_name": test.effect.method, **test.effect.columns("effect")}
+    row |= test
     half_width = half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
     return row | _runs_needed(x, y, half_width, is_paired=is_paired)
 
@@ -345,16 +341,10 @@ def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tup
     if x is None or y is None:
         return False, "not paired: real missions, or missions without seed, share no random numbers", *apart
     common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
-    if common.empty:
-        seeds = [", ".join(each.index.unique("seed")[:3]) for each in (x, y)]
-        if seeds[0] != seeds[1]:
-            why = f"not paired: the seeds {seeds[0]} and {seeds[1]} differ, so no random numbers are shared"
-        else:
-            why = "not paired: they have no run number in common"
-        return False, why, *apart
     both = common.dropna()
-    if len(both) < 2 <= min(map(len, apart)):
-        return False, "not paired: fewer than two runs have a value under both", *apart
+    if len(both) < min(2, *map(len, apart)):
+        why = "not paired: fewer than two runs of the same seed and number have a value under both"
+        return False, why, *apart
     left = max(map(len, apart)) - len(both)
     rest = f"; {left} of one without a counterpart are left out" if left and len(both) else ""
     why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"

@@ -407,8 +407,7 @@ def overall_conclusion(
     if claimed:
         sentences.append(_claims(best, metric, claimed, alike, len(tested)))
     elif alike:
-        has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
-        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean,"
+        is_shown = f"No difference in {metric.title} is shown between {best}, which has the best mean,"
         sentences.append(f"{is_shown} and {_and(alike)}.")
     others = [each["conclusion"] for each in against if each["p_holm"] < SIGNIFICANCE and each not in claimed]
     return " ".join([*sentences, *others])

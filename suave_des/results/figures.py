@@ -1,37 +1,274 @@
-"""Draw the contents of results folders: missions, a campaign, or a sweep."""
+"""Figures of results folders: of a mission, and of a campaign distributions, and means over a sweep."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+import io
+import math
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from textwrap import fill
+from types import MappingProxyType
+from typing import Any
 
+import matplotlib
+import numpy as np
 import pandas
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.estimates import mean_of
+from suave_des.files import write_files
+from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
-from suave_des.results import campaign_figures, style
+from suave_des.results import style
 from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
-from suave_des.results.missions import Group, Missions, grouped, missions_of, read_missions
-from suave_des.results.style import key_words
+from suave_des.results.missions import (
+    Group,
+    Missions,
+    first_alike,
+    grouped,
+    missions_of,
+    read_missions,
+    runs_sharing_draw,
+    time_limit_s,
+)
+from suave_des.results.statistics import Sample
+from suave_des.results.style import folded, key_words, value_words
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-AUTO, SWEEP, HEAT_MAP, MAP, TIMELINE = "auto", "sweep", "heatmap", "map", "timeline"
+AUTO, DISTRIBUTIONS, SWEEP, MAP, TIMELINE = "auto", "distributions", "sweep", "map", "timeline"
+_LEGEND_LINE_IN, _HANDLE_IN = 0.2, 0.6
+"""Height of a line of a legend, and width of an entry without its text."""
 
 
-CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
-    "distributions": campaign_figures.draw_distributions,
-    "differences": campaign_figures.draw_differences,
-}
-"""Figures of a campaign's missions by their names."""
-_OF_MEANS = "differences"
-"""What has intervals of means: of runs, as points of a sweep share a run's random numbers. The others show missions;
-means over the points would be what no mission did."""
-KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, HEAT_MAP)
-"""All figures by their names."""
+def draw_distributions(groups: Sequence[Group]) -> style.Picture:
+    """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
+    labels = [*map(_label, groups), "marks at 0%: means"]
+    rows = math.ceil(len(labels) / _legend_columns(labels))
+    legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
+    for axes, metric, title in _metric_panels(figure):
+        end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
+        for number, group in _looks(groups):
+            values = np.sort(group.known_values(metric))
+            shares = np.arange(1, len(values) + 1) / len(values)
+            look = style.line(number)
+            axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look)
+            mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
+            axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
+        axes.set(xlabel=title, xlim=(0.0, end))
+    _mark_limit(figure.axes[0], groups)
+    figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
+    figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
+    curves = [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
+    handles = [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
+    _legend(figure, handles, labels)
+    return figure
+
+
+def _mark_limit(axes: Axes, groups: Sequence[Group]) -> None:
+    """Mark the end of missions that never found the pipeline on an axis of search times, if there are any."""
+    if any((group.values(FOUND) < 1.0).any() for group in groups):
+        limit_s = time_limit_s(groups)
+        axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+        look: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
+        axes.text(limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
+
+
+def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
+    """Make the panels a and b for the metrics of the paper's table; yield each with its metric, and the axis' title."""
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, letter, metric in zip(panels, "ab", PAPER_METRICS, strict=True):
+        axes.set_title(f"{letter}   {METRICS[metric].title.capitalize()}")
+        yield axes, metric, METRICS[metric].heading
+
+
+def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
+    """Yield each group with the number of its look."""
+    return zip(style.looks([group.name for group in groups]), groups, strict=True)
+
+
+def _label(group: Group, width: int = 40) -> str:
+    return style.text(folded(f"{group.name} (n = {len(group.frame):,})", width))
+
+
+def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    figure.legend(handles, labels, loc="outside upper right", ncols=_legend_columns(labels), handlelength=2.8)
+
+
+def _legend_columns(labels: Sequence[str]) -> int:
+    """Return the number of columns with which a legend fits the width of a figure."""
+    most = len(labels) if len(labels) <= 4 else 3
+    widths_in = [_HANDLE_IN + _text_width_in(label) for label in labels]
+    for columns in range(most, 1, -1):
+        if sum(max(column) for column in np.array_split(widths_in, columns)) <= style.WIDTH_IN:
+            return columns
+    return 1
+
+
+def _text_width_in(label: str) -> float:
+    font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
+    return max(float(TextPath((0.0, 0.0), part, prop=font).get_extents().x1) for part in label.split("\n")) / 72.0
+
+
+# Sweeps
+
+_MOST_PARAMETERS = 3
+_MOST_VALUES = 16
+"""A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
+_BINS = 8
+_MOST_TICKS = 6
+"""With more swept values, or where two are closer than so many would be, the axis has round numbers instead."""
+_APART = 0.012
+"""Between managers at the same value, as a share of the axis, so that their intervals do not hide each other."""
+
+
+def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Picture:
+    """Draw means with their 95% intervals over each parameter, the others averaged over, a line for each manager.
+
+    All points of a sweep share the random numbers of a run, so that the runs are the independent values: intervals are
+    those of the means that each run has over the points.
+
+    Args:
+        missions: of a sweep.
+        parameters: to draw; empty: all that are swept.
+
+    Raises:
+        InputError: one of them is not swept, or there are too many for one figure.
+    """
+    parameters = list(parameters or missions.swept)
+    missions.check_swept(parameters, "parameters")
+    for source, part in missions.frame.groupby("source", sort=False):
+        if fixed := [name for name in parameters if part[name].isna().all()]:
+            problem = f"{source} does not vary {', '.join(fixed)}"
+            raise InputError(problem, place="parameters", remedy="leave it out, or choose what all of the sweeps vary")
+    if len(parameters) > _MOST_PARAMETERS:
+        problem = f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
+        raise InputError(problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them")
+    frame, columns = missions.frame, len(parameters)
+    names = _names(frame)
+    width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
+    height_in = 4.0 + 0.2 * math.ceil((names.nunique() + 1) / 3)
+    figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
+    panels = figure.subplots(len(PAPER_METRICS), columns, sharex="col", sharey="row", squeeze=False)
+    counts: list[int] = []
+    for row, metric in zip(panels, PAPER_METRICS, strict=True):
+        for axes, parameter in zip(row, parameters, strict=True):
+            counts += _draw_panel(axes, frame, names, parameter, metric)
+        row[0].set_ylabel(f"mean {METRICS[metric].heading}")
+        row[0].set_ylim(bottom=0.0)
+    for axes, parameter in zip(panels[-1], parameters, strict=True):
+        axes.set_xlabel(_folded(key_words(parameter)))
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    handles.append(Line2D([], [], lw=0, marker="|", ms=8, color=style.GREY))
+    labels.append("95% interval of the mean")
+    ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
+    figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
+    if len(missions.swept) == columns > 1:
+        write_below(figure, f"{_averaged(counts, ())}, each averaged over the parameters of the other panels")
+    else:
+        write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))
+    return figure
+
+
+def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:
+    """Say of how many runs means are, and what they are averaged over besides."""
+    low, high = min(counts), max(counts)
+    of = f"means of n = {low if low == high else f'{low} to {high}'} run{'s' * (high > 1)}"
+    return f"{of}, each averaged over {', '.join(map(key_words, others))}" if others else of
+
+
+def write_below(figure: Figure, text: str) -> None:
+    """Write what a figure shows below it."""
+    figure.supxlabel(fill(text, int(16 * figure.get_figwidth())), fontsize=7.5, color="#555555")
+
+
+def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
+    """Name the curve of each mission: its manager, with its source where there are several."""
+    if frame["source"].nunique() > 1:
+        return frame["manager"] + " (" + frame["source"] + ")"
+    return frame["manager"]
+
+
+def _draw_panel(
+    axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], parameter: str, metric: str
+) -> list[int]:
+    """Draw the means of each manager over a parameter, and return of how many runs they are."""
+    counts = []
+    places, words = _places(frame[parameter])
+    apart = _APART * float(places.max() - places.min())
+    managers = list(dict.fromkeys(names))
+    for place, (number, manager) in enumerate(zip(style.looks(managers), managers, strict=True)):
+        own = names == manager
+        beside = (place - (len(managers) - 1) / 2) * apart
+        counts += _draw_means(axes, frame[own].assign(place=places[own]), metric, beside, number, manager)
+    if words:
+        shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
+        long = max(map(len, words)) > 6 and len(words) > 2
+        axes.set_xticks(range(len(words)), shown_words, rotation=30 if long else 0, ha="right" if long else "center")
+        axes.set_xlim(-0.5, len(words) - 0.5)
+    elif _fit_as_ticks(values := np.unique(places)):
+        axes.set_xticks(values, [f"{value:g}" for value in values])
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+    return counts
+
+
+def _fit_as_ticks(values: Sample) -> bool:
+    """Return whether swept values are few enough, and far enough apart, to be written at the axis."""
+    return 1 < len(values) <= _MOST_TICKS and bool(np.diff(values).min() > np.ptp(values) / _MOST_TICKS)
+
+
+def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
+    """Place missions on the horizontal axis: at the value, or at the number of the word in the order of the sweep."""
+    if pandas.api.types.is_numeric_dtype(parameter) and not pandas.api.types.is_bool_dtype(parameter):
+        return parameter.astype(float), []
+    codes, words = pandas.factorize(parameter)
+    return pandas.Series(codes, parameter.index, dtype=float), [str(word) for word in words]
+
+
+def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str) -> list[int]:
+    """Draw the mean at each place; of very many places, those of equally many missions at their mean place."""
+    key = frame["place"]
+    if key.nunique() > _MOST_VALUES:
+        key = pandas.qcut(key.rank(method="first"), _BINS, labels=False)
+    found, middles, counts = [], [], []
+    for _, part in frame.groupby(key):
+        has_runs = part["run"].notna().all()
+        runs = first_alike(part, runs_sharing_draw(part))
+        by_run = part.groupby(["seed", runs])[metric].mean() if has_runs else part[metric]
+        found.append(mean_of(by_run.dropna().tolist()))
+        counts.append(int(by_run.count()))
+        middles.append(float(part["place"].mean()) + beside)
+    means = np.array([each.value for each in found])
+    low, high = np.array([each.interval or (each.value, each.value) for each in found]).T
+    axes.errorbar(
+        middles,
+        means,
+        yerr=(means - low, high - means),
+        label=style.text(folded(label)),
+        marker=style.marker(number),
+        ms=3.2,
+        capsize=2,
+        elinewidth=0.8,
+        **style.line(number),
+    )
+    return counts
+
+
+def _folded(text: str, width: int = 26) -> str:
+    """Break a long name into lines, so that names stay apart."""
+    return fill(text, width, break_long_words=False)
+
+
+# What is drawn
 
 
 def draw_folder(folder: str | Path, out: str | Path) -> None:
@@ -51,7 +288,7 @@ def draw_results(
     Args:
         folders: one of a mission (trajectory.csv), or of campaigns (runs.csv) and files like these.
         out: picture to write; its ending says which kind.
-        kind: one of KINDS; "auto": of a mission its map, of a campaign the distributions, of a sweep the means.
+        kind: of the figure; "auto": of a mission its map, of a campaign the distributions, of a sweep the means.
         parameters: of a sweep: those to draw; empty: all.
         rules_of: finds the rules behind the adaptations of a mission, for its timeline.
 
@@ -59,21 +296,15 @@ def draw_results(
         InputError: there are no results of that kind in the folders, or the picture cannot be written.
     """
     check_picture(out)
-    if kind not in KINDS:
-        raise InputError(f"there is no figure {shown(kind)}", place="kind", remedy=did_you_mean(kind, KINDS))
-    is_mission, wants_mission = (folders[0] / TRAJECTORY_FILE).is_file(), kind in (MAP, TIMELINE)
-    if is_mission and len(folders) > 1:
-        raise InputError("has a mission, of which one is drawn at a time", file=folders[0], remedy="give one folder")
-    if is_mission != wants_mission and (wants_mission or kind != AUTO):
-        of, command = ("a mission", "run") if wants_mission else ("a campaign", "campaign")
-        remedy = f"give the --out folder of suave-des {command}"
-        raise InputError(f"the figure {kind} is of {of}", file=folders[0], remedy=remedy)
     with style.publication():
-        if is_mission:
-            record = read_mission(folders[0])
-            figure: Figure = draw_timeline(record, rules_of(record)) if kind == TIMELINE else draw_map(record)
-        else:
+        if not (folders[0] / TRAJECTORY_FILE).is_file():
             figure = _of_missions(read_missions(folders), kind, parameters)
+        elif len(folders) > 1:
+            problem = "has a mission, of which one is drawn at a time"
+            raise InputError(problem, file=folders[0], remedy="give one folder")
+        else:
+            record = read_mission(folders[0])
+            figure = draw_mission(record, MAP if kind == AUTO else kind, rules_of(record) if kind == TIMELINE else {})
         write_picture(figure, out)
 
 
@@ -99,24 +330,18 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
     Raises:
         InputError: it cannot be written.
     """
-    temporary = out.with_name(f".{os.getpid()}{out.suffix}")
-    try:
-        figure.savefig(temporary, bbox_inches=bbox_inches, metadata=_UNDATED.get(out.suffix.lower()))
-        temporary.replace(out)
-    except OSError as error:
-        remedy = "give a path in a folder that is yours"
-        raise InputError(f"cannot be written: {error.strerror}", file=out, remedy=remedy) from None
-    finally:
-        with suppress(OSError):  # there may not even be a folder
-            temporary.unlink()
+    picture, metadata = io.BytesIO(), _UNDATED.get(out.suffix.lower())
+    figure.savefig(picture, format=out.suffix[1:].lower(), bbox_inches=bbox_inches, metadata=metadata)
+    write_files(out.parent, {out.name: picture.getvalue()})
 
 
-def draw_mission(record: MissionRecord, kind: str = MAP) -> Figure:
+def draw_mission(record: MissionRecord, kind: str = MAP, rules: Rules = MappingProxyType({})) -> Figure:
     """Draw a mission.
 
     Args:
         record: of the mission.
         kind: MAP or TIMELINE.
+        rules: behind its adaptations, for the timeline.
 
     Raises:
         InputError: there is no such figure of a mission.
@@ -125,7 +350,7 @@ def draw_mission(record: MissionRecord, kind: str = MAP) -> Figure:
         remedy = did_you_mean(kind, (MAP, TIMELINE))
         raise InputError(f"there is no figure {shown(kind)} of a mission", place="kind", remedy=remedy)
     with style.publication():
-        return draw_timeline(record) if kind == TIMELINE else draw_map(record)
+        return draw_timeline(record, rules) if kind == TIMELINE else draw_map(record)
 
 
 def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
@@ -139,20 +364,17 @@ def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
 
 
 def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:
-    if kind in (SWEEP, HEAT_MAP) or (kind == AUTO and missions.swept):
+    if kind == SWEEP or (kind == AUTO and missions.swept):
         if not missions.swept:
             raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")
-        draw = campaign_figures.draw_heat_map if kind == HEAT_MAP else campaign_figures.draw_sweep
-        return draw(missions, parameters)
+        return draw_sweep(missions, parameters)
     if parameters:
         raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
-    name = "distributions" if kind == AUTO else kind
-    if name not in CAMPAIGN_KINDS:
-        raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
-    groups = grouped(missions, averages=name == _OF_MEANS)[0]
-    figure = CAMPAIGN_KINDS[name](groups)
+    if kind not in (AUTO, DISTRIBUTIONS):
+        remedy = did_you_mean(kind, (DISTRIBUTIONS, SWEEP))
+        raise InputError(f"there is no figure {shown(kind)} of a campaign", place="kind", remedy=remedy)
+    figure = draw_distributions(grouped(missions, averages=False)[0])
     if missions.swept:
-        shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)
-        campaign_figures.write_below(figure, f"{shown_are} all points of the sweep: {swept}")
+        write_below(figure, f"missions at all points of the sweep: {swept}")
     return figure

@@ -251,11 +251,8 @@ Rules = Mapping[tuple[float, str], Sequence[str]]
 """Names of the rules that made a function be adapted, by time (s) and function."""
 
 
-class _Line(NamedTuple):
-    """A line of the chart: its name, and spans with colour and text."""
-
-    name: str
-    bars: list[tuple[Span, str, str]]
+_Line = tuple[str, list[tuple[Span, str, str]]]
+"""A line of the chart: its name, and spans with colour and text."""
 
 
 def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) -> style.Picture:
@@ -346,7 +343,7 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
 
 def _lines(record: MissionRecord) -> Iterator[_Line]:
     """Yield the lines of the chart: tasks, the modes of each function, and failures."""
-    yield _Line("task", [(span, _TASK, plain(span.what)) for span in task_spans(record)])
+    yield "task", [(span, _TASK, plain(span.what)) for span in task_spans(record)]
     colours = style.MODE_COLOURS | mode_colours(record)
     for function, spans in mode_spans(record).items():
         bars = []
@@ -355,19 +352,19 @@ def _lines(record: MissionRecord) -> Iterator[_Line]:
                 is_moving = span.what in colours and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
                 colour = colours[span.what] if is_moving else _ON if "recover" not in span.what else style.ORANGE
                 bars.append((span, colour, function_mode_words(function, span.what)))
-        yield _Line(function_words(function), bars)
+        yield function_words(function), bars
     for component, spans in sorted(failure_spans(record).items()):
-        yield _Line(component_words(component), [(span, _FAILED, "failed") for span in spans])
+        yield component_words(component), [(span, _FAILED, "failed") for span in spans]
 
 
 def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
     """Draw a bar for each span; its text is in it or behind it, or in a legend where there is no room for any."""
-    end_s = max((span.end_s for line in lines for span, _, _ in line.bars), default=1.0)
+    end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
     letter_s = _LETTER_IN / _LINES_IN * end_s
     named, unnamed = set[tuple[int, str]](), dict[tuple[int, str], str]()
-    for row, line in enumerate(lines):
-        ends_s = [*(span.begin_s for span, _, _ in line.bars[1:]), end_s]
-        for (span, colour, text), next_s in zip(line.bars, ends_s, strict=True):
+    for row, (_, bars) in enumerate(lines):
+        ends_s = [*(span.begin_s for span, _, _ in bars[1:]), end_s]
+        for (span, colour, text), next_s in zip(bars, ends_s, strict=True):
             width_s = span.end_s - span.begin_s
             axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
             label = style.text(text)
@@ -383,14 +380,14 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
                 continue
             named.add((row, label))
     legend = [
-        Patch(color=colour, label=f"{style.text(lines[row].name)}: {label}")
+        Patch(color=colour, label=f"{style.text(lines[row][0])}: {label}")
         for (row, label), colour in unnamed.items()
         if (row, label) not in named
     ]
     if legend:
         place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
         axes.legend(handles=legend, ncols=4, handlelength=1.2, **place)
-    axes.set_yticks(range(len(lines)), [style.text(line.name) for line in lines])
+    axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
 

@@ -15,7 +15,7 @@ import numpy as np
 import pandas
 from numpy.typing import NDArray
 
-from suave_des.errors import InputError, did_you_mean, number_of, shown
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.files import as_number
 from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
 from suave_des.records.runs import COLUMNS, is_foreign, read_runs
@@ -50,11 +50,6 @@ class Missions:
     swept: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     folders: Mapping[str, Path] = field(default_factory=dict)
-
-    @property
-    def managers(self) -> list[str]:
-        """In the order of their first missions."""
-        return list(dict.fromkeys(self.frame["manager"]))
 
     def check_swept(self, names: Sequence[str], place: str) -> None:
         """Check that a sweep varies these columns.
@@ -119,13 +114,12 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
     missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in plain}
     plain = plain.assign(**missing, source="", **{SHARING: int(frame.attrs.get(SHARING, 1))})
     plain = plain.assign(**{name: plain[name].astype(str) for name in texts})
-    for name in plain:
-        if name == "run" or (name not in texts and metric_of(str(name)) is not None):
-            try:
-                plain[name] = plain[name].astype("Float64").to_numpy(float, na_value=math.nan)
-            except (ValueError, TypeError) as error:
-                problem = f"the data frame's column {name!r} has something that is no number: {error}"
-                raise InputError(problem, remedy="it needs the columns of runs.csv") from None
+    numbers = [str(name) for name in plain if name == "run" or (name not in texts and metric_of(str(name)))]
+    try:
+        plain = plain.astype(dict.fromkeys(numbers, "Float64")).astype(dict.fromkeys(numbers, float))
+    except (ValueError, TypeError) as error:
+        problem = f"the data frame's columns of metrics have something that is no number: {error}"
+        raise InputError(problem, remedy="it needs the columns of runs.csv") from None
     return _checked(Missions(plain, _swept({}, plain)))
 
 
@@ -150,10 +144,10 @@ def _read_file(path: Path, manifest: Mapping[str, Any] = MappingProxyType({})) -
     frame = runs.frame.reset_index(drop=True)
     if frame["scenario"].iloc[0]:
         return _checked(Missions(frame, _swept(manifest, frame), runs.notes), path)
-    return _checked(Missions(_in_papers_order(frame), (), runs.notes), path)
+    return _checked(Missions(in_papers_order(frame), (), runs.notes), path)
 
 
-def _in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
+def in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
     """Sort real missions by manager as in the paper's table, others after these in their own order."""
     ranks = frame["manager"].map(PAPER_ORDER).fillna(len(PAPER_ORDER))
     return frame.iloc[ranks.argsort(kind="stable")].reset_index(drop=True)
@@ -162,17 +156,15 @@ def _in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
 def _read_exemplars_folder(folder: Path) -> Missions:
     """Read all CSV files of a folder that are results; others, such as the exemplar's statistics, are left out."""
     paths = sorted(folder.glob("*.csv"))
-    own = [path for path in paths if not is_foreign(path)]
-    if own or paths:
-        found = [_read_file(path) for path in own or paths[:1]]
-        notes = [f"{path} is left out: it has no columns of missions" for path in paths if path not in own]
-        notes += [note for each in found for note in each.notes]
-        frame = pandas.concat([each.frame for each in found], ignore_index=True)
-        return Missions(_in_papers_order(frame), (), tuple(notes))
-    if inner := sorted(str(path.parent) for path in folder.glob(f"*/{RUNS_FILE}")):
-        raise InputError("has no results itself", file=folder, remedy=f"give the folders in it: {' '.join(inner[:4])}")
-    remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
-    raise InputError("has no result files" if folder.exists() else "no such folder", file=folder, remedy=remedy)
+    own = [path for path in paths if not is_foreign(path)] or paths[:1]
+    if not own:
+        remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+        raise InputError("has no result files" if folder.exists() else "no such folder", file=folder, remedy=remedy)
+    found = [_read_file(path) for path in own]
+    notes = [f"{path} is left out: it has no columns of missions" for path in paths if path not in own]
+    notes += [note for each in found for note in each.notes]
+    frame = pandas.concat([each.frame for each in found], ignore_index=True)
+    return Missions(in_papers_order(frame), (), tuple(notes))
 
 
 def _sharing(manifest: Mapping[str, Any]) -> int:
@@ -185,16 +177,13 @@ def _sharing(manifest: Mapping[str, Any]) -> int:
 
 def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
     """Say how many missions a campaign lacks."""
-    try:
+    with suppress(ValueError, KeyError, TypeError):
         left_out, failed, planned = (int(manifest["missions"][key]) for key in ("left_out", "failed", "planned"))
-    except (ValueError, KeyError, TypeError):
-        return
-    if left_out:
-        how = f"suave-des campaign --resume {folder} runs the rest"
-        are = "is" if left_out == 1 else "are"
-        yield f"{folder} is not finished: {left_out} of {planned} missions {are} missing; {how}"
-    if failed:
-        yield f"{folder}: {failed} of {planned} missions failed and {'is' if failed == 1 else 'are'} missing"
+        if left_out or failed:
+            yield (
+                f"{folder}: of {planned} missions {left_out} are missing and {failed} failed;"
+                f" suave-des campaign --resume {folder} runs those that are missing"
+            )
 
 
 def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, ...]:
@@ -264,20 +253,12 @@ class Group:
         return pandas.MultiIndex.from_frame(self.frame[["seed", "run"]])
 
 
-def first_and_last(values: pandas.Series[float]) -> tuple[tuple[float, int], tuple[float, int]]:
-    """Return the least and the greatest of values by (seed, run), each with its run."""
-    runs = values.index.get_level_values("run").astype(int)
-    known = list(zip(values.tolist(), runs.tolist(), strict=True))
-    return min(known, key=lambda each: each[0]), max(known, key=lambda each: each[0])
-
-
 def counted(groups: Sequence[Group]) -> str:
     """Return what the rows of groups are: "mission", "run", "draw", or "value" where they differ."""
-    if all(group.is_of_missions for group in groups):
-        return "mission"
-    if any(group.is_of_missions for group in groups):
-        return "value"
-    return "draw" if any(runs_sharing_draw(group.frame) > 1 for group in groups) else "run"
+    kinds = {group.is_of_missions for group in groups}
+    if kinds == {False}:
+        return "draw" if any(runs_sharing_draw(group.frame) > 1 for group in groups) else "run"
+    return "mission" if kinds == {True} else "value"
 
 
 def time_limit_s(groups: Sequence[Group]) -> int:
@@ -306,7 +287,7 @@ def grouped(
     Raises:
         InputError: a name is not there, or there are too many groups.
     """
-    frame, known = missions.frame, missions.managers
+    frame, known = missions.frame, list(dict.fromkeys(missions.frame["manager"]))
     for name in managers:
         if name not in known:
             raise InputError(f"there is no mission of {shown(name)}", remedy=did_you_mean(name, known, "there are"))
@@ -333,7 +314,9 @@ def grouped(
         if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
             lacking.append(f"{name} {left} of {left + len(rows)}")
         if (sharing := alike.get(source, 1)) > 1:
-            rows = _means(rows.assign(run=first_alike(rows, sharing)), _runs_of_draws(frame, source, sharing))
+            whole = frame[frame["source"] == source]  # how many runs of a draw there are under any manager
+            draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)["run"].nunique()
+            rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
         groups.append(Group(name, rows, number == sharing == 1, end))
     if lacking and not any(len(group.frame) for group in groups):
         remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
@@ -353,14 +336,11 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[
     labels = ends if len(set(ends)) == len(ends) else by
     names = []
     for manager, source, *values in keys:
-        point = "".join(f", {label} {_short(value)}" for label, value in zip(labels, values, strict=True))
+        texts = (f"{value:g}" if isinstance(value, float) else printable(str(value)) for value in values)
+        point = "".join(f", {label} {text}" for label, text in zip(labels, texts, strict=True))
         of_source = f" ({printable(str(source))})" if len(sources[manager]) > 1 else ""
         names.append((f"{printable(str(manager))}{of_source}{point}", point))
     return names
-
-
-def _short(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else printable(str(value))
 
 
 # What to compare
@@ -395,14 +375,11 @@ def read_half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[st
     found = {}
     for text in texts:
         name, _, number = (part.strip() for part in text.partition(":"))
-        half_width = as_number(number)
-        if name not in names:
-            remedy = did_you_mean(name, names, "compared are")
-            raise InputError(f"{shown(name)} is not compared", place="half-width", remedy=remedy)
-        if not 0.0 < half_width < math.inf:
-            remedy = f"give METRIC:HALF_WIDTH with a number above 0, for instance {SEARCH_TIME}:2"
-            raise InputError(f"{shown(text)} has no half-width", place="half-width", remedy=remedy)
-        found[name] = half_width
+        if name not in names or not 0.0 < as_number(number) < math.inf:
+            remedy = f"give METRIC:HALF_WIDTH, such as {names[0]}:2; metrics are {', '.join(names)}"
+            problem = f"{shown(text)} is no half-width above 0 of what is compared"
+            raise InputError(problem, place="half-width", remedy=remedy)
+        found[name] = as_number(number)
     return found
 
 
@@ -420,28 +397,13 @@ def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
 
 
 def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
-    """Return how many runs of each source are averaged, because they share a draw.
+    """Return by source how many runs are averaged, because some share a draw.
 
-    Campaigns with a seed in common are compared run by run, and so by means over the same runs. Other sources, such as
-    real missions, keep their own number.
+    Campaigns are compared run by run, and so by means over the same runs. Other sources, such as real missions, are not
+    averaged.
     """
-    parts = {str(source): part for source, part in frame.groupby("source", observed=True)}
-    seeds = {source: set(part.loc[part["run"].notna(), "seed"]) - {""} for source, part in parts.items()}
-    return {
-        source: math.lcm(
-            runs_sharing_draw(part),
-            *(runs_sharing_draw(parts[other]) for other in parts if seeds[source] & seeds[other]),
-        )
-        for source, part in parts.items()
-        if part["run"].notna().all()
-    }
-
-
-def _runs_of_draws(frame: pandas.DataFrame, source: str, alike: int) -> pandas.Series[int]:
-    """Return by (seed, first run) how many runs of a draw there are under any manager of a source."""
-    runs = frame[frame["source"] == source]
-    draws = runs.assign(draw=first_alike(runs, alike)).groupby(["seed", "draw"], observed=True)
-    return draws["run"].nunique()
+    are_runs = (frame["run"].notna() & (frame["seed"] != "")).groupby(frame["source"], observed=True).all()
+    return dict.fromkeys(map(str, are_runs.index[are_runs]), runs_sharing_draw(frame))
 
 
 def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.DataFrame:
@@ -469,11 +431,11 @@ def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.
 def _notes(
     groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame, alike_by_source: Mapping[str, int]
 ) -> Iterator[str]:
-    for alike in sorted({each for each in alike_by_source.values() if each > 1}):
-        sources = [source for source, each in alike_by_source.items() if each == alike]
-        is_one = frame.loc[frame["source"].isin(sources), SHARING].eq(alike).all()
+    if (alike := max(alike_by_source.values(), default=1)) > 1:
+        is_one = frame.loc[frame["source"].isin(list(alike_by_source)), SHARING].eq(alike).all()
         what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs, of which some share a draw"
-        of = "" if len(sources) == frame["source"].nunique() else f" of {', '.join(map(printable, sources))}"
+        others = len(alike_by_source) < frame["source"].nunique()
+        of = f" of {', '.join(map(printable, alike_by_source))}" if others else ""
         yield (
             f"the values of {what} (runs_per_draw){of} are averaged: draws are independent, and runs are not; n and the"
             f" runs needed{of and ' there'} are numbers of {'draws' if is_one else 'these averages'}"
@@ -489,9 +451,8 @@ def _notes(
             f"runs have {members} sets of parameters (an ensemble): intervals and tests are for chance among runs with"
             " these sets; how much the sets differ is in ensemble.csv"
         )
-    scenarios = [name for name in dict.fromkeys(frame["scenario"]) if name]
-    if len(scenarios) > 1:
-        yield f"the missions are of different scenarios: {', '.join(scenarios)}"
+    if len(scenarios := set(frame["scenario"]) - {""}) > 1:
+        yield f"the missions are of different scenarios: {', '.join(sorted(scenarios))}"
     few = min(len(group.frame) for group in groups)
     if few < _FEW:
         rough = f"intervals and numbers of runs needed from fewer than {_FEW} are rough"
@@ -513,9 +474,9 @@ def mostly_lost(groups: Sequence[Group]) -> str:
     """Say which groups did not find the pipeline in most of their missions; empty if all found it in half of them."""
     lost = [(group, 1.0 - group.known_values(FOUND)) for group in groups if len(group.known_values(FOUND))]
     counts = [
-        f"{group.name} in {shares.sum():.0f} of {number_of(len(shares), 'mission')}"
-        if group.is_of_missions
-        else f"{group.name} in {shares.mean():.0%} of its missions"
+        f"{group.name} in "
+        + (f"{shares.sum():.0f} of {len(shares)}" if group.is_of_missions else f"{shares.mean():.0%} of its")
+        + " missions"
         for group, shares in lost
         if shares.mean() > 0.5
     ]
@@ -524,34 +485,24 @@ def mostly_lost(groups: Sequence[Group]) -> str:
 
 
 def _never_found(groups: Sequence[Group]) -> Iterator[str]:
-    counts, ends_s, early = [], {}, []
+    counts, ends = [], []
     for group in groups:
-        found, times_s = group.values(FOUND), group.values(SEARCH_TIME)
-        lost = found < 1.0
-        if lost.any() and group.is_of_missions:
-            counts.append(f"{group.name} {int(lost.sum())} of {len(found)}")
-            first_s, last_s = float(times_s[lost].min()), float(times_s[lost].max())
-            ends_s[group.name] = float(np.median(times_s[lost]))
-            if last_s - first_s > SAME_LIMIT_S:
-                early.append(f"{group.name} after {first_s:.0f} to {last_s:.0f} s")
-        elif lost.any():
-            counts.append(f"{group.name} {1.0 - np.nanmean(found):.1%}")
-    ended = (
-        f"the search time of missions that never found the pipeline ({listed(counts)}) is the time at which they ended"
-    )
-    if early:
+        is_lost = group.values(FOUND) < 1.0
+        if is_lost.any() and group.is_of_missions:
+            times_s = group.values(SEARCH_TIME)[is_lost]
+            counts.append(f"{group.name} {len(times_s)} of {len(is_lost)}")
+            ends.append((group.name, times_s.min(), times_s.max()))
+        elif is_lost.any():
+            counts.append(f"{group.name} {1.0 - np.nanmean(group.values(FOUND)):.1%}")
+    ended = f"the search time of missions that never found the pipeline ({listed(counts)}) is the time at which they"
+    if ends and max(high for *_, high in ends) - min(low for _, low, _ in ends) > SAME_LIMIT_S:
+        times = [f"{name} after {low:.0f}{f' to {high:.0f}' if high > low else ''} s" for name, low, high in ends]
         yield (
-            f"{ended}, some of them before others ({listed(early)}): a mean search time is then not the mean up to one"
-            " limit, and a mission that ends early counts as a short search; compare the share that found the pipeline"
+            f"{ended} ended, which differs ({listed(times)}): a mission that ends early counts as a short search, and"
+            " means, differences and tests of the search time do not compare it; compare the share that found it"
         )
     elif counts:
-        yield f"{ended}: a mean search time is the mean up to that limit, and would be longer without it"
-    if not early and ends_s and max(ends_s.values()) - min(ends_s.values()) > SAME_LIMIT_S:
-        limits = listed([f"{name} after {end_s:.0f} s" for name, end_s in ends_s.items()])
-        yield (
-            f"missions that never found the pipeline ended at different times ({limits}): means, differences and tests"
-            " of the search time are not comparable, but the means to the same limit are"
-        )
+        yield f"{ended} ended: a mean search time is the mean up to that limit, and would be longer without it"
 
 
 def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas
 
 from suave_des.errors import InputError, number_of
-from suave_des.estimates import Estimate, mean_of, std_of
+from suave_des.estimates import mean_of, std_of
 from suave_des.records.metrics import DISTANCE, METRICS, PAPER_METRICS, SEARCH_TIME
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
-from suave_des.results.missions import PAPER_ORDER, Group
+from suave_des.results.comparison import estimate_in, rows_of
+from suave_des.results.missions import in_papers_order
 from suave_des.results.statistics import difference_interval
+from suave_des.results.validation import sample
 from suave_des.tables import Table, markdown_text
 
 _CLAIMS = {SEARCH_TIME: "find the pipeline sooner", DISTANCE: "inspect more of it"}
@@ -29,44 +31,45 @@ class PaperComparison:
     """The paper's table beside ours.
 
     Attributes:
-        published: groups of the published runs, managers in the order of the paper's table.
-        ours: groups of our missions, of the same managers.
-        figures: by manager, metric, and "mean" or "std": the paper's figure and ours, with 95% intervals; nan where
-            there are too few missions.
+        figures: a row for each manager, in the order of the paper's table, metric, and statistic ("mean" or "std"): the
+            paper's figure (paper) and ours (here), each with the ends of its 95% interval; nan where there are too few
+            missions.
+        published: missions behind the paper's table.
+        ours: missions of the same managers.
     """
 
-    published: tuple[Group, ...]
-    ours: tuple[Group, ...]
-    figures: dict[tuple[str, str, str], tuple[Estimate, Estimate]]
+    figures: pandas.DataFrame
+    published: pandas.DataFrame
+    ours: pandas.DataFrame
+
+    @property
+    def managers(self) -> Sequence[str]:
+        """In the order of the paper's table."""
+        return list(self.figures["manager"].unique())
 
     def table(self, metric: str = "") -> Table:
         """Return the figures as text; of one metric or, with a column for that, of both."""
         rows = []
-        for (manager, name, statistic), (paper, ours) in self.figures.items():
-            if metric in ("", name):
-                known = [paper.value == paper.value, ours.value == ours.value]
-                apart = f"{ours.value - paper.value:+.2f}" if all(known) else ""
-                figures = (f"{paper.value:.2f}", paper.text(".1f"), f"{ours.value:.2f}" if known[1] else "")
-                mark = MARK if known[1] and not paper.contains(ours.value) else ""
-                names = (manager, statistic) if metric else (manager, METRICS[name].heading, statistic)
-                rows.append((*names, *figures, ours.text(".1f"), apart, mark))
+        for row in rows_of(self.figures[self.figures["metric"].isin([metric] if metric else PAPER_METRICS)]):
+            paper, ours = estimate_in(row, "paper"), estimate_in(row, "here")
+            is_known = row["here"] is not None
+            figures = (f"{paper.value:.2f}", paper.text(".1f"), f"{ours.value:.2f}" if is_known else "")
+            apart = f"{ours.value - paper.value:+.2f}" if is_known else ""
+            mark = MARK if is_known and not paper.contains(ours.value) else ""
+            names = (row["manager"], *([] if metric else [METRICS[row["metric"]].heading]), row["statistic"])
+            rows.append((*names, *figures, ours.text(".1f"), apart, mark))
         names = ("manager", "") if metric else ("manager", "metric", "")
         headings = (*names, "paper", "95% interval", "here", "95% interval", "difference", "")
         return Table(headings, rows, METRICS[metric].heading if metric else "", f"{'l' * len(names)}rrrrrl")
 
     def remarks(self) -> Iterator[str]:
         """Summarise the comparison in sentences."""
-        known = [(paper, ours) for paper, ours in self.figures.values() if ours.value == ours.value]
-        inside = sum(paper.contains(ours.value) for paper, ours in known)
-        yield f"Paper: {_sizes(self.published)}. Here: {_sizes(self.ours)}. Difference = here - paper."
-        if not known:
-            yield "There are too few missions for any figure."
-        elif inside == len(known):
-            yield f"All {inside} figures lie in the 95% intervals of the paper's."
-        else:
-            outside = f"the one marked {MARK} does" if len(known) - inside == 1 else f"those marked {MARK} do"
-            lie = "lies" if inside == 1 else "lie"
-            yield f"{inside} of {len(known)} figures {lie} in the 95% intervals of the paper's; {outside} not."
+        sizes = self._sizes(self.published), self._sizes(self.ours)
+        yield f"Paper: {sizes[0]}. Here: {sizes[1]}. Difference = here - paper."
+        known = self.figures.dropna(subset="here")
+        inside = int(known["here"].between(known["paper_ci95_low"], known["paper_ci95_high"]).sum())
+        rest = f"; those marked {MARK} do not" if inside < len(known) else ""
+        yield f"{inside} of {number_of(len(known), 'figure')} lie in the 95% intervals of the paper's{rest}."
         yield (
             "Intervals: Student's t for means; chi-square for standard deviations, a rough guide only, because it"
             " assumes normally distributed values."
@@ -74,9 +77,16 @@ class PaperComparison:
         for metric, claim in _CLAIMS.items():
             yield from self._claim(metric, claim)
 
+    def _sizes(self, missions: pandas.DataFrame) -> str:
+        """Describe the number of missions of each manager."""
+        sizes = {name: int((missions["manager"] == name).sum()) for name in self.managers}
+        if len(set(sizes.values())) == 1:
+            return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager"
+        return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
+
     def _claim(self, metric: str, claim: str) -> Iterator[str]:
         """Say whether metacontrol is the best on average, as in the paper, and what could be chance."""
-        samples = {group.name: each for group in self.ours if len(each := group.known_values(metric))}
+        samples = {name: each for name in self.managers if len(each := sample(self.ours, name, metric))}
         best = samples.pop("metacontrol", None)
         if best is None or not samples:
             return
@@ -109,24 +119,15 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
     Raises:
         InputError: the file cannot be read, or has fewer than two runs of a manager.
     """
-    theirs = read_runs(published or published_runs()).frame
-    names = sorted(theirs["manager"].unique(), key=lambda name: (PAPER_ORDER.get(name, len(PAPER_ORDER)), name))
-    known, ours = (tuple(Group(name, frame[frame["manager"] == name]) for name in names) for frame in (theirs, runs))
-    figures = {}
-    for groups in zip(known, ours, strict=True):
+    theirs = in_papers_order(read_runs(published or published_runs()).frame)
+    rows = []
+    for manager in theirs["manager"].unique():
         for metric in PAPER_METRICS:
             for statistic, estimate in (("mean", mean_of), ("std", std_of)):
-                paper, here = (estimate(group.known_values(metric).tolist()) for group in groups)
+                paper, here = (estimate(sample(side, manager, metric).tolist()) for side in (theirs, runs))
                 if not paper.has_interval:
-                    problem = f"fewer than two published runs of {groups[0].name}"
+                    problem = f"fewer than two published runs of {manager}"
                     raise InputError(problem, place=metric, remedy="an interval needs two or more")
-                figures[groups[0].name, metric, statistic] = paper, here
-    return PaperComparison(known, ours, figures)
-
-
-def _sizes(groups: tuple[Group, ...]) -> str:
-    """Describe the number of missions of each manager."""
-    sizes = {group.name: len(group.frame) for group in groups}
-    if len(set(sizes.values())) == 1:
-        return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager"
-    return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
+                row = {"manager": manager, "metric": metric, "statistic": statistic}
+                rows.append(row | paper.columns("paper") | here.columns("here"))
+    return PaperComparison(pandas.DataFrame(rows), theirs, runs)

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from suave_des.campaign.spec import read_campaign_file
-from suave_des.campaign.variation import Sweep, Variation, cell_of, check_drawn, vary
+from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
 from suave_des.errors import InputError, did_you_mean, line_error, number_of
 from suave_des.records.runs import Runs, read_runs
 from suave_des.resources import shipped_folder
-from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
+from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
 from suave_des.scenario.schema import validated
 from suave_des.scenario.yamlfile import read_yaml
@@ -351,40 +351,26 @@ def matched(
     return real, simulated
 
 
-def read_varied(campaign: str | Path, **replacements: Unpack[Replacements]) -> tuple[LoadedScenario, Variation, str]:
-    """Read a campaign file's scenario, and what the file sweeps and perturbs; of a scenario, that nothing varies.
+def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
+    """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
 
     Args:
         campaign: path of a campaign or scenario file, or name of a shipped one.
         replacements: of the scenario's files, as of load_scenario.
 
-    Returns:
-        The scenario, what varies in it, and the scenario's own file as a further scenario can name it.
-
     Raises:
         InputError: a file cannot be used.
     """
     file = read_campaign_file(campaign)
-    if file is None:
-        return load_scenario(campaign, **replacements), Variation(), str(campaign)
-    settings, loaded = file.settings, load_scenario(file.scenario, **replacements)
+    if file is None or not file.settings.sweep:
+        return None
+    loaded, settings = load_scenario(file.scenario, **replacements), file.settings
     try:
         varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw)
         check_drawn(*varied)
     except InputError as error:
         raise file.located(error) from None
-    return *varied, str(file.scenario)
-
-
-def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
-    """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
-
-    Arguments and errors are those of read_varied.
-    """
-    file = read_campaign_file(campaign)
-    if file is None or not file.settings.sweep:
-        return None
-    return Conditions.of(read_varied(campaign, **replacements)[1].sweep)
+    return Conditions.of(varied[1].sweep)
 
 
 def published_for(scenario: str | Path) -> Path | None:

@@ -11,8 +11,9 @@ import warnings
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -23,8 +24,6 @@ from suave_des.estimates import CONFIDENCE, Estimate, mean_of, t_quantile
 
 Sample = NDArray[np.float64]
 
-EXTRA = "compare"
-"""The extra that installs statsmodels and lifelines."""
 SIGNIFICANCE = 0.05
 WELCH, NEWCOMBE, BONETT_PRICE = "Welch's t", "Newcombe", "Bonett and Price"
 WILCOXON, MANN_WHITNEY = "Wilcoxon signed-rank", "Mann-Whitney"
@@ -48,7 +47,7 @@ def library(module: str) -> Any:
         return import_module(module)
     except ImportError:
         problem = f"comparisons need {module.split('.')[0]}, which is not installed"
-        raise InputError(problem, remedy=f"pip install 'suave-des[{EXTRA}]'") from None
+        raise InputError(problem, remedy="pip install 'suave-des[compare]'") from None
 
 
 @contextmanager
@@ -176,33 +175,21 @@ def search_times(times_s: Sample, found: NDArray[np.bool_], horizon_s: float) ->
 
 # Tests
 
+Test = dict[str, Any]
+"""Columns of a comparison: test, p (two-sided), p_less (one-sided: that the first is not less than the second),
+p_greater, effect_name, and effect with the ends of its interval; None for what a test does not have."""
+
 _NONE = Estimate()
 
 
-@dataclass(frozen=True, slots=True)
-class Test:
-    """A test of two samples, and the effect that belongs to it; nan for what the test does not have.
-
-    Attributes:
-        name: of the test.
-        p: two-sided.
-        p_less: one-sided: that the first is not less than the second; likewise p_greater.
-        effect: its size, whose method is what it is.
-    """
-
-    __test__ = False  # for pytest
-
-    name: str
-    p: float
-    p_less: float = math.nan
-    p_greater: float = math.nan
-    effect: Estimate = _NONE
+def _test(name: str, found: Sequence[Any], effect: Estimate = _NONE) -> Test:
+    """Return the columns of a test, from what each of _ALTERNATIVES gives."""
+    ps = dict(zip(("p", "p_less", "p_greater"), (float(each.pvalue) for each in found), strict=True))
+    return {"test": name, **ps, "effect_name": effect.method, **effect.columns("effect")}
 
 
-def _ps(found: Sequence[Any]) -> tuple[float, float, float]:
-    """Return the p-values of a test with each of _ALTERNATIVES."""
-    p, p_less, p_greater = (float(each.pvalue) for each in found)
-    return p, p_less, p_greater
+_SAME = (SimpleNamespace(pvalue=1.0),) * 3
+"""What the alternatives give for equal samples."""
 
 
 def signed_rank_test(first: Sample, second: Sample) -> Test:
@@ -215,11 +202,11 @@ def signed_rank_test(first: Sample, second: Sample) -> Test:
 
     differing = int(np.count_nonzero(first != second))
     if differing == 0:
-        return Test(WILCOXON, 1.0, 1.0, 1.0, Estimate(0.0, method=RANK_BISERIAL))
+        return _test(WILCOXON, _SAME, Estimate(0.0, method=RANK_BISERIAL))
     with _quiet():
         found = [wilcoxon(first, second, alternative=each) for each in _ALTERNATIVES]
     effect = 4.0 * float(found[-1].statistic) / (differing * (differing + 1)) - 1.0
-    return Test(WILCOXON, *_ps(found), Estimate(effect, method=RANK_BISERIAL))
+    return _test(WILCOXON, found, Estimate(effect, method=RANK_BISERIAL))
 
 
 def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asymptotic"] = "auto") -> Test:
@@ -231,10 +218,10 @@ def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asympto
     from scipy.stats import mannwhitneyu
 
     if np.ptp(np.concatenate([first, second])) == 0.0:
-        return Test(MANN_WHITNEY, 1.0, 1.0, 1.0, Estimate(0.5, method=A12))
+        return _test(MANN_WHITNEY, _SAME, Estimate(0.5, method=A12))
     found = [mannwhitneyu(first, second, alternative=each, method=method) for each in _ALTERNATIVES]
     effect = Estimate(float(found[0].statistic) / (len(first) * len(second)), method=A12)
-    return Test(MANN_WHITNEY, *_ps(found), effect)
+    return _test(MANN_WHITNEY, found, effect)
 
 
 def rank_sum_test(first: Sample, second: Sample) -> Test:
@@ -245,8 +232,8 @@ def rank_sum_test(first: Sample, second: Sample) -> Test:
     with _quiet():
         ranks = library("statsmodels.stats.nonparametric").rank_compare_2indep(first, second)
         low, high = ranks.conf_int(alpha=1.0 - CONFIDENCE)
-    effect = _with_interval(found.effect.value, low, high, A12).cut(0.0, 1.0)  # none of samples that do not overlap
-    return replace(found, effect=effect)
+    effect = _with_interval(found["effect"], low, high, A12).cut(0.0, 1.0)  # none of samples that do not overlap
+    return found | effect.columns("effect")
 
 
 def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Test:
@@ -254,14 +241,14 @@ def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Test:
     from scipy.stats import fisher_exact
 
     table = [[count, n - count] for count, n in (first, second)]
-    return Test(FISHER, *_ps([fisher_exact(table, alternative=each) for each in _ALTERNATIVES]))
+    return _test(FISHER, [fisher_exact(table, alternative=each) for each in _ALTERNATIVES])
 
 
 def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Test:
     """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the two differ."""
     both = [[int(np.sum((first == row) & (second == column))) for column in (True, False)] for row in (True, False)]
     found = library("statsmodels.stats.contingency_tables").mcnemar(both, exact=True)
-    return Test(MCNEMAR, min(1.0, float(found.pvalue)))
+    return {"test": MCNEMAR, "p": min(1.0, float(found.pvalue)), "effect_name": ""}
 
 
 def holm(ps: Sequence[float]) -> list[float]:
@@ -293,14 +280,6 @@ def runs_for(spread: float, half_width: float, fixed: float = 0.0, least: int = 
 
 
 # Distributions, and conclusions from small samples: what a validation asks
-
-
-def kolmogorov_smirnov(first: Sample, second: Sample) -> tuple[float, float]:
-    """Return distance and p of the two-sample, two-sided Kolmogorov-Smirnov test; with ties its p is too high."""
-    from scipy.stats import ks_2samp
-
-    found = ks_2samp(first, second)
-    return float(found.statistic), float(found.pvalue)
 
 
 def anderson_darling(

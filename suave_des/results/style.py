@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -35,7 +36,6 @@ _KNOWN_MANAGERS = ("none", "random", "metacontrol", "bt")
 """They have the same look in every figure: that of their place here."""
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 _MARKERS = "osD^v<>PX"
-_HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
 
 MODE_COLOURS = {
     "fd_spiral_low": "#7FB8DA",
@@ -50,35 +50,9 @@ MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 
 """Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
 OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
 
-_SETTINGS: Any = {
-    "font.family": "sans-serif",
-    "font.size": 8.0,
-    "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.7,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#E3E3E3",
-    "grid.linewidth": 0.5,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "legend.fontsize": 7.5,
-    "legend.frameon": False,
-    "lines.linewidth": 1.2,
-    "figure.dpi": 100,
-    "savefig.dpi": 300,
-    "pdf.fonttype": 42,  # text stays text
-    "svg.fonttype": "none",
-    "svg.hashsalt": "suave-des",  # equal data give equal files
-}
-
 
 def looks(names: Sequence[str]) -> list[int]:
-    """Return for each manager the number of its look, which `line`, `marker` and `hatch` take.
+    """Return for each manager the number of its look, which `line` and `marker` take.
 
     Those of the exemplar keep theirs whoever is shown, and no other manager has one of these.
     """
@@ -96,11 +70,6 @@ def marker(number: int) -> str:
     return _MARKERS[number % len(_MARKERS)]
 
 
-def hatch(number: int) -> str:
-    """Return the hatching of an area, by the number of its manager, for print without colours."""
-    return _HATCHES[number % len(_HATCHES)]
-
-
 def text(name: str) -> str:
     """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a leading underscore."""
     return (f" {name}" if name.startswith("_") else name).replace("$", r"\$")
@@ -110,22 +79,17 @@ class Picture(Figure):
     """A figure that a notebook shows without further settings."""
 
     def _repr_png_(self) -> bytes:
+        picture = io.BytesIO()
         with publication():
-            return png(self, dpi=160)
+            self.savefig(picture, format="png", dpi=160)
+        return picture.getvalue()
 
 
 @contextmanager
 def publication() -> Iterator[None]:
     """Draw figures in the one style; matplotlib's own settings are restored afterwards."""
-    with matplotlib.rc_context(_SETTINGS):
+    with matplotlib.rc_context(fname=Path(__file__).with_name("figures.mplstyle")):
         yield
-
-
-def png(figure: Figure, dpi: int = 300) -> bytes:
-    """Write a figure as PNG; equal figures give equal bytes."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})  # else matplotlib's version is in it
-    return buffer.getvalue()
 
 
 # Words instead of names from files

@@ -11,8 +11,6 @@ import numpy as np
 import pandas
 import pytest
 
-from suave_des.results.assisted import compare_assisted, deviations
-
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "analysis"
 SCRIPTS = sorted(FOLDER.glob("*.py"))
@@ -173,9 +171,6 @@ def test_the_committed_facts_are_those_of_the_published_runs(study, table):
     pandas.testing.assert_frame_equal(getattr(study("published_facts"), table)(), before)
 
 
-DEVIATIONS = ROOT / "scenarios" / "published" / "planta_exp1_deviations.csv"
-
-
 def test_intervals_hold_the_mean_of_whatever_plays_the_real_system(study):
     module = study("assisted")
     chance = np.random.default_rng(1)
@@ -186,21 +181,6 @@ def test_intervals_hold_the_mean_of_whatever_plays_the_real_system(study):
         rows = list(module.coverage(real, simulator, [(3, 2), (6, 1), (12, 1)], 200))
         assert min(row["assisted"] for row in rows) >= 0.91
     assert next(module.coverage(real, useful, [(6, 1)], 200))["assisted_half"] < 15.0
-
-
-def test_the_shipped_deviations_are_those_of_the_published_missions(study):
-    module = study("assisted")
-    same = module.under_real_conditions(4, 1)
-    drawn = same.drop(columns=[name for name in same if "." in name])
-    drawn = drawn.assign(run=drawn.groupby("manager", observed=True).cumcount() + 1)
-    found = deviations(compare_assisted([module.REAL], same, drawn, metrics=module.METRICS).conditions)
-    shipped = pandas.read_csv(DEVIATIONS)
-    assert list(found.columns) == list(shipped.columns)
-    keys = ["manager", "metric", "conditions", "runs"]
-    pandas.testing.assert_frame_equal(found[keys].astype(str), shipped[keys].astype(str))
-    assert found["chance_std"].to_numpy() == pytest.approx(shipped["chance_std"].to_numpy(), abs=1e-3)
-    near = shipped["chance_std"] / 2.0 + 1.0
-    assert ((found["deviation_mean"] - shipped["deviation_mean"]).abs() < near).all()
 
 
 def test_the_committed_conclusion_is_of_the_committed_tables(study):

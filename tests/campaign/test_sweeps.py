@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
-from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, read_missions
+from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import AWKWARD, rows_of

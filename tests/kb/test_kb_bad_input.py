@@ -6,7 +6,7 @@ import pytest
 
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
-from suave_des.records.knowledge import KNOWLEDGE_FILE, knowledge_text
+from suave_des.records.mission_folder import KNOWLEDGE_FILE, knowledge_text
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 

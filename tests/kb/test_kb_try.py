@@ -8,7 +8,7 @@ import pytest
 from suave_des import run_mission
 from suave_des.errors import InputError
 from suave_des.kb.replay import try_rules
-from suave_des.records.knowledge import (
+from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
     knowledge_text,

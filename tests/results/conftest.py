@@ -11,8 +11,8 @@ Missions = Callable[..., pandas.DataFrame]
 
 @pytest.fixture(scope="module")
 def few_resamples() -> Iterator[None]:
-    """Has validations permute and subsample a tenth as often as users have them, and draw small figures."""
-    from suave_des.results import statistics, style
+    """Has validations permute and subsample a tenth as often as users have them."""
+    from suave_des.results import statistics
 
     with pytest.MonkeyPatch.context() as patch:
         for function, times in (
@@ -20,7 +20,6 @@ def few_resamples() -> Iterator[None]:
             (statistics.agreement, {"subsamples": statistics.SUBSAMPLES // 10}),
         ):
             patch.setattr(statistics, function.__name__, partial(function, **times))
-        patch.setattr(style, "png", partial(style.png, dpi=60))
         yield
 
 

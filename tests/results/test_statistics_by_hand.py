@@ -82,7 +82,7 @@ def test_the_mean_to_the_limit_has_the_interval_of_a_sample_though_missions_end_
 def test_the_effect_of_pairs_is_the_rank_biserial_correlation_of_those_that_differ():
     # Ranks of the differences 3, -1, 2, 4: 3, 1, 2, 4; those in favour have 9 of 10, so r = (9 - 1) / 10.
     first, second = np.array([13.0, 9.0, 12.0, 14.0, 7.0]), np.array([10.0, 10.0, 10.0, 10.0, 7.0])
-    assert statistics.signed_rank_test(first, second).effect.value == pytest.approx(0.8)
+    assert statistics.signed_rank_test(first, second)["effect"] == pytest.approx(0.8)
 
 
 def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_differences():
@@ -267,10 +267,10 @@ class TestManagers:
     def test_the_conclusion_has_scipys_p_and_says_which_is_greater(self):
         first, second = normal(100, 20, 20, 1), normal(140, 20, 20, 2)
         found = mann_whitney(first, second, "asymptotic")
-        for p, each in ((found.p_less, "less"), (found.p_greater, "greater"), (found.p, "two-sided")):
+        for p, each in ((found["p_less"], "less"), (found["p_greater"], "greater"), (found["p"], "two-sided")):
             assert p == pytest.approx(stats.mannwhitneyu(first, second, alternative=each, method="asymptotic").pvalue)
-        assert sign_of(found.p_less, found.p_greater) == -1
-        assert sign_of(found.p_greater, found.p_less) == 1
+        assert sign_of(found["p_less"], found["p_greater"]) == -1
+        assert sign_of(found["p_greater"], found["p_less"]) == 1
         assert sign_of(0.05, 0.05) == 0
 
     def test_subsamples_agree_with_a_clear_conclusion_and_not_with_its_opposite(self):

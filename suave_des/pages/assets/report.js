@@ -243,7 +243,7 @@ function drawRun() {
 }
 
 function drawCommand() {
-  const canReplay = DATA.folders.length === 1 && made[0].facts.length > 0 && columns.run[0] !== null;
+  const canReplay = DATA.folders.length === 1 && Object.keys(made[0].manifest).length > 0 && columns.run[0] !== null;
   const command = `suave-des replay ${quoted(DATA.folders[0])} --run ${state.run} --managers ${quoted(groups[state.group] ?? '')} --open`;
   byId('run-command').replaceChildren(...(canReplay ? [element('span', {}, 'watch it:'), element('code', {}, command), element('button', {
     type: 'button', onclick: (event) => { navigator.clipboard?.writeText(command); event.target.textContent = 'copied'; },
@@ -324,14 +324,15 @@ function writeText() {
     element('ul', {}, ...results.remarks.map((each) => element('li', {}, each)))));
   byId('how').append(element('h2', {}, 'How it was made'), ...made.map((each) => element('details', { class: 'block', open: '' },
     element('summary', {}, each.folder),
-    each.facts.length ? element('dl', {}, ...each.facts.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])) : element('p', {}, 'There is no manifest.json that says how these were made.'),
+    Object.keys(each.manifest).length ? null : element('p', {}, 'There is no manifest.json that says how these were made.'),
     each.command ? element('div', {}, element('p', {}, 'To repeat it:'), element('pre', {}, element('code', {}, each.command))) : null,
-    listed('Files that went into it (SHA-256)', each.inputs), listed('Versions', each.versions))));
+    listed('manifest.json', Object.fromEntries(Object.entries(each.manifest).filter(([, value]) => typeof value === 'string'))),
+    ...Object.entries(each.manifest).map(([key, value]) => (typeof value === 'string' ? null : listed(key.replaceAll('_', ' ').replace('sha256', 'SHA-256'), value))))));
   byId('made-by').textContent = `suave-des ${DATA.version}`;
 }
 
 const listed = (title, entries) => (Object.keys(entries).length ? element('details', {}, element('summary', {}, title), element('dl', {},
-  ...Object.entries(entries).flatMap(([name, value]) => [element('dt', {}, name), element('dd', { class: 'mono' }, value)]))) : null);
+  ...Object.entries(entries).flatMap(([name, value]) => [element('dt', {}, name), element('dd', { class: 'mono' }, typeof value === 'object' ? JSON.stringify(value) : String(value))]))) : null);
 
 function makeTools() {
   const chip = (number) => element('button', {
