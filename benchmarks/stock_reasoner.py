@@ -22,7 +22,7 @@ from typing import Any
 import owlready2
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, WATER_VISIBILITY
-from suave_des.knowledge.pellet.java import java_executable
+from suave_des.knowledge.pellet.in_process import java_executable
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.resources import shipped_folder
 

@@ -8,8 +8,7 @@ import random
 from collections.abc import Callable, Mapping
 from operator import attrgetter
 
-from suave_des.scenario.models import Scenario
-from suave_des.scenario.quantities import Distribution, Drawn, draw
+from suave_des.scenario.models import Distribution, Drawn, Scenario, draw
 
 
 class Streams:

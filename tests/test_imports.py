@@ -36,7 +36,7 @@ print(scipy.linalg.det(numpy.eye(2)))
 
 REASONING = """
 import sys
-from suave_des.knowledge.pellet import java
+from suave_des.knowledge.pellet import in_process as java
 java.start()
 print("numpy" in sys.modules)
 

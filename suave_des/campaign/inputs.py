@@ -166,10 +166,10 @@ def check_inputs(
 
         knowledge = open_knowledge(scenarios[0])
         knowledge.analyze_and_plan(KnowledgeState())
-        for assumption in knowledge.base.assumptions:
+        for assumption in knowledge.base.assumptions.values():
             logging.getLogger("suave_des").warning("note: %s", assumption)
         for path in knowledge.base.files:
-            files.ontology(path)
+            files.note(path)
         report_mistakes(scenarios[0], knowledge.base)
     code = user_modules(managers, functions)
     for module in _defining(managers, functions):  # of a class that a package has installed, its module

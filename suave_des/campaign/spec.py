@@ -16,7 +16,7 @@ from suave_des.errors import InputError, shown
 from suave_des.registry import is_built_in, manager_class
 from suave_des.resources import find
 from suave_des.scenario.loader import Replacements
-from suave_des.scenario.quantities import Real, Strict
+from suave_des.scenario.models import Real, Strict
 from suave_des.scenario.schema import problem_and_remedy, validated
 from suave_des.scenario.yamlfile import InputFiles, Layer, find_named
 

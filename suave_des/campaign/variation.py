@@ -27,8 +27,7 @@ from suave_des.records.metrics import Row
 from suave_des.records.store import MissionKey
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, full_path, value_at, with_values
-from suave_des.scenario.models import MissionSettings
-from suave_des.scenario.quantities import Strict, wrong
+from suave_des.scenario.models import MissionSettings, Strict, wrong
 from suave_des.scenario.schema import problem_and_remedy
 
 ENSEMBLE_COLUMN = "ensemble_member"

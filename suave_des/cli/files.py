@@ -52,10 +52,6 @@ def import_config(
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
     campaign: Annotated[Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")] = None,
-    base: Annotated[
-        str | None,
-        typer.Option(metavar="SCENARIO", help="Scenario to build on; by default that of the revision."),
-    ] = None,
     revision: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Revision of the files, if they fit several."),
@@ -71,14 +67,14 @@ def import_config(
     Keys without a counterpart are reported. Files may be of any revision, with or without leading slashes.
     """
     from suave_des.registry import manager_names
-    from suave_des.scenario.exemplar.importing import import_config as imported_from
+    from suave_des.scenario.exemplar import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
     for target in targets:
         if target.resolve() in [file.resolve() for file in (*files, *targets) if file is not target]:
             raise InputError("is one of the other files, too", file=target, remedy="give the output a different name")
         check_output_file(target, overwrite=overwrite)
-    given = {"base": base, "revision": revision, "campaign": campaign, "runner_seed": runner_seed}
+    given = {"revision": revision, "campaign": campaign, "runner_seed": runner_seed}
     imported = imported_from(files, out, managers=manager_names(), **given)  # type: ignore[arg-type]
     for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
         write_files(target.parent, {target.name: text})
@@ -105,7 +101,7 @@ def export_config(
     import-config gives the same scenario again. What the exemplar cannot express is reported.
     """
     from suave_des.campaign.spec import CampaignSettings, read_campaign_file
-    from suave_des.scenario.exemplar.exporting import export_config as exported
+    from suave_des.scenario.exemplar import export_config as exported
     from suave_des.scenario.loader import load_scenario
 
     file = read_campaign_file(scenario)

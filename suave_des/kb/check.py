@@ -103,7 +103,7 @@ def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> It
     scale, groups = Scale(numbers_in(base)), interchangeable_components(base)
     apart = RECOVERED if rules_of_2023(base.content) else None
     attributes = [
-        name for name in base.quality_attributes if has_effect(base, name) and (measured is None or name in measured)
+        name for name in base.model.attributes if has_effect(base, name) and (measured is None or name in measured)
     ]
     designs = {function: found for function in base.functions if (found := base.designs(function))}
     for number in range(max(map(len, designs.values()), default=0)):

@@ -13,8 +13,8 @@ from suave_des.kb.tracing import Derivation, Tracer
 from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, facts_of, local_name, value_of
+from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.state import (
     Decision,
     Fact,

@@ -203,7 +203,6 @@ class KnowledgeBase:
         return self.limit.run(
             lambda: explain(self.base, question, reasoning, self._tracing_pellet),
             f"explaining the state {state}",
-            self.base.rules,
         )
 
     def policy(
@@ -266,6 +265,5 @@ class KnowledgeBase:
             InputError: it is not a query.
             KnowledgeError: the state contradicts itself, or it takes too long.
         """
-        rules = self.base.rules
-        graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query", rules)
+        graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query")
         return answer(graph, text)

@@ -16,8 +16,7 @@ from typing import Final
 from rdflib import BNode
 
 from suave_des.kb.space import Situation
-from suave_des.knowledge.content import Content
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import Content, Ontology
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of

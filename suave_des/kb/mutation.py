@@ -38,8 +38,7 @@ from suave_des.knowledge.rules import (
     mirrored,
     write_atom,
 )
-from suave_des.knowledge.rules.checks import fatal_problems
-from suave_des.knowledge.rules.files import with_triples
+from suave_des.knowledge.rules.files import fatal_problems, with_triples
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.tables import Table
 

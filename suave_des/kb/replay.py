@@ -14,7 +14,7 @@ from suave_des.kb.matching import with_bindings
 from suave_des.kb.space import Situation, differing_decisions
 from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
 from suave_des.kb.tracing import Tracer, pellet_for
-from suave_des.knowledge.content import with_rules
+from suave_des.knowledge.ontology import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.state import NONE_LEFT, STAYS
 from suave_des.metrics.result import KnowledgeRecord

@@ -106,8 +106,6 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
 
 def _read(path: Path) -> OntologyFile:
     file = read_ontology(path)
-    if not file.is_xml:
-        raise InputError("only RDF/XML is edited in place", file=path, remedy="keep the rules as text, for --rules")
     try:
         file.content.decode()
     except UnicodeDecodeError:

@@ -92,7 +92,7 @@ class Outcome:
     @cached_property
     def statuses(self) -> tuple[str, ...]:
         """What is inferred of objectives and groundings, as text, sorted."""
-        return () if self.reasoning is None else tuple(sorted(self.reasoning.statuses))
+        return () if self.reasoning is None else tuple(sorted(self.reasoning.inference.statuses))
 
     def choice(self, function: str) -> str:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
@@ -343,7 +343,7 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
 def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
     """Group the components that can be exchanged: doing so maps ontologies and rules onto themselves."""
     groups: dict[str, list[str]] = {}
-    for name in base.components:
+    for name in base.model.components:
         first = next((each for each in groups if _exchangeable(base, each, name)), name)
         groups.setdefault(first, []).append(name)
     return tuple(map(tuple, groups.values()))
@@ -451,7 +451,7 @@ class PolicySpace:
 
 def measured_attributes(base: Ontology, settings: ManagingSettings) -> list[str]:
     """Quality attributes of the ontologies that the scenario measures, by name."""
-    return sorted(name for name in settings.measured if name in base.quality_attributes)
+    return sorted(name for name in settings.measured if name in base.model.attributes)
 
 
 def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] | None:

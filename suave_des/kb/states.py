@@ -15,11 +15,10 @@ from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
 from suave_des.files import read_json
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.planning import triggers_adaptation
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
+from suave_des.knowledge.reasoner import triggers_adaptation
 from suave_des.knowledge.rules import Atom, Named, Rule, RuleError, Term, Variable, texts_of
-from suave_des.knowledge.rules.checks import Vocabulary, fatal_problems
-from suave_des.knowledge.rules.files import RulesFile, read_rule
+from suave_des.knowledge.rules.files import RulesFile, Vocabulary, fatal_problems, read_rule
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, ObjectiveState
 from suave_des.records.mission_folder import (
@@ -259,7 +258,8 @@ class StateBuilder:
     def _known(self, kind: str) -> tuple[str, ...]:
         """Names that parts of a kind can have."""
         base = self.base
-        return {"components": base.components, "measurements": base.quality_attributes}.get(kind, base.functions)
+        model = base.model
+        return tuple({"components": model.components, "measurements": model.attributes}.get(kind, model.functions))
 
     def _check_status(self, property_name: str, value: str) -> None:
         """Reject a status that resembles one that a rule mentions, because nothing would follow from it."""

@@ -14,8 +14,7 @@ from functools import cached_property
 from typing import Final
 
 from suave_des.kb.matching import Bound, Facts, matched, matches, shown_bindings, stated, with_bindings
-from suave_des.knowledge.content import Content, Terms
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import Content, Ontology, Terms
 from suave_des.knowledge.pellet.in_process import (
     InProcessPellet,
     Trace,

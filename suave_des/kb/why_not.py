@@ -42,7 +42,7 @@ from suave_des.knowledge.rdf import (
     value_of,
 )
 from suave_des.knowledge.rules import COMPARISONS, Atom, Rule, Variable, literal_text, write_atom
-from suave_des.knowledge.rules.checks import fatal_problems
+from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import ContradictionError, KnowledgeState
 
 _WORDS: Final = {

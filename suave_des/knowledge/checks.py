@@ -6,63 +6,26 @@ what can hold in any state. `kb check` adds the shapes of the model (SHACL), and
 
 from __future__ import annotations
 
-import operator
 import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
-from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar, with_article
-from suave_des.knowledge.content import Content
-from suave_des.knowledge.ontology import OPERATORS, Model, Ontology, assumption, wrong_values
+from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
+from suave_des.knowledge import rdf
+from suave_des.knowledge import rules as swrl
+from suave_des.knowledge.ontology import OPERATORS, Content, Model, Ontology, wrong_values
 from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
-from suave_des.knowledge.rdf import (
-    C_STATUS,
-    HAS_QA_VALUE,
-    HAS_VALUE,
-    IS_QA_TYPE,
-    LANGUAGE_NAMESPACES,
-    NUMERIC,
-    O_STATUS,
-    OWL,
-    PERFORMANCE,
-    QA_OPERATOR,
-    RDF_TYPE,
-    RDFS,
-    TOMASYS,
-    XSD,
-    Lit,
-    canonical,
-    local_name,
-    memberships,
-    namespace,
-    number_in,
-    reached,
-)
-from suave_des.knowledge.rules import (
-    COMPARISON_OF,
-    COMPARISONS,
-    EXPRESSION,
-    Atom,
-    Named,
-    Place,
-    Rule,
-    RuleError,
-    Term,
-    Variable,
-    literal_text,
-    mirrored,
-    write_atom,
-)
-from suave_des.knowledge.rules.checks import Vocabulary, about_rule, fatal_problems
-from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile
+from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term, Variable, write_atom
+from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile, Vocabulary, about_rule, fatal_problems
 from suave_des.resources import shipped_folder
 
 
@@ -204,27 +167,12 @@ def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
     return [finding for check in CHECKS for finding in check(material)]
 
 
-def findings_on_rule(
-    name: str, base: Ontology, reported: Mapping[str, Collection[str]], measured: Collection[str]
-) -> Iterator[Finding]:
-    """Find what is wrong with the rules of a name in a knowledge base.
-
-    Args:
-        name: of the rules.
-        base: the knowledge base that has them.
-        reported: the statuses that the simulation reports, by component.
-        measured: the quality attributes that the scenario measures.
-    """
-    files = [rule.file for rule in base.rules if rule.name == name]
-    found = findings_in(base, Subject(rules=files, reported=reported, measured=measured))
-    return (each for each in found if each.rule == name)
-
-
 # The model, and what missions have to do with it.
 
-_ABOUT_CLASSES: Final = frozenset(
-    (RDFS + "subClassOf", RDFS + "domain", RDFS + "range", OWL + "equivalentClass", OWL + "disjointWith")
-)
+_ABOUT_CLASSES: Final = frozenset(rdf.RDFS + name for name in ("subClassOf", "domain", "range")) | {
+    rdf.OWL + "equivalentClass",
+    rdf.OWL + "disjointWith",
+}
 _PROPERTIES: Final = ("object property", "data property", "annotation property")
 
 
@@ -242,21 +190,21 @@ def undefined_names(material: Material) -> Iterator[Finding]:
     model, kinds, triples = material.base.model, material.base.vocabulary.kinds, material.content.triples
     of_states = {each.iri for each in model.individuals()}
     described = {subject for subject, _, _ in triples} | of_states
-    namespaces = {namespace(iri) for iri in described}
-    assumed = {(model.attributes[name], QA_OPERATOR) for name in material.base.assumed}
+    namespaces = {rdf.namespace(iri) for iri in described}
+    assumed = {(model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed}
     for subject, predicate, value in triples:
         used: tuple[str, str, Collection[str]] | None = None  # words, what is used, what it should be
-        is_term = isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
-        if predicate == RDF_TYPE or predicate in _ABOUT_CLASSES:
-            wanted = ("class", "datatype") if predicate == RDFS + "range" else ("class",)
+        is_term = isinstance(value, str) and not value.startswith(rdf.LANGUAGE_NAMESPACES)
+        if predicate == rdf.RDF_TYPE or predicate in _ABOUT_CLASSES:
+            wanted = ("class", "datatype") if predicate == rdf.RDFS + "range" else ("class",)
             if is_term and kinds.get(str(value), frozenset()).isdisjoint(wanted):
-                used = "class" if predicate == RDF_TYPE else local_name(predicate), str(value), ("class",)
-        elif not predicate.startswith(LANGUAGE_NAMESPACES) and (subject, predicate) not in assumed:
+                used = "class" if predicate == rdf.RDF_TYPE else local_name(predicate), str(value), ("class",)
+        elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES) and (subject, predicate) not in assumed:
             if predicate not in described:
                 used = "property", predicate, _PROPERTIES
             elif is_term and value not in described and "object property" in kinds.get(predicate, ()):
                 used = local_name(predicate), str(value), ("individual",)
-        if used is not None and namespace(used[1]) in namespaces:
+        if used is not None and rdf.namespace(used[1]) in namespaces:
             words, name, meant = used
             known = [iri for iri in described - of_states - {subject} if kinds.get(iri, frozenset()) & {*meant}]
             same = sorted(iri for iri in known if local_name(iri) == local_name(name))
@@ -298,22 +246,17 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
         designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
         problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
         yield material.about(Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <")
-    valued = {subject for subject, predicate, _ in material.content.triples if predicate == HAS_VALUE}
-    for name, each in model.measurements.items():
-        if measured is not None and each.iri in valued and name not in measured:
-            problem = f"hasValue of {local_name(each.iri)} is not used: {name} has the value that missions measure"
-            yield material.about(Level.WARN, local_name(each.iri), problem, "measure it in the scenario")
 
 
 def without_operator(content: Content, model: Model, measured: Collection[str]) -> list[str]:
     """Return the quality attributes that missions measure and designs expect, and that cannot be compared."""
-    compared = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
+    compared = {subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR}
     return sorted(name for name in _expected(model).intersection(measured) if model.attributes[name] not in compared)
 
 
 def _expected(model: Model) -> frozenset[str]:
     """The quality attributes of which designs expect a value, without the performance."""
-    return frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
+    return frozenset().union(*model.estimated.values()) - {local_name(rdf.PERFORMANCE)}
 
 
 def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
@@ -327,22 +270,9 @@ def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
             yield material.about(Level.WARN, design, problem, remedy)
 
 
-def unknown_to_missions(material: Material) -> Iterator[Finding]:
-    """Note the components that nothing reports, the attributes that nothing measures, and what is assumed."""
-    content, subject, model = material.content, material.subject, material.base.model
-    asserted = {each for each, predicate, _ in content.triples if predicate == C_STATUS}
-    if subject.reported is not None and C_STATUS not in content.head_properties():
-        for name, iri in sorted(model.components.items()):
-            if name not in subject.reported and iri not in asserted:
-                problem = (
-                    f"nothing in the simulation reports the status of component {name}, so missions never have one"
-                )
-                yield material.about(Level.INFO, name, problem, f"reported are {', '.join(subject.reported)}")
-    for name in sorted(_expected(model).difference(subject.measured) if subject.measured is not None else ()):
-        problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
-        yield material.about(Level.INFO, name, problem)
-    for name, sign in material.base.assumed.items():
-        yield material.about(Level.INFO, name, assumption(name, sign))
+def assumed_operators(material: Material) -> Iterator[Finding]:
+    """Note which comparison operators are assumed."""
+    return (material.about(Level.INFO, name, words) for name, words in material.base.assumptions.items())
 
 
 def rules_of_2023(content: Content) -> list[tuple[Rule, Atom]]:
@@ -351,7 +281,9 @@ def rules_of_2023(content: Content) -> list[tuple[Rule, Atom]]:
         (rule, atom)
         for rule in content.enabled_rules
         for atom in rule.head
-        if atom.predicate == O_STATUS and isinstance(atom.arguments[-1], Lit) and atom.arguments[-1].text == "UPDATABLE"
+        if atom.predicate == rdf.O_STATUS
+        and isinstance(atom.arguments[-1], Lit)
+        and atom.arguments[-1].text == "UPDATABLE"
     ]
 
 
@@ -432,18 +364,18 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not every
     dead rule is returned.
     """
-    leads = tuple(RDFS + name for name in ("subClassOf", "subPropertyOf", "domain", "range"))
-    both_ways = tuple(OWL + name for name in ("equivalentClass", "equivalentProperty", "inverseOf"))
+    leads = tuple(rdf.RDFS + name for name in ("subClassOf", "subPropertyOf", "domain", "range"))
+    both_ways = tuple(rdf.OWL + name for name in ("equivalentClass", "equivalentProperty", "inverseOf"))
     related = [(one, name, str(other)) for one, name, other in content.triples]
     steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
-    steps += [(other, one) for one, name, other in related if name in (*both_ways, RDFS + "subPropertyOf")]
+    steps += [(other, one) for one, name, other in related if name in (*both_ways, rdf.RDFS + "subPropertyOf")]
     in_states = ("Objective", "FunctionGrounding", "typeF", "typeFD", "solvesO", "o_always_improve")
-    held = {OWL + "Thing", EXPRESSION, C_STATUS, O_STATUS, *(TOMASYS + name for name in in_states)}
-    held |= {*(name for _, name in memberships(content.triples)), *(name for _, name, _ in content.triples)}
-    held |= {TOMASYS + "QAvalue", IS_QA_TYPE, HAS_VALUE} if model.attributes else set()
-    held |= {HAS_QA_VALUE} if any(model.estimated.values()) else set()
+    held = {rdf.OWL + "Thing", swrl.EXPRESSION, rdf.C_STATUS, rdf.O_STATUS, *(rdf.TOMASYS + name for name in in_states)}
+    held |= {*(name for _, name in rdf.memberships(content.triples)), *(name for _, name, _ in content.triples)}
+    held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
+    held |= {rdf.HAS_QA_VALUE} if any(model.estimated.values()) else set()
     structure = "".join(content.structure)
-    waiting, possible = list(content.enabled_rules), reached(held, steps)
+    waiting, possible = list(content.enabled_rules), rdf.reached(held, steps)
 
     def allows(atom: Atom) -> bool:
         is_named = atom.kind in ("class", "object", "data") and atom.arguments
@@ -452,7 +384,7 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
 
     while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
         held.update(atom.predicate for rule in firing for atom in rule.head)
-        possible = reached(held, steps)
+        possible = rdf.reached(held, steps)
         waiting = [rule for rule in waiting if rule not in firing]
     return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
 
@@ -473,16 +405,18 @@ def unmeasured_rules(
     Returns:
         each rule with the atom that names the attribute, what is wrong, and what would be right.
     """
-    if IS_QA_TYPE in content.head_properties():
+    if rdf.IS_QA_TYPE in content.head_properties():
         return []
-    elsewhere = HAS_QA_VALUE in content.head_properties() or any(p == HAS_QA_VALUE for _, p, _ in content.triples)
+    elsewhere = rdf.HAS_QA_VALUE in content.head_properties() or any(
+        p == rdf.HAS_QA_VALUE for _, p, _ in content.triples
+    )
     estimated = frozenset().union(*model.estimated.values())
-    valued = {local_name(str(value)) for _, predicate, value in content.triples if predicate == IS_QA_TYPE}
+    valued = {local_name(str(value)) for _, predicate, value in content.triples if predicate == rdf.IS_QA_TYPE}
     found: list[tuple[Rule, Atom, str, str | None]] = []
     for rule in content.enabled_rules:
-        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == HAS_QA_VALUE}
+        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
         for atom in rule.body:
-            if atom.predicate != IS_QA_TYPE or len(atom.arguments) != 2 or not isinstance(atom.arguments[1], Named):
+            if atom.predicate != rdf.IS_QA_TYPE or len(atom.arguments) != 2 or not isinstance(atom.arguments[1], Named):
                 continue
             name = local_name(atom.arguments[1].iri)
             is_measured = measured is None or name in measured
@@ -513,7 +447,9 @@ def never_fires(material: Material) -> Iterator[Finding]:
 
 
 #: Axioms by which individuals are different: declared so, or members of disjoint classes or properties.
-_MAKE_DIFFERENT: Final = re.compile(OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)")
+_MAKE_DIFFERENT: Final = re.compile(
+    rdf.OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)"
+)
 
 
 def equal_individuals(material: Material) -> Iterator[Finding]:
@@ -534,48 +470,6 @@ def equal_individuals(material: Material) -> Iterator[Finding]:
 
 
 # Rules that cannot mean what their author wanted.
-
-#: Classes of which nothing is a member of two, unless an ontology or a rule says so.
-_KINDS: Final = frozenset(
-    TOMASYS + name
-    for name in (
-        *("Component", "Function", "FunctionDesign", "FunctionGrounding"),
-        *("Objective", "QAvalue", "QualityAttributeType"),
-    )
-)
-
-
-def things_of_two_kinds(material: Material) -> Iterator[Finding]:
-    """Find variables and individuals that a rule would have to be of two kinds of TOMASys at once.
-
-    A reasoner contradicts no other use than the one that a property is declared for (rdfs:domain, rdfs:range): it
-    concludes that the thing is of both kinds, and a rule that needs both never fires. Where an ontology or a rule makes
-    something a thing of two kinds, none excludes another.
-    """
-    triples = material.content.triples
-    kinds: dict[str, set[str]] = defaultdict(set)
-    for thing, name in (*memberships(triples), *((s, o) for s, p, o in triples if p == RDFS + "subClassOf")):
-        kinds[thing] |= {str(name)} & _KINDS
-    if any(len(each) > 1 for each in kinds.values()) or not _KINDS.isdisjoint(material.content.head_classes()):
-        return
-    ends = {RDFS + "domain": 0, RDFS + "range": 1}
-    wanted = {(s, ends[p]): str(o) for s, p, o in triples if p in ends and o in _KINDS}
-    wanted |= {(kind, 0): kind for kind in _KINDS}
-    for rule in material.rules:
-        known: dict[Term, tuple[str, str]] = {}
-        for atom in sorted(rule.atoms, key=lambda each: each.kind != "class"):
-            for number, term in enumerate(atom.arguments):
-                kind, name = wanted.get((atom.predicate, number)), local_name(atom.predicate)
-                if kind is None or isinstance(term, Lit):
-                    continue
-                if isinstance(term, Named) and kinds.get(term.iri):
-                    known.setdefault(term, (min(kinds[term.iri]), ""))
-                before, by = known.setdefault(term, (kind, "" if atom.kind == "class" else f" in {name}"))
-                if kind != before:
-                    thing = f"?{term.name}" if isinstance(term, Variable) else local_name(term.iri)
-                    first = with_article(local_name(before)) + by
-                    problem = f"{thing} is {first}, but {with_article(local_name(kind))} in {name}"
-                    yield material.suspicious(rule, atom.place(), problem)
 
 
 def misspelt_variables(material: Material) -> Iterator[Finding]:
@@ -613,32 +507,35 @@ def are_near(one: str, other: str) -> bool:
 
 def two_values(material: Material) -> Iterator[Finding]:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
-    kind = (RDF_TYPE, OWL + "FunctionalProperty")
+    kind = (rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty")
     functional = {subject for subject, name, value in material.content.triples if (name, value) == kind}
     for rule in material.rules:
         values: dict[tuple[str, Term], Term] = {}
-        for atom in rule.body:
-            if atom.predicate in functional and len(atom.arguments) == 2:
-                subject, value = atom.arguments
-                before = values.setdefault((atom.predicate, subject), value)
-                if not isinstance(before, Variable) and not isinstance(value, Variable) and not _same(before, value):
-                    name = local_name(atom.predicate)
-                    problem = f"{write_atom(atom)}: nothing has two values of {name}, so the rule never fires"
-                    yield material.suspicious(rule, atom.place(), problem, "write a rule for each value")
-        equated = {term for atom in rule.body if COMPARISONS.get(atom.predicate) == "=" for term in atom.arguments}
-        for atom in rule.head:
-            asked = values.get((atom.predicate, atom.arguments[0])) if len(atom.arguments) == 2 else None
-            if asked is None or asked in equated or atom.kind != "data" or _same(asked, atom.arguments[1]):
+        equated = {term for atom in rule.body if swrl.COMPARISONS.get(atom.predicate) == "=" for term in atom.arguments}
+        for atom in rule.atoms:
+            if atom.predicate not in functional or len(atom.arguments) != 2:
                 continue
-            problem = f"{write_atom(atom)} contradicts {local_name(atom.predicate)} in the body, which holds as well"
-            yield material.suspicious(rule, atom.place(), problem, "rules add facts, and change none")
+            (subject, value), is_asked = atom.arguments, atom in rule.body
+            key = atom.predicate, subject
+            before = values.setdefault(key, value) if is_asked else values.get(key)
+            name, words = local_name(atom.predicate), write_atom(atom)
+            if before is None or _same(before, value):
+                continue
+            if is_asked and not isinstance(before, Variable) and not isinstance(value, Variable):
+                problem = f"{words}: nothing has two values of {name}, so the rule never fires"
+                yield material.suspicious(rule, atom.place(), problem, "write a rule for each value")
+            elif not is_asked and before not in equated and atom.kind == "data":
+                problem = f"{words} contradicts {name} in the body, which holds as well"
+                yield material.suspicious(rule, atom.place(), problem, "rules add facts, and change none")
 
 
 def _same(one: Term, other: Term) -> bool:
-    return one == other or (isinstance(one, Lit) and isinstance(other, Lit) and canonical(one) == canonical(other))
+    return one == other or (
+        isinstance(one, Lit) and isinstance(other, Lit) and rdf.canonical(one) == rdf.canonical(other)
+    )
 
 
-_FD_REALISABILITY: Final = TOMASYS + "fd_realisability"
+_FD_REALISABILITY: Final = rdf.TOMASYS + "fd_realisability"
 
 
 def no_effect(material: Material) -> Iterator[Finding]:
@@ -654,62 +551,6 @@ def no_effect(material: Material) -> Iterator[Finding]:
                 yield material.suspicious(rule, atom.place(), problem, remedy)
 
 
-_COMPARE: Final[Mapping[str, Callable[[float, float], bool]]] = {
-    "=": operator.eq,
-    "!=": operator.ne,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-}
-
-
-def comparisons_that_decide_nothing(material: Material) -> Iterator[Finding]:
-    """Find comparisons that no value satisfies, alone or together, and those with a text that none is."""
-    vocabulary = material.base.vocabulary
-    for rule in material.rules:
-        holders = dict(rule.read_values())
-        asked: dict[str, list[tuple[str, float, str]]] = defaultdict(list)  # sign, number, how it is written
-        for atom, name, sign, value in _comparisons(rule):
-            holder = holders.get(name, "")
-            texts = vocabulary.enumerations.get(holder)
-            if texts is not None and sign in ("=", "!=") and value.text not in texts:
-                holds, where = "never" if sign == "=" else "always", local_name(holder)
-                problem = f"{literal_text(value)} is not among the values of {where}: the comparison {holds} holds"
-                remedy = nearest(value.text, texts) or f"one of {', '.join(sorted(texts))}"
-                yield material.suspicious(rule, atom.place(), problem, remedy)
-            ranges = vocabulary.ranges.get(holder, frozenset())
-            if sign != "!=" and ranges and ranges <= NUMERIC and value.datatype not in NUMERIC:
-                compares = f"{local_name(COMPARISON_OF[sign])} compares ?{name}, a number"
-                problem = f"{compares}, with the text {literal_text(value)}: it never holds"
-                yield material.suspicious(rule, atom.place(), problem, f"write {value.text} without quotes")
-            elif (number := number_in(value)) is not None:
-                asked[name].append((sign, float(number), f"{sign} {value.text}"))
-                if not _is_possible(asked[name]):
-                    all_of_them = " and ".join(words for *_, words in asked.pop(name))
-                    problem = f"no value of ?{name} is {all_of_them}: the rule never fires"
-                    yield material.suspicious(rule, atom.place(), problem, "reverse one of the comparisons")
-
-
-def _comparisons(rule: Rule) -> Iterator[tuple[Atom, str, str, Lit]]:
-    """(comparison, variable, sign, literal) of each comparison with a literal, as if the variable were on the left."""
-    for atom in rule.body:
-        sign = COMPARISONS.get(atom.predicate)
-        if sign is not None and len(atom.arguments) == 2:
-            one, other = atom.arguments
-            if isinstance(one, Variable) and isinstance(other, Lit):
-                yield atom, one.name, sign, other
-            elif isinstance(one, Lit) and isinstance(other, Variable):
-                yield atom, other.name, mirrored(sign), one
-
-
-def _is_possible(asked: Iterable[tuple[str, float, str]]) -> bool:
-    """Whether a number satisfies all comparisons: one of theirs, one between two of them, or one beyond them."""
-    numbers = sorted({number for _, number, _ in asked})
-    tried = [numbers[0] - 1.0, *numbers, numbers[-1] + 1.0, *((low + high) / 2.0 for low, high in pairwise(numbers))]
-    return any(all(_COMPARE[sign](each, number) for sign, number, _ in asked) for each in tried)
-
-
 def misspelt_statuses(material: Material) -> Iterator[Finding]:
     """Find the user's rules that ask for a component's status that is nearly one that the simulation reports.
 
@@ -717,17 +558,17 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
     """
     reported = {*chain.from_iterable((material.subject.reported or {}).values())}
     by_capitals = {each.upper(): each for each in sorted(reported)}
-    asserted = [value for _, predicate, value in material.content.triples if predicate == C_STATUS]
-    heads = [atom.arguments[-1] for rule in material.rules for atom in rule.head if atom.predicate == C_STATUS]
+    asserted = [value for _, predicate, value in material.content.triples if predicate == rdf.C_STATUS]
+    heads = [atom.arguments[-1] for rule in material.rules for atom in rule.head if atom.predicate == rdf.C_STATUS]
     known = {*reported, *(value.text for value in (*asserted, *heads) if isinstance(value, Lit))}
     for rule in filter(material.is_own, material.rules):
-        asked = [(atom, atom.arguments[-1]) for atom in rule.body if atom.predicate == C_STATUS]
+        asked = [(atom, atom.arguments[-1]) for atom in rule.body if atom.predicate == rdf.C_STATUS]
         statuses = {status for _, status in asked if isinstance(status, Variable)}
         for atom in rule.body:  # and in a comparison
-            if atom.predicate in (COMPARISON_OF["="], COMPARISON_OF["!="]) and not statuses.isdisjoint(atom.arguments):
+            if swrl.COMPARISONS.get(atom.predicate) in ("=", "!=") and not statuses.isdisjoint(atom.arguments):
                 asked += [(atom, term) for term in atom.arguments]
         for atom, status in asked:
-            if isinstance(status, Lit) and status.datatype == XSD + "string" and status.text not in known:
+            if isinstance(status, Lit) and status.datatype == rdf.XSD + "string" and status.text not in known:
                 meant = similar(status.text.upper(), by_capitals)
                 if meant is not None:
                     problem = f'nothing in the simulation reports c_status "{status.text}"'
@@ -741,17 +582,15 @@ CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
     designs_and_modes,
     attributes_that_do_not_fit,
     thresholds_without_reaction,
-    unknown_to_missions,
+    assumed_operators,
     another_revision,
     mistakes_that_pellet_ignores,
     shared_names,
     for_other_models,
     never_fires,
     equal_individuals,
-    things_of_two_kinds,
     misspelt_variables,
     two_values,
     no_effect,
-    comparisons_that_decide_nothing,
     misspelt_statuses,
 )

@@ -14,41 +14,214 @@ from decimal import Decimal
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
-from suave_des.errors import KnowledgeError
-from suave_des.knowledge.content import Content, merge, with_rules
-from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts, place_of
-from suave_des.knowledge.rdf import (
-    C_STATUS,
-    EXACT,
-    HAS_QA_VALUE,
-    HAS_VALUE,
-    IS_QA_TYPE,
-    MROS,
-    O_STATUS,
-    OWL,
-    QA_OPERATOR,
-    RDF_TYPE,
-    RDFS,
-    TOMASYS,
-    XSD,
-    Lit,
-    Names,
-    Triple,
-    facts_of,
-    is_fact,
-    local_name,
-    namespace,
-    number_in,
-    reached,
-    value_of,
-)
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.rules.checks import Vocabulary, check_property_use
-from suave_des.knowledge.rules.files import RulesFile
+from rdflib import BNode, URIRef
+from rdflib.namespace import OWL as OWL_TERMS
+from rdflib.namespace import RDF
+from rdflib.term import Node
+
+from suave_des.errors import KnowledgeError, nearest
+from suave_des.knowledge import rdf
+from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts, place_of, supplies
+from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rules import EXPRESSION, Rule
+from suave_des.knowledge.rules.files import RulesFile, Vocabulary, check_property_use, rules_of
 from suave_des.knowledge.state import Fact, KnowledgeState, Value, grounding_name, measurement_name, objective_name
 from suave_des.resources import shipped_folder
+
+# The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all libraries in use
+# write and read without loss.
+
+_DECLARED: Final = frozenset(rdf.OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Class"))
+_CLASSES: Final = frozenset((rdf.OWL + "Class", rdf.RDFS + "Class"))
+_PROPERTIES: Final = frozenset(
+    rdf.OWL + kind
+    for kind in (
+        *("ObjectProperty", "DatatypeProperty", "FunctionalProperty", "InverseFunctionalProperty"),
+        *("TransitiveProperty", "SymmetricProperty", "AsymmetricProperty", "ReflexiveProperty", "IrreflexiveProperty"),
+    )
+)
+#: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
+RULE_IRI: Final = "urn:suave-des:rule:"
+#: Annotations, which mean nothing for inference.
+_ANNOTATIONS: Final = frozenset(
+    (rdf.RDFS + "label", rdf.RDFS + "comment", rdf.RDFS + "seeAlso", rdf.RDFS + "isDefinedBy", rdf.OWL + "versionInfo")
+) | {rdf.SWRLA + "isRuleEnabled"}
+
+
+class Terms(NamedTuple):
+    """The terms to read after an inference: properties for their values, classes for their members; sorted IRIs."""
+
+    properties: tuple[str, ...]
+    classes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Content:
+    """The content of all ontology files.
+
+    Attributes:
+        triples: about named things and with named things or literals as values, without those of rules.
+        structure: all others, with blank nodes in them (class expressions), as N-Triples.
+        rules: the rules of all files, disabled ones included.
+        replaced: rules that those of the same name in a later file of rules have replaced, each with its replacement.
+    """
+
+    triples: tuple[rdf.Triple, ...]
+    structure: tuple[str, ...]
+    rules: tuple[Rule, ...]
+    replaced: tuple[tuple[Rule, Rule], ...] = ()
+
+    @property
+    def enabled_rules(self) -> tuple[Rule, ...]:
+        """The enabled rules."""
+        return tuple(rule for rule in self.rules if rule.enabled)
+
+    def head_properties(self) -> frozenset[str]:
+        """Properties that an enabled rule can assert."""
+        return frozenset(name for name, kind in _concluded(self.enabled_rules) if kind != "Class")
+
+    def head_classes(self) -> frozenset[str]:
+        """Classes that an enabled rule can assert membership in."""
+        return frozenset(name for name, kind in _concluded(self.enabled_rules) if kind == "Class")
+
+    def decision_terms(self) -> Terms:
+        """Terms on which decisions depend, and terms that rules assert, with super-properties and inverses."""
+        both_ways = (rdf.OWL + "inverseOf", rdf.OWL + "equivalentProperty")
+        related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
+        edges = [(s, o) for s, p, o in related if p in (rdf.RDFS + "subPropertyOf", *both_ways)]
+        edges += [(o, s) for s, p, o in related if p in both_ways]
+        wanted = rdf.reached((*self.head_properties(), *rdf.DECISION_PROPERTIES), edges)
+        return Terms(_named(wanted), tuple(sorted(self.head_classes())))
+
+    def all_terms(self) -> Terms:
+        """Every property and class: some axiom can conclude any of them."""
+        kinds: dict[str, set[str]] = {}
+        for subject, predicate, value in self.triples:
+            if predicate == rdf.RDF_TYPE and isinstance(value, str):
+                kinds.setdefault(value, set()).add(subject)
+        decisions = self.decision_terms()
+        properties = {*decisions.properties, *(name for _, name, _ in filter(rdf.is_fact, self.triples))}
+        properties = properties.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
+        classes = {*decisions.classes, *(name for _, name in rdf.memberships(self.triples))}
+        classes = classes.union(*(kinds.get(kind, ()) for kind in _CLASSES))
+        return Terms(_named(properties - kinds.get(rdf.OWL + "AnnotationProperty", set())), _named(classes))
+
+    def n_triples(self, rules: Sequence[Rule] | None = None) -> str:
+        """Write all of it for a reasoner, with the enabled rules or those given."""
+        chosen = self.enabled_rules if rules is None else rules
+        lines = [rdf.n_triple(triple) for triple in self.triples]
+        lines += self.structure
+        lines += [rdf.n_triple(triple) for triple in _declarations(self.triples, chosen)]
+        for rule in chosen:
+            lines += _rule_lines(rule, self.rules.index(rule))
+        return "".join(lines)
+
+
+def _named(iris: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted(iri for iri in iris if not iri.startswith(rdf.LANGUAGE_NAMESPACES)))
+
+
+def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Content:
+    """Merge the triples and rules of files, with the values of named QAvalue individuals replaced.
+
+    Raises:
+        KnowledgeError: a value names no individual with a hasValue.
+    """
+    triples, structure, rules = dict[rdf.Triple, None](), list[str](), list[Rule]()
+    shipped = shipped_folder("ontology")
+    # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology replaces them.
+    given_mros = {
+        rule.name
+        for source in sources
+        if source.path.parent != shipped and supplies(source, rdf.MROS)
+        for rule in rules_of(source)
+    }
+    for number, source in enumerate(sorted(sources, key=lambda source: source.content)):
+        found = rules_of(source)
+        rules += [rule for rule in found if source.path.parent != shipped or rule.name not in given_mros]
+        # Triples about the ontology itself (imports, versions) are no part of its content.
+        ontologies = set(source.graph.subjects(RDF.type, OWL_TERMS.Ontology))
+        inside = {triple for rule in found for triple in rule.triples}
+        for triple in sorted(set(source.graph) - inside):
+            # Protégé declares the built-ins, about which Pellet logs a warning.
+            if str(triple[1]) in _ANNOTATIONS or triple[0] in ontologies or triple[2] == URIRef(rdf.SWRL + "Builtin"):
+                continue
+            if any(isinstance(term, BNode) for term in triple):
+                structure.append(rdf.n_triple_with_nodes(triple, f"f{number}", {}))
+            else:
+                triples[str(triple[0]), str(triple[1]), rdf.term_of(triple[2])] = None
+    return Content(_override(tuple(sorted(triples, key=str)), values), tuple(structure), _in_order(rules))
+
+
+def with_rules(content: Content, more: Iterable[Sequence[Rule]], disabled: Collection[str]) -> Content:
+    """Add the rules of text files and disable rules.
+
+    A file's rules replace all rules of the same names that were read before, of ontologies or of files: so a rule
+    can be tried in another wording, or disabled by its mark.
+
+    Raises:
+        KnowledgeError: there is no rule of a name to disable.
+    """
+    rules, replaced = list(content.rules), list[tuple[Rule, Rule]]()
+    for group in more:
+        new = {rule.name: rule for rule in group}
+        replaced += [(rule, new[rule.name]) for rule in rules if rule.name in new]
+        rules = [rule for rule in rules if rule.name not in new] + list(group)
+    _check_known(disabled, {rule.name for rule in rules}, "disabled_rules", "there is no rule {} to switch off")
+    rules = [replace(rule, enabled=rule.enabled and rule.name not in disabled) for rule in rules]
+    return replace(content, rules=_in_order(rules), replaced=tuple(replaced))
+
+
+def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
+    return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text, str(rule.file))))
+
+
+def _check_known(names: Iterable[str], known: Collection[str], key: str, problem: str) -> None:
+    """Check names that a scenario gives under a key of `knowledge`."""
+    for name in sorted(set(names).difference(known)):
+        remedy = nearest(name, known) or f"known: {', '.join(sorted(known)) or 'none'}"
+        raise KnowledgeError(problem.format(name), place=f"{key}.{name}", remedy=remedy)
+
+
+def _override(triples: tuple[rdf.Triple, ...], values: Mapping[str, Decimal]) -> tuple[rdf.Triple, ...]:
+    known = {local_name(triple[0]) for triple in triples if triple[1] == rdf.HAS_VALUE}
+    _check_known(values, known, "values", "the ontology has no individual {} with a hasValue")
+    return tuple(
+        (subject, predicate, Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal"))
+        if predicate == rdf.HAS_VALUE and local_name(subject) in values
+        else (subject, predicate, value)
+        for subject, predicate, value in triples
+    )
+
+
+def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[rdf.Triple]:
+    """Declare properties and classes that occur only in the head of a rule.
+
+    Pellet accepts an undeclared term, but stock owlready2 drops what is inferred of it; declared, both agree.
+    """
+    declared = {subject for subject, predicate, value in triples if predicate == rdf.RDF_TYPE and value in _DECLARED}
+    return [(name, rdf.RDF_TYPE, rdf.OWL + kind) for name, kind in sorted(_concluded(rules)) if name not in declared]
+
+
+def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
+    """(IRI, kind in OWL) of each property and class that rules assert."""
+    kinds = {"object": "ObjectProperty", "data": "DatatypeProperty", "class": "Class"}
+    heads = (atom for rule in rules for atom in rule.head if atom.predicate not in ("", EXPRESSION))
+    return {(atom.predicate, kinds[atom.kind]) for atom in heads if atom.kind in kinds}
+
+
+def _rule_lines(rule: Rule, number: int) -> list[str]:
+    """A rule's N-Triples, with an IRI for the rule and numbered blank nodes."""
+    renamed: dict[Node, str] = {rule.node: f"<{RULE_IRI}{number}>"}
+    for term in (term for triple in rule.triples for term in (triple[0], triple[2]) if isinstance(term, BNode)):
+        renamed.setdefault(term, f"_:r{number}n{len(renamed)}")
+    kept = (triple for triple in rule.triples if str(triple[1]) not in _ANNOTATIONS)
+    return [rdf.n_triple_with_nodes(triple, f"r{number}", renamed) for triple in kept]
+
+
+# The model.
 
 #: Comparison operators that a quality attribute type may have.
 OPERATORS: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
@@ -57,16 +230,16 @@ OPERATORS: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-_HAS_QA_ESTIMATION: Final = TOMASYS + "hasQAestimation"
-_ALWAYS: Final = TOMASYS + "o_always_improve"
-_SOLVES_F: Final = TOMASYS + "solvesF"
-_SOLVES_O: Final = TOMASYS + "solvesO"
-_TYPE_F: Final = TOMASYS + "typeF"
-_TYPE_FD: Final = TOMASYS + "typeFD"
+_HAS_QA_ESTIMATION: Final = rdf.TOMASYS + "hasQAestimation"
+_ALWAYS: Final = rdf.TOMASYS + "o_always_improve"
+_SOLVES_F: Final = rdf.TOMASYS + "solvesF"
+_SOLVES_O: Final = rdf.TOMASYS + "solvesO"
+_TYPE_F: Final = rdf.TOMASYS + "typeF"
+_TYPE_FD: Final = rdf.TOMASYS + "typeFD"
 #: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology asserts of it.
 _STATE_PROPERTIES: Final = frozenset(
-    {_TYPE_F, _TYPE_FD, _SOLVES_O, O_STATUS, _ALWAYS, HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE}
-    | {TOMASYS + "fg_status", TOMASYS + "o_updatable"}
+    {_TYPE_F, _TYPE_FD, _SOLVES_O, rdf.O_STATUS, _ALWAYS, rdf.HAS_QA_VALUE, rdf.IS_QA_TYPE, rdf.HAS_VALUE}
+    | {rdf.TOMASYS + "fg_status", rdf.TOMASYS + "o_updatable"}
 )
 
 
@@ -75,11 +248,11 @@ class Individual:
     """An individual that exists only in some states, with what the ontologies assert of it (for example hasNFR)."""
 
     iri: str
-    own: tuple[Triple, ...] = ()
+    own: tuple[rdf.Triple, ...] = ()
 
-    def described_as(self, kind: str) -> Iterator[Triple]:
+    def described_as(self, kind: str) -> Iterator[rdf.Triple]:
         """Its class of TOMASys, and what the ontologies assert of it."""
-        yield self.iri, RDF_TYPE, TOMASYS + kind
+        yield self.iri, rdf.RDF_TYPE, rdf.TOMASYS + kind
         yield from self.own
 
 
@@ -104,18 +277,18 @@ class Model:
     groundings: Mapping[str, Individual]
     measurements: Mapping[str, Individual]
     estimated: Mapping[str, frozenset[str]]
-    initial: Mapping[str, tuple[Triple, ...]]
+    initial: Mapping[str, tuple[rdf.Triple, ...]]
 
     def individuals(self) -> Iterator[Individual]:
         """All objectives, groundings and measurements that states may have."""
         return chain.from_iterable(group.values() for group in (self.objectives, self.groundings, self.measurements))
 
-    def triples(self) -> Iterator[Triple]:
+    def triples(self) -> Iterator[rdf.Triple]:
         """Assertions of the ontologies that only apply in states: about these individuals, and components' statuses."""
         own = (individual.own for individual in self.individuals())
         return chain.from_iterable((*own, *self.initial.values()))
 
-    def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
+    def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
         """Return the triples that assert a state, for every reasoner in the same order.
 
         A component or a quality attribute that the ontology does not have can match no rule, and is left out:
@@ -124,28 +297,28 @@ class Model:
         Raises:
             KnowledgeError: a function or a function design is not in the ontology.
         """
-        named = [*((each.function, self.functions, "function") for each in state.objectives)]
-        named += [(name, self.functions, "function") for name, _ in state.groundings]
-        named += [(design, self.designs, "function design") for _, design in state.groundings]
-        for name, known, what in named:
-            if name not in known:
-                remedy = f"known: {', '.join(sorted(known)) or 'none'}"
-                raise KnowledgeError(f"the knowledge base has no {what} {name}", remedy=remedy)
+        functions = (*(each.function for each in state.objectives), *(name for name, _ in state.groundings))
+        designs = (design for _, design in state.groundings)
+        for what, names, known in (("function", functions, self.functions), ("function design", designs, self.designs)):
+            for name in names:
+                if name not in known:
+                    remedy = f"known: {', '.join(sorted(known)) or 'none'}"
+                    raise KnowledgeError(f"the knowledge base has no {what} {name}", remedy=remedy)
         present = {self.objectives[objective.function].iri for objective in state.objectives}
         present |= {self.groundings[design].iri for _, design in state.groundings}
         present |= {self.measurements[name].iri for name, _ in state.measurements if name in self.attributes}
         absent = {individual.iri for individual in self.individuals()} - present
         return tuple(triple for triple in self._triples(state) if triple[2] not in absent)
 
-    def _triples(self, state: KnowledgeState) -> Iterator[Triple]:
+    def _triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
         for objective in state.objectives:
             individual = self.objectives[objective.function]
             yield from individual.described_as("Objective")
             yield individual.iri, _TYPE_F, self.functions[objective.function]
             if objective.status is not None:
-                yield individual.iri, O_STATUS, Lit(objective.status, XSD + "string")
+                yield individual.iri, rdf.O_STATUS, Lit(objective.status, rdf.XSD + "string")
             if objective.always_improve:
-                yield individual.iri, _ALWAYS, Lit("true", XSD + "boolean")
+                yield individual.iri, _ALWAYS, Lit("true", rdf.XSD + "boolean")
         required = {objective.function for objective in state.objectives}
         for function, design in state.groundings:
             individual = self.groundings[design]
@@ -155,19 +328,19 @@ class Model:
                 yield individual.iri, _SOLVES_O, self.objectives[function].iri
             for name, _ in state.measurements:
                 if name in self.estimated[design]:
-                    yield individual.iri, HAS_QA_VALUE, self.measurements[name].iri
+                    yield individual.iri, rdf.HAS_QA_VALUE, self.measurements[name].iri
         reported = dict(state.components)
         for name, iri in self.components.items():
             if name in reported:
-                yield iri, C_STATUS, Lit(reported[name], XSD + "string")
+                yield iri, rdf.C_STATUS, Lit(reported[name], rdf.XSD + "string")
             else:
                 yield from self.initial.get(name, ())
         for name, value in state.measurements:
             if name in self.attributes:
                 individual = self.measurements[name]
                 yield from individual.described_as("QAvalue")
-                yield individual.iri, IS_QA_TYPE, self.attributes[name]
-                yield individual.iri, HAS_VALUE, Lit(format(value, "f"), XSD + "decimal")
+                yield individual.iri, rdf.IS_QA_TYPE, self.attributes[name]
+                yield individual.iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.XSD + "decimal")
 
 
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
@@ -191,19 +364,23 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
         for iri in sorted(iris):
             other = found.setdefault(local_name(iri), iri)
             if other != iri:
-                raise wrong_in(iri, sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
+                raise _wrong_in(iri, sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
         return dict(sorted(found.items()))
 
     functions = by_name(_members(triples, "Function") | linked(_SOLVES_F, 2), "functions")
     designs = by_name(_members(triples, "FunctionDesign") | linked(_SOLVES_F, 0), "function designs")
     parts = (
-        _members(triples, "Component") | linked(MROS + "requiredBy", 0) | {s for s, p, _ in triples if p == C_STATUS}
+        _members(triples, "Component")
+        | linked(rdf.MROS + "requiredBy", 0)
+        | {s for s, p, _ in triples if p == rdf.C_STATUS}
     )
     components = by_name(parts, "components")
-    attributes = by_name(_members(triples, "QualityAttributeType") | linked(IS_QA_TYPE, 2), "quality attribute types")
+    attributes = by_name(
+        _members(triples, "QualityAttributeType") | linked(rdf.IS_QA_TYPE, 2), "quality attribute types"
+    )
     existing = {local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)}
     groups = [
-        {name: existing.get(rename(name), namespace(iri) + rename(name)) for name, iri in things.items()}
+        {name: existing.get(rename(name), rdf.namespace(iri) + rename(name)) for name, iri in things.items()}
         for things, rename in (
             (functions, objective_name),
             (designs, grounding_name),
@@ -217,11 +394,11 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
             file=sources[0].path,
             remedy="rename one, for example f_search and search",
         )
-    own: dict[str, list[Triple]] = {iri: [] for iri in in_states}
+    own: dict[str, list[rdf.Triple]] = {iri: [] for iri in in_states}
     for triple in triples:
         subject, predicate, value = triple
         holder = subject if subject in in_states else value
-        if isinstance(holder, str) and holder in own and predicate not in _STATE_PROPERTIES and is_fact(triple):
+        if isinstance(holder, str) and holder in own and predicate not in _STATE_PROPERTIES and rdf.is_fact(triple):
             own[holder].append(triple)
     objectives, groundings, measurements = (
         {name: Individual(iri, tuple(own[iri])) for name, iri in group.items()} for group in groups
@@ -239,22 +416,17 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
         measurements=measurements,
         estimated={name: frozenset(found) for name, found in estimated.items()},
         initial={
-            name: tuple(triple for triple in triples if triple[:2] == (iri, C_STATUS))
+            name: tuple(triple for triple in triples if triple[:2] == (iri, rdf.C_STATUS))
             for name, iri in components.items()
         },
     )
-    kept = tuple(t for t in triples if t[0] not in in_states and t[2] not in in_states and t[1] != C_STATUS)
+    kept = tuple(t for t in triples if t[0] not in in_states and t[2] not in in_states and t[1] != rdf.C_STATUS)
     return model, replace(content, triples=kept)
-
-
-def assumption(name: str, sign: str) -> str:
-    """Describe which comparison operator is assumed for a quality attribute type."""
-    return f"{name} has no qa_comparison_operator in the ontologies: {sign} is assumed, as in the revision's code"
 
 
 def with_operators(content: Content, model: Model, operators: Mapping[str, str]) -> tuple[Content, dict[str, str]]:
     """Add the comparison operators of quality attribute types that have none; return those that were added, by name."""
-    present = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
+    present = {subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR}
     added = {
         name: sign
         for name, sign in sorted(operators.items())
@@ -262,30 +434,30 @@ def with_operators(content: Content, model: Model, operators: Mapping[str, str])
     }
     if not added:
         return content, {}
-    more = [(model.attributes[name], QA_OPERATOR, Lit(sign, XSD + "string")) for name, sign in added.items()]
+    more = [(model.attributes[name], rdf.QA_OPERATOR, Lit(sign, rdf.XSD + "string")) for name, sign in added.items()]
     return replace(content, triples=tuple(sorted((*content.triples, *more), key=str))), added
 
 
-def _members(triples: Iterable[Triple], name: str) -> set[str]:
+def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
     """Individuals of a class of TOMASys or of its subclasses."""
-    below = ((str(o), s) for s, p, o in triples if p == RDFS + "subClassOf")
-    classes = reached([TOMASYS + name], below)
-    return {s for s, p, o in triples if p == RDF_TYPE and o in classes}
+    below = ((str(o), s) for s, p, o in triples if p == rdf.RDFS + "subClassOf")
+    classes = rdf.reached([rdf.TOMASYS + name], below)
+    return {s for s, p, o in triples if p == rdf.RDF_TYPE and o in classes}
 
 
 def estimations(
-    triples: Iterable[Triple], designs: Mapping[str, str], attributes: Mapping[str, str]
+    triples: Iterable[rdf.Triple], designs: Mapping[str, str], attributes: Mapping[str, str]
 ) -> Iterator[tuple[str, str, str]]:
     """(design, quality attribute type, IRI of the QAvalue individual) of each hasQAestimation."""
     design_names = {iri: name for name, iri in designs.items()}
     attribute_names = {iri: name for name, iri in attributes.items()}
-    types = {s: attribute_names[o] for s, p, o in triples if p == IS_QA_TYPE and isinstance(o, str)}
+    types = {s: attribute_names[o] for s, p, o in triples if p == rdf.IS_QA_TYPE and isinstance(o, str)}
     for subject, predicate, value in triples:
         if predicate == _HAS_QA_ESTIMATION and subject in design_names and value in types:
             yield design_names[subject], types[str(value)], str(value)
 
 
-def wrong_values(triples: Iterable[Triple]) -> Iterator[tuple[str, str, str]]:
+def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]]:
     """Find numbers that are no decimals, unknown operators, and functional properties with several values.
 
     A reasoner would not explain the first two. Of two values that an ontology asserts for one functional data
@@ -295,18 +467,18 @@ def wrong_values(triples: Iterable[Triple]) -> Iterator[tuple[str, str, str]]:
         the IRI of the individual, what is wrong, and what would be right.
     """
     triples = tuple(triples)
-    functional = {s for s, p, o in triples if p == RDF_TYPE and o == OWL + "FunctionalProperty"}
-    names = Names(triples)
+    functional = {s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"}
+    names = rdf.Names(triples)
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
         shown, datatype = value if isinstance(value, Lit) else (value, "")
-        if predicate == HAS_VALUE and (number_in(value) is None or datatype not in EXACT):
-            but = f" but an xsd:{local_name(datatype)}" if datatype not in (*EXACT, "") else ""
+        if predicate == rdf.HAS_VALUE and (rdf.number_in(value) is None or datatype not in rdf.EXACT):
+            but = f" but an xsd:{local_name(datatype)}" if datatype not in (*rdf.EXACT, "") else ""
             yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
-        if predicate == QA_OPERATOR and shown not in OPERATORS:
+        if predicate == rdf.QA_OPERATOR and shown not in OPERATORS:
             yield subject, f"qa_comparison_operator {shown!r} is unknown", f"one of {' '.join(OPERATORS)}"
         if predicate in functional and isinstance(value, Lit):
-            one = value_of(value, names)
+            one = rdf.value_of(value, names)
             other = seen.setdefault((subject, predicate), one)
             if one != other:
                 values = f"the values {other} and {one}"
@@ -314,7 +486,7 @@ def wrong_values(triples: Iterable[Triple]) -> Iterator[tuple[str, str, str]]:
                 yield subject, problem, "keep one of them"
 
 
-def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
+def _wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
     """Return an error on an individual, with the file and line where it is described."""
     name = local_name(subject)
     file, line = place_of(name, sources)
@@ -345,11 +517,11 @@ class Ontology:
     files: tuple[Path, ...]
     content_hash: str
     content: Content = field(repr=False)
-    names: Names = field(repr=False)
+    names: rdf.Names = field(repr=False)
     model: Model = field(repr=False)
     vocabulary: Vocabulary = field(repr=False)
     sources: tuple[OntologyFile, ...] = field(repr=False)
-    stated: tuple[Triple, ...] = field(repr=False)
+    stated: tuple[rdf.Triple, ...] = field(repr=False)
     assumed: Mapping[str, str]
 
     @classmethod
@@ -380,7 +552,7 @@ class Ontology:
         files = [RulesFile.read(Path(path)) for path in rules]
         base = cls.merged(sources, files, RulesFile.rules, values or {}, disabled_rules, operators or {})
         for subject, problem, remedy in wrong_values(base.stated):
-            raise wrong_in(subject, sources, problem, remedy)
+            raise _wrong_in(subject, sources, problem, remedy)
         check_property_use(base.content.enabled_rules, base.vocabulary)
         return base
 
@@ -414,7 +586,7 @@ class Ontology:
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
             content_hash=_content_hash(sources, values, assumed, files, disabled_rules),
             content=with_rules(content, [usable(file, vocabulary) for file in files], disabled_rules),
-            names=Names(merged.triples),
+            names=rdf.Names(merged.triples),
             model=model,
             vocabulary=vocabulary,
             sources=tuple(sources),
@@ -426,20 +598,21 @@ class Ontology:
         """Return the same ontology with different rules, enabled or not."""
         return replace(self, content=replace(self.content, rules=tuple(rules)))
 
-    def with_facts(self, facts: Iterable[Triple]) -> Ontology:
+    def with_facts(self, facts: Iterable[rdf.Triple]) -> Ontology:
         """Return the same ontology with further facts about individuals."""
         return replace(self, content=replace(self.content, triples=(*self.content.triples, *facts)))
 
-    def with_triples(self, triples: Iterable[Triple]) -> Ontology:
+    def with_triples(self, triples: Iterable[rdf.Triple]) -> Ontology:
         """Return the ontology with different triples, in which the model is found again."""
         whole = replace(self.content, triples=(*triples, *self.model.triples()))
         model, content = build_model(whole, self.sources)
-        return replace(self, content=content, model=model, names=Names(whole.triples), stated=whole.triples)
+        return replace(self, content=content, model=model, names=rdf.Names(whole.triples), stated=whole.triples)
 
     @property
-    def assumptions(self) -> tuple[str, ...]:
-        """What was added to the ontologies, in words."""
-        return tuple(assumption(name, sign) for name, sign in self.assumed.items())
+    def assumptions(self) -> dict[str, str]:
+        """What was added to the ontologies, in words, by quality attribute type."""
+        found = "{} has no qa_comparison_operator in the ontologies: {} is assumed, as in the revision's code"
+        return {name: found.format(name, sign) for name, sign in self.assumed.items()}
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -449,22 +622,12 @@ class Ontology:
     @cached_property
     def facts(self) -> frozenset[Fact]:
         """The facts that the ontologies assert about individuals."""
-        return frozenset(facts_of(self.content.triples, self.names))
+        return frozenset(rdf.facts_of(self.content.triples, self.names))
 
     @property
     def functions(self) -> tuple[str, ...]:
         """Names of the functions."""
         return tuple(self.model.functions)
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the components."""
-        return tuple(self.model.components)
-
-    @property
-    def quality_attributes(self) -> tuple[str, ...]:
-        """Names of the quality attribute types."""
-        return tuple(self.model.attributes)
 
     def designs(self, function: str) -> tuple[str, ...]:
         """Function designs that solve a function, sorted by name; none for an unknown function."""
@@ -487,7 +650,7 @@ class Ontology:
     def _expected(self) -> Mapping[str, Mapping[str, Decimal]]:
         triples, found = self.content.triples, {name: dict[str, Decimal]() for name in self.model.designs}
         numbers = {
-            s: Decimal(value.text.strip()) for s, p, value in triples if p == HAS_VALUE and isinstance(value, Lit)
+            s: Decimal(value.text.strip()) for s, p, value in triples if p == rdf.HAS_VALUE and isinstance(value, Lit)
         }
         for design, attribute, individual in estimations(triples, self.model.designs, self.model.attributes):
             if individual in numbers:
@@ -505,7 +668,7 @@ class Ontology:
         line = None if source is None else source.line_of_rule(rule.name)
         return rule.place or (f"line {line}" if line else None)
 
-    def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
+    def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
         """Return the triples that assert a state.
 
         Raises:
@@ -515,7 +678,7 @@ class Ontology:
 
     def asserted(self, state: KnowledgeState) -> frozenset[Fact]:
         """The facts of the ontologies and of a state."""
-        return self.facts.union(facts_of(self.assertions(state), self.names))
+        return self.facts.union(rdf.facts_of(self.assertions(state), self.names))
 
     def unsolved(self, functions: Iterable[str]) -> Iterator[tuple[str, str, str]]:
         """Yield those functions that are not there or have no design: name, what is wrong, what would be right."""

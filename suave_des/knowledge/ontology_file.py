@@ -1,13 +1,11 @@
 """Read ontology files, and resolve their imports to local files. Nothing is ever fetched.
 
-Files are in RDF/XML, or, according to their extension, in Turtle or N-Triples.
+Files are in RDF/XML. lxml reads the XML first: it stops at entities that expand too far, and knows line numbers. Simple
+internal entities, as Protégé writes them, are accepted.
 
-lxml reads the XML first: it stops at entities that expand too far, and knows line numbers. Simple internal entities, as
-Protégé writes them, are accepted.
-
-An import is looked for among the files that were given, then among the files beside the importing one, then among the
-shipped ones: by the IRI (of the ontology, or xml:base), then by the last part of the IRI, which for the exemplar's
-ontologies is the name of the file (tomasys, mros, suave).
+An import is looked for among the files that were given, by the IRI (of the ontology, or xml:base), then by the last
+part of the IRI, which for the exemplar's ontologies is the name of the file (tomasys, mros, suave); then, by that name,
+among the files beside the importing one, and among the shipped ones.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urldefrag, urljoin
@@ -28,9 +26,8 @@ from rdflib.collection import Collection
 from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF as RDF_TERMS
 from rdflib.namespace import RDFS as RDFS_TERMS
-from rdflib.plugins.parsers.notation3 import BadSyntax
 
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import KnowledgeError
 from suave_des.files import read_bytes
 from suave_des.knowledge.rdf import MROS, OWL, RDF, TOMASYS, XSD, local_name, without_log
 from suave_des.resources import shipped_folder
@@ -38,12 +35,10 @@ from suave_des.resources import shipped_folder
 MAX_BYTES: Final = 64 * 2**20
 _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
-_OTHER_NOTATION: Final = "save it in Protégé as RDF/XML, or give it the ending of what it is: .ttl, .nt"
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
 _EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
-_FORMATS: Final = {".ttl": ("turtle", "Turtle"), ".nt": ("nt", "N-Triples")}
-_ENDINGS: Final = (".owl", ".rdf", ".xml", *_FORMATS)
+_ENDINGS: Final = (".owl", ".rdf", ".xml")
 #: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
 _SHIPPED: Final = {"tomasys": "tomasys.owl", "mros": "tomasys.owl", "suave": "suave.owl"}
 
@@ -56,7 +51,7 @@ class OntologyFile:
         path: where it is.
         content: its bytes.
         iris: the IRIs of the ontology (empty for an anonymous one), without a trailing '#'.
-        base: xml:base of the document, if it is RDF/XML and has one.
+        base: xml:base of the document, if it has one.
         imports: (imported IRI, line) in the order of the file.
         graph: all its triples.
     """
@@ -68,29 +63,27 @@ class OntologyFile:
     imports: tuple[tuple[str, int], ...]
     graph: Graph = field(repr=False, compare=False)
 
-    @property
-    def is_xml(self) -> bool:
-        """Whether the file is RDF/XML."""
-        return self.path.suffix not in _FORMATS
-
     def line_of(self, name: str) -> int | None:
         """The first line that describes the thing of that name."""
         # about="...#name", about="&suave;name", ID="name", or the label of a rule
         own = re.escape(name)
-        described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<""")
-        if not self.is_xml:  # mine:name, <...#name>, or "...#name"
-            described = re.compile(rf"""(?:^|[\s"])[\w.-]*:{own}(?=[\s"])|[<"][^<>"]*[#/]{own}[>"]|label\s+"{own}\"""")
-        lines = enumerate(text_of(self.content, "replace").splitlines(), start=1)
-        return next((number for number, line in lines if described.search(line)), None)
+        described = rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<"""
+        return self._line(re.search(described, self._text, re.MULTILINE))
 
     def line_of_rule(self, name: str) -> int | None:
         """The line of a rule's label, else the first line that describes a thing of its name.
 
         Of several things with that label it is the last one: editors write rules at the end.
         """
-        text = text_of(self.content, "replace")
-        labels = [found.start() for found in re.finditer(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)]
-        return text.count("\n", 0, labels[-1]) + 1 if labels else self.line_of(name)
+        labels = [*re.finditer(rf"label[^<>]*>\s*{re.escape(name)}\s*<", self._text)]
+        return self._line(labels[-1]) if labels else self.line_of(name)
+
+    @cached_property
+    def _text(self) -> str:
+        return text_of(self.content, "replace")
+
+    def _line(self, found: re.Match[str] | None) -> int | None:
+        return None if found is None else self._text.count("\n", 0, found.start()) + 1
 
 
 def place_of(name: str, sources: Sequence[OntologyFile]) -> tuple[Path, int | None]:
@@ -130,14 +123,14 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text_of(content), count=1)
     except UnicodeDecodeError as error:
         raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
-    root: Any = None if path.suffix in _FORMATS else _parse_xml(path, text)  # lxml-stubs lack sourceline
+    root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, text)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
-    base = None if root is None else root.get(_BASE)
+    base = root.get(_BASE)
     lines: dict[str, int] = {}
-    for element in () if root is None else root.iter(f"{{{OWL}}}imports"):
+    for element in root.iter(f"{{{OWL}}}imports"):
         iri = urljoin(base or "", element.get(f"{{{RDF}}}resource", ""))
         lines.setdefault(iri, element.sourceline or 0)
     imports = {str(iri): lines.get(str(iri), 0) for iri in graph.objects(None, OWL_TERMS.imports)}
@@ -155,9 +148,8 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
     """Return the root element, after checking that no entity refers to other files or expands too far."""
     if external := _EXTERNAL.search(text):
         line, remedy = text.count("\n", 0, external.start()) + 1, "only simple internal entities are read"
-        raise KnowledgeError(
-            "its DOCTYPE or an entity refers to another file", file=path, place=f"line {line}", remedy=remedy
-        )
+        problem = "its DOCTYPE or an entity refers to another file"
+        raise KnowledgeError(problem, file=path, place=f"line {line}", remedy=remedy)
     # lxml-stubs do not know "internal". Long rules are deeply nested: 256 levels, a hundred atoms, are too few. The
     # larger limit takes the one on expansion away, so it is used only where no entity can be declared.
     options: Any = {"resolve_entities": "internal", "no_network": True, "load_dtd": False}
@@ -170,9 +162,8 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
         if "amplification" in reason:
             problem = "the entities in this file expand to far more than its size"
             raise KnowledgeError(problem, file=path, remedy="write their values out") from error
-        remedy = _SAVE_AS if text.lstrip().startswith("<") else _OTHER_NOTATION
         place = f"line {line}, column {column}"
-        raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=remedy) from error
+        raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=_SAVE_AS) from error
     if root.tag != f"{{{RDF}}}RDF":
         name = etree.QName(root).localname
         raise KnowledgeError(f"not RDF/XML: the root element is <{name}>", file=path, remedy=_SAVE_AS)
@@ -183,21 +174,17 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
 def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     graph = Graph()
-    form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
     before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write the ill-formed 1e3 as 1000
     try:
         with without_log():
             # A file without xml:base gets a base that reveals nothing of this machine's folders.
-            graph.parse(data=text, format=form, publicID=f"http://ontology.invalid/{path.stem}")
-    except Exception as error:  # the parser raises many kinds; each means that this file is not of its format
+            graph.parse(data=text, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
+    except Exception as error:  # the parser raises many kinds; each means that this file is not RDF/XML
         reason, place = str(error), None
         if isinstance(error, SAXParseException):
             reason, place = error.getMessage(), f"line {error.getLineNumber()}"
-        elif isinstance(error, BadSyntax):
-            reason, place = str(error._why), f"line {error.lines + 1}"
-        remedy = _SAVE_AS if form == "xml" else f"by its ending the file is {name}"
-        problem = f"not {name}: {' '.join(reason.split())}"
-        raise KnowledgeError(problem, file=path, place=place, remedy=remedy) from error
+        problem = f"not RDF/XML: {' '.join(reason.split())}"
+        raise KnowledgeError(problem, file=path, place=place, remedy=_SAVE_AS) from error
     finally:
         rdflib.NORMALIZE_LITERALS = before
     for subject, predicate, value in list(graph):
@@ -239,14 +226,10 @@ def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
                 found = _beside(file, iri) or _shipped(files, iri)
                 if found is not None:
                     _add(files, found)
-                elif not _holds_terms_of(files, iri):
-                    raise KnowledgeError(
-                        f"import {iri} does not resolve to a local file",
-                        file=file.path,
-                        place=f"line {line}" if line else None,
-                        remedy="give the imported ontology's file too, or put it beside this one; "
-                        "nothing is fetched from the network",
-                    )
+                else:
+                    problem, place = f"import {iri} does not resolve to a local file", f"line {line}" if line else None
+                    remedy = "give the imported ontology's file too, or put it beside this one"
+                    raise KnowledgeError(problem, file=file.path, place=place, remedy=remedy)
     return tuple(files)
 
 
@@ -290,18 +273,10 @@ def _supplier(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
 
 
 def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
-    """The file of that name, or else with that IRI, in the folder of the importing file."""
-    name, own = _name(iri), file.path.resolve()
-    files = [path for path in sorted(file.path.parent.iterdir()) if path.suffix in _ENDINGS and path.resolve() != own]
-    for path in files:
-        if path.stem == name and path.is_file():
+    """The file of that name in the folder of the importing file."""
+    for path in sorted(file.path.parent.iterdir()):
+        if path.stem == _name(iri) and path.suffix in _ENDINGS and path.resolve() != file.path.resolve():
             return read_ontology(path)
-    for path in files:
-        try:
-            if name.encode() in path.read_bytes() and supplies(found := read_ontology(path), iri, by_name=False):
-                return found
-        except (InputError, OSError):
-            continue  # an unrelated file that happens to be in the folder
     return None
 
 
@@ -312,12 +287,3 @@ def _shipped(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
     found = read_ontology(shipped_folder("ontology") / name)
     # A given tomasys ontology is not mixed with the shipped one for the sake of its mros terms.
     return None if any(_supplier(files, known) for known in found.iris) else found
-
-
-def _holds_terms_of(files: Iterable[OntologyFile], iri: str) -> bool:
-    """Whether a file, such as an edited copy of the shipped tomasys.owl, defines the terms for robots itself."""
-    return _name(iri) == "mros" and any(
-        isinstance(subject, URIRef) and subject.startswith(MROS) and len(set(file.graph.predicates(subject))) > 1
-        for file in files
-        for subject in file.graph.subjects(RDF_TERMS.type, None)
-    )

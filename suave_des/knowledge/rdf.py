@@ -13,7 +13,7 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
 from typing import Final, NamedTuple, TypeVar
 
@@ -125,29 +125,23 @@ _LEXICAL: Final = (
 ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 
 
-def literal(term: Literal) -> Lit:
-    """Convert a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
-    if term.language:
-        return Lit(str(term), f"@{term.language}")
-    return Lit(str(term), XSD + "string" if term.datatype is None else str(term.datatype))
-
-
 def term_of(term: Node) -> str | Lit:
-    """Convert an IRI or a literal of rdflib."""
-    return literal(term) if isinstance(term, Literal) else str(term)
+    """Convert an IRI or a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
+    if not isinstance(term, Literal):
+        return str(term)
+    return Lit(str(term), f"@{term.language}" if term.language else str(term.datatype or XSD + "string"))
 
 
 @contextmanager
 def without_log() -> Iterator[None]:
     """Keep rdflib's warnings about odd terms off the terminal."""
     logger = logging.getLogger("rdflib.term")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    before, logger.disabled = logger.disabled, True
     try:
         with warnings.catch_warnings(action="ignore"):
             yield
     finally:
-        logger.setLevel(before)
+        logger.disabled = before
 
 
 def is_well_formed(value: Lit) -> bool:
@@ -265,11 +259,8 @@ def value_of(value: str | Lit, names: Names) -> Value:
         return names.short(value)
     if value.datatype == XSD + "boolean":
         return value.text.strip() in ("true", "1")
-    if value.datatype in NUMERIC:
-        try:
-            return Decimal(value.text.strip())
-        except InvalidOperation:
-            return value.text
+    with suppress(InvalidOperation):
+        return Decimal(value.text.strip()) if value.datatype in NUMERIC else value.text
     return value.text
 
 

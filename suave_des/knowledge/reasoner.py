@@ -17,22 +17,36 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
+from itertools import product
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any, Final
 
 from suave_des import knowledge
 from suave_des.caches import SharedEntries, private_cache
-from suave_des.errors import InputError
-from suave_des.knowledge.content import Terms
-from suave_des.knowledge.ontology import Ontology
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge import rdf
+from suave_des.knowledge.ontology import OPERATORS, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
-from suave_des.knowledge.planning import plan
 from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, Triple, facts_of, local_name, reached
 from suave_des.knowledge.rules import COMPARISONS, EXPRESSION
-from suave_des.knowledge.state import MAX_EXPONENT, Fact, Inference, KnowledgeState, Plan, Reasoning, Value
+from suave_des.knowledge.state import (
+    MAX_EXPONENT,
+    NO_GROUNDING,
+    UNGROUNDED,
+    Decision,
+    Fact,
+    Inference,
+    KnowledgeState,
+    ObjectiveState,
+    Plan,
+    Reasoning,
+    Rejection,
+    Value,
+    objective_name,
+)
 
 #: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
 Key = tuple[Any, ...]
@@ -91,22 +105,12 @@ class Regions:
     def key(self, state: KnowledgeState) -> Key:
         """Return what the rules can distinguish of a state: states with equal keys entail the same."""
         measured: tuple[object, ...] = state.measurements
-        if not self.reasons:
-            where = [(name, self.region(value)) for name, value in state.measurements]
-            is_shared = len(where) > 1 and len({number for _, number in where}) < len(where)
-            measured = _ranked(state, where) if is_shared else tuple(where)
+        regions = tuple((name, self.region(value)) for name, value in state.measurements)
+        # Of two values in one gap between thresholds rules can tell which is the greater.
+        gaps = [number for _, number in regions if number % 2 == 0]
+        if not self.reasons and len(set(gaps)) == len(gaps):
+            measured = regions
         return state.objectives, state.groundings, state.components, measured
-
-
-def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[str, int | tuple[int, int]], ...]:
-    """Regions, with the rank of each value among those in the same gap; equal values have the same rank."""
-    in_gap: dict[int, set[Decimal]] = {}
-    for (_, value), (_, number) in zip(state.measurements, where, strict=True):
-        in_gap.setdefault(number, set()).add(value)
-    return tuple(
-        (name, number if number % 2 else (number, sorted(in_gap[number]).index(value)))
-        for (name, value), (_, number) in zip(state.measurements, where, strict=True)
-    )
 
 
 def regions_of(ontology: Ontology) -> Regions:
@@ -118,8 +122,7 @@ def regions_of(ontology: Ontology) -> Regions:
     reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
     pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
     carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])  # properties with a measured value
-    reasons += [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
-    return Regions(tuple(thresholds), tuple(dict.fromkeys(reasons)))
+    return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology, carriers)])))
 
 
 def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
@@ -134,7 +137,8 @@ def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
         yield from ((f"rule {rule.name}", term) for term in terms if isinstance(term, Lit))
 
 
-def _of_rules(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
+def _reasons(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
+    """Why rules may distinguish values within a region, given the properties that have a measured value."""
     for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
@@ -144,9 +148,6 @@ def _of_rules(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
         measured = {name for name, predicate in rule.read_values() if predicate in carriers}
         for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
             yield f"rule {rule.name} copies the value ?{name} to its head"
-
-
-def _of_ontologies(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
     for name in sorted({*carriers} - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
     for subject, predicate, value in ontology.content.triples:
@@ -158,6 +159,143 @@ def _of_ontologies(ontology: Ontology, carriers: Collection[str]) -> Iterator[st
         if term not in _SIZELESS | _SIZES:
             yield f"a class expression speaks of {local_name(term)}"
 
+
+# Plan: choose a function design for each objective that needs one (the third step of the MAPE-K loop). The planner
+# reads facts, asserted and inferred; the rules are the reasoner's. Source: the exemplar's Metacontrol (paper, section
+# on Metacontrol; repository kas-lab/suave). Unlike there, the filter by required values is in force.
+
+#: Performance of a design for which none is given.
+DEFAULT_PERFORMANCE: Final = Decimal("0.001")
+_PERFORMANCE: Final = local_name(rdf.PERFORMANCE)
+#: Statuses that trigger adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
+_TRIGGERS: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
+
+
+def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
+    """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
+
+    Args:
+        inference: what the reasoner added to the state that was analyzed.
+        improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current function
+            design expects (the exemplar's revision 2023 does so in code).
+
+    Raises:
+        KnowledgeError: an objective requires a value of a quality attribute type without comparison operator.
+    """
+    decisions = []
+    exceeded = dict(_exceeded(ontology, inference.state)) if improve_exceeded else {}
+    for objective in inference.state.objectives:
+        trigger = _trigger(objective, inference) or exceeded.get(objective.function)
+        if trigger is not None:
+            decisions.append(_decide(ontology, inference, objective.function, trigger))
+    return Plan(tuple(decisions))
+
+
+def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, str]]:
+    """Functions whose current design expects less than the measured value, each with the reason to adapt it."""
+    measured = dict(state.measurements)
+    for function, design in state.groundings:
+        for name, value in sorted(ontology.expected(design).items()):
+            if name in measured and measured[name] > value:
+                yield function, f"{name} {measured[name]:.2f} exceeds what {design} expects"
+
+
+def triggers_adaptation(status: str) -> bool:
+    """Whether an objective of a status (o_status) is adapted."""
+    return status in _TRIGGERS or status.startswith("IN_ERROR_")
+
+
+def _trigger(objective: ObjectiveState, inference: Inference) -> str | None:
+    """Return why an objective is adapted; None if it need not be."""
+    name = objective_name(objective.function)
+    for status in map(str, inference.values(name, "o_status")):
+        if triggers_adaptation(status):
+            return f"o_status {status}"
+    if True in inference.values(name, "o_updatable"):
+        return "updatable"
+    return "always to be improved" if True in inference.values(name, "o_always_improve") else None
+
+
+def _decide(ontology: Ontology, inference: Inference, function: str, trigger: str) -> Decision:
+    designs = [name for name in inference.subjects("solvesF", function) if name in ontology.model.designs]
+    reasons = {design: next(_rejection_reasons(inference, design, function), None) for design in designs}
+    rejected = tuple(Rejection(design, reason) for design, reason in reasons.items() if reason is not None)
+    eligible = {design: performance(inference, design) for design, reason in reasons.items() if reason is None}
+    if not eligible:
+        current = inference.state.grounded(function)
+        kept = f"{current} is kept" if current else f"it stays {NO_GROUNDING}"
+        return Decision(function, None, f"{trigger}: no function design is left, {kept}", rejected)
+    best = min(eligible, key=lambda design: (-eligible[design], design))
+    among = f"among {len(eligible)} eligible of {len(designs)} designs"
+    reason = f"{trigger}: highest performance ({_show(eligible[best])}) {among}"
+    return Decision(function, best, reason, rejected)
+
+
+def _rejection_reasons(inference: Inference, design: str, function: str) -> Iterator[str]:
+    """Yield the reasons why a function design must not be chosen now."""
+    objective = objective_name(function)
+    if False in inference.values(design, "fd_realisability"):
+        yield "not realisable"
+    if objective in inference.values(design, "fd_error_log"):
+        yield f"{objective} is in its error log"
+    for attribute, required in _values(inference, objective, "hasNFR"):
+        signs = _operators(inference, attribute)
+        if not signs:
+            raise KnowledgeError(
+                f"{objective} requires a value of {attribute}, which has no qa_comparison_operator",
+                remedy=f"give {attribute} one of {' '.join(OPERATORS)}: "
+                "the way in which a value is worse than the required one",
+            )
+        for expected, sign in product(_expected(inference, design, attribute), signs):
+            if OPERATORS[sign](expected, required):
+                left, right = _show_pair(expected, required)
+                yield f"{attribute} {left} expected {sign} {right} required"
+    for attribute, expected in _values(inference, design, "hasQAestimation"):
+        for measured in (value for name, value in inference.state.measurements if name == attribute):
+            for sign in _operators(inference, attribute):
+                if OPERATORS[sign](measured, expected):
+                    left, right = _show_pair(measured, expected)
+                    yield f"{attribute} {left} measured {sign} {right} expected"
+
+
+def _values(inference: Inference, subject: str, property_name: str) -> Iterator[tuple[str, Decimal]]:
+    """(quality attribute type, value) of the QAvalue individuals that a property leads to."""
+    for individual in inference.values(subject, property_name):
+        for attribute in inference.values(str(individual), "isQAtype"):
+            for value in inference.values(str(individual), "hasValue"):
+                if isinstance(value, Decimal):
+                    yield str(attribute), value
+
+
+def _expected(inference: Inference, design: str, attribute: str) -> list[Decimal]:
+    """Expected values of one quality attribute; a missing performance is the default, as in the choice."""
+    found = [value for name, value in _values(inference, design, "hasQAestimation") if name == attribute]
+    return found or ([DEFAULT_PERFORMANCE] if attribute == _PERFORMANCE else [])
+
+
+def _operators(inference: Inference, attribute: str) -> list[str]:
+    """Return the operators by which a value of a quality attribute is worse than an expected one; usually one."""
+    return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in OPERATORS]
+
+
+def performance(inference: Inference, design: str) -> Decimal:
+    """The design's expected performance, which the planner maximises."""
+    return max(_expected(inference, design, _PERFORMANCE))
+
+
+def _show(value: Decimal, digits: int = 2) -> str:
+    """Write a number with two digits, or up to `digits` of them that are not zero at the end."""
+    whole, _, part = f"{value:.{digits}f}".partition(".")
+    return f"{whole}.{part[:2]}{part[2:].rstrip('0')}"
+
+
+def _show_pair(one: Decimal, other: Decimal) -> tuple[str, str]:
+    """Write two numbers with as many digits as it takes to distinguish them."""
+    shown = ((_show(one, digits), _show(other, digits)) for digits in range(2, 17))
+    return next((pair for pair in shown if pair[0] != pair[1] or one == other), (str(one), str(other)))
+
+
+# The reasoner.
 
 #: Inferences that a reasoner caches in this process, of which the oldest is dropped; some kB each.
 CACHED_STATES: Final = 65536
@@ -174,12 +312,8 @@ def _in_process(ontology: Ontology, limit: TimeLimit, terms: Terms | None, *, at
 
     pellet = cache(lambda: InProcessPellet(ontology, terms))
     if at_once:
-        limit.run(pellet, LOADING, ontology.rules)
-
-    def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
-        return limit.run(lambda: pellet().infer(assertions), reasoning_on(state), ontology.rules)
-
-    return entailed
+        limit.run(pellet, LOADING)
+    return lambda state, assertions: limit.run(lambda: pellet().infer(assertions), reasoning_on(state))
 
 
 def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Backend:
@@ -192,13 +326,13 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Bac
     def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
         # owlready2 discards Pellet's log, which alone reports dropped rules and explains contradictions. The Pellet
         # in this process does so: once at the start, and for contradictions.
-        pellet = limit.run(in_process, reasoning_on(state), ontology.rules)
+        pellet = limit.run(in_process, reasoning_on(state))
         try:
             found = stock.infer(assertions, limit.seconds)
         except TimeoutError:
-            raise limit.exceeded(reasoning_on(state), ontology.rules) from None
+            raise limit.exceeded(reasoning_on(state)) from None
         if found is None:
-            return limit.run(lambda: pellet.infer(assertions), reasoning_on(state), ontology.rules)
+            return limit.run(lambda: pellet.infer(assertions), reasoning_on(state))
         return found
 
     return entailed
@@ -206,7 +340,7 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Bac
 
 #: How Pellet is run, by the reasoner's name.
 BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Backend]]] = {
-    "cached": lambda ontology, limit, terms: _in_process(ontology, limit, terms, at_once=False),
+    "cached": partial(_in_process, at_once=False),
     "pellet": _in_process,
     "owlready2": _owlready2,
 }
@@ -275,7 +409,7 @@ class Reasoner:
         assertions = (*self.base.assertions(state), *facts)
         asserted = self.base.facts.union(facts_of(assertions, self.base.names))
         if inferred is not None:
-            return Inference(state, asserted, inferred)
+            return Inference(state, lambda _: asserted, inferred)
         inferred = frozenset(facts_of(self._backend(state, assertions), self.base.names)) - asserted
         if facts or not self._mentions_measured(state, inferred):
             self._known[key] = inferred
@@ -283,7 +417,7 @@ class Reasoner:
                 del self._known[next(iter(self._known))]
             if self._disk is not None and not facts:
                 self._disk.add(str(key), sorted(map(_written, inferred)))
-        return Inference(state, asserted, inferred)
+        return Inference(state, lambda _: asserted, inferred)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
         """Whether a measured value is among the inferred ones, so that it would be wrong for another state."""
@@ -320,8 +454,7 @@ class Reasoner:
         if self.regions is None or not all(map(isfinite, measured)):
             return tuple(measured)
         bounds = tuple(map(self.regions.around, measured))
-        # Of two values in one gap between thresholds rules can tell which is the greater.
-        return bounds if len(bounds) == 1 or len(set(bounds)) == len(bounds) else tuple(measured)
+        return bounds if len(set(bounds)) == len(bounds) else tuple(measured)
 
     @cached_property
     def expected_attributes(self) -> frozenset[str]:
@@ -341,8 +474,8 @@ def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
 
 @lru_cache(maxsize=1)
 def _code() -> str:
-    total = hashlib.sha256()
-    for path in sorted(Path(knowledge.__file__).parent.rglob("*.py")):
+    total, folder = hashlib.sha256(), Path(knowledge.__file__).parent
+    for path in sorted((*folder.rglob("*.py"), *folder.rglob("*.lark"))):
         total.update(path.read_bytes())
     return total.hexdigest()
 

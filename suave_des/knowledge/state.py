@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -116,10 +116,6 @@ class KnowledgeState:
         """The function design in use for a function."""
         return next((design for name, design in self.groundings if name == function), None)
 
-    def measured(self, attribute: str) -> tuple[Decimal, ...]:
-        """The measured value of a quality attribute; empty before the first measurement."""
-        return tuple(value for name, value in self.measurements if name == attribute)
-
 
 @dataclass(frozen=True, slots=True)
 class Fact:
@@ -141,42 +137,24 @@ def value_text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
+@dataclass(frozen=True)
 class Inference:
-    """The facts that the reasoner adds to a state; not to be changed.
+    """The facts that the reasoner adds to a state.
 
-    Args:
+    Attributes:
         state: the state that was analyzed.
-        asserted: the facts of the ontologies and of the state, or a function that finds them when they are needed.
+        asserted_in: finds the facts of the knowledge base and of a state, when they are needed.
         facts: the inferred facts, none of which is asserted.
     """
 
-    def __init__(
-        self,
-        state: KnowledgeState,
-        asserted: frozenset[Fact] | Callable[[KnowledgeState], frozenset[Fact]],
-        facts: frozenset[Fact],
-    ) -> None:
-        self.state = state
-        self.facts = facts
-        self._asserted = asserted
+    state: KnowledgeState
+    asserted_in: Callable[[KnowledgeState], frozenset[Fact]] = field(compare=False, repr=False)
+    facts: frozenset[Fact]
 
     @cached_property
     def asserted(self) -> frozenset[Fact]:
         """The facts of the knowledge base and of the state."""
-        return self._asserted(self.state) if callable(self._asserted) else self._asserted
-
-    def __eq__(self, other: object) -> bool:
-        """Whether both have the same facts about the same state."""
-        return (
-            isinstance(other, Inference)
-            and self.state == other.state
-            and self.facts == other.facts
-            and self.asserted == other.asserted
-        )
-
-    def __hash__(self) -> int:
-        """Equal for equal inferences."""
-        return hash((self.state, self.facts))
+        return self.asserted_in(self.state)
 
     @cached_property
     def _index(self) -> dict[tuple[str, str], tuple[Value, ...]]:
@@ -202,10 +180,6 @@ class Inference:
         grounding = grounding_name(self.state.grounded(function) or "")
         return next(map(str, self.values(grounding, "fg_status")), None)
 
-    def is_updatable(self, function: str) -> bool:
-        """Whether a better function design may have become available."""
-        return True in self.values(objective_name(function), "o_updatable")
-
     @cached_property
     def statuses(self) -> frozenset[str]:
         """The inferred statuses of objectives and groundings, in words."""
@@ -214,7 +188,7 @@ class Inference:
             status = self.objective_status(objective.function)
             if status is not None and status != objective.status:
                 found.append(f"objective of {objective.function} is {status}")
-            if self.is_updatable(objective.function) and not objective.always_improve:
+            if True in self.values(objective_name(objective.function), "o_updatable") and not objective.always_improve:
                 found.append(f"objective of {objective.function} is updatable")
         for function, design in self.state.groundings:
             if (status := self.grounding_status(function)) is not None:
@@ -277,11 +251,6 @@ class Reasoning:
         state = self.inference.state
         outcomes = {each.function: each.design or NONE_LEFT for each in self.plan.decisions}
         return {function: outcome for function, outcome in outcomes.items() if outcome != state.grounded(function)}
-
-    @property
-    def statuses(self) -> frozenset[str]:
-        """The inferred statuses of objectives and groundings, in words."""
-        return self.inference.statuses
 
 
 def objective_name(function: str) -> str:

@@ -13,7 +13,7 @@ from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.managed.node import ProcessNode, SetPointSender
 from suave_des.monitor.measurements import BatteryMeasurements
-from suave_des.scenario.physical import Battery
+from suave_des.scenario.models import Battery
 
 ABOVE_M = 3.0
 """Height of the set-point above the surface: an autopilot that stops short of it still surfaces."""

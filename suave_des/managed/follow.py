@@ -17,7 +17,7 @@ from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.waypoints import WaypointFunction
-from suave_des.scenario.revision import FollowRevision
+from suave_des.scenario.models import FollowRevision
 from suave_des.vehicle.vehicle import ArrivalCheck
 
 

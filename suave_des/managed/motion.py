@@ -13,7 +13,7 @@ from suave_des.domain import THRUSTER_NAMES
 from suave_des.managed.node import ProcessNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.thrusters import Thrusters
-from suave_des.scenario.revision import RecoveryRevision
+from suave_des.scenario.models import RecoveryRevision
 
 
 @dataclass(eq=False)

@@ -14,8 +14,8 @@ from suave_des.clock import tick_at_or_after
 from suave_des.compiling import Array, compiled
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.managed.waypoints import WaypointFunction
+from suave_des.scenario.models import SpiralRevision
 from suave_des.scenario.modes import Mode
-from suave_des.scenario.revision import SpiralRevision
 from suave_des.vehicle.vehicle import ArrivalCheck
 
 

@@ -22,7 +22,7 @@ from suave_des.domain import (
 )
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
-from suave_des.scenario.quantities import draw
+from suave_des.scenario.models import draw
 
 
 @dataclass(eq=False)

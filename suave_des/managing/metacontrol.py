@@ -24,8 +24,7 @@ from suave_des.knowledge.state import (
 )
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
-from suave_des.scenario.quantities import draw, support
-from suave_des.scenario.revision import MetacontrolRevision
+from suave_des.scenario.models import MetacontrolRevision, draw, support
 
 _cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = WeakKeyDictionary()
 """What follows and is planned, by symbolic state: missions of one scenario go through the same few states."""
@@ -126,9 +125,9 @@ class Metacontrol(ManagingSubsystem):
         recovered = [component for component, status in self.components.items() if status == RECOVERED]
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
-            for line in sorted(reasoning.statuses - self._recorded_statuses):
+            for line in sorted(reasoning.inference.statuses - self._recorded_statuses):
                 self.system.log("inferred", line)
-            self._recorded_statuses = reasoning.statuses
+            self._recorded_statuses = reasoning.inference.statuses
         grounded = self._request_modes(reasoning.plan)
         if not grounded.items() <= self.groundings.items():
             self.reasoning_time_s += latency_s
@@ -252,9 +251,9 @@ class Metacontrol(ManagingSubsystem):
         if RECOVERED in self.components.values():
             return False
         if self.system.recorded:
-            if reasoning.statuses - self._recorded_statuses:
+            if reasoning.inference.statuses - self._recorded_statuses:
                 return False
-            self._recorded_statuses = reasoning.statuses
+            self._recorded_statuses = reasoning.inference.statuses
         current_mode = self.system.modes.current_mode
         for decision in reasoning.plan.decisions:
             function, design = decision.function, decision.design

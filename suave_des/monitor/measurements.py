@@ -20,8 +20,7 @@ from suave_des.compiling import Array, IntArray
 from suave_des.domain import BATTERY_LEVEL
 from suave_des.draws import Draws
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.scenario.models import Scenario
-from suave_des.scenario.physical import Monitor
+from suave_des.scenario.models import Monitor, Scenario
 from suave_des.world.signals import Signal
 
 _DELIVERY_S = 0.01

@@ -11,8 +11,7 @@ from suave_des.draws import Draws
 from suave_des.monitor.diagnostics import HULL, LEAK, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing, message_loss
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.models import Scenario
-from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.models import ConstantSignal, Scenario, SinusoidSignal, StepSignal, TableSignal
 from suave_des.vehicle.model import Pose
 from suave_des.world import signals
 from suave_des.world.signals import Signal

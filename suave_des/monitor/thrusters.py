@@ -12,9 +12,7 @@ from suave_des.domain import THRUSTER_NAMES
 from suave_des.draws import Draws
 from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Timing
-from suave_des.scenario.models import Scenario
-from suave_des.scenario.physical import ThrusterEvent
-from suave_des.scenario.revision import ThrusterFailureRevision
+from suave_des.scenario.models import Scenario, ThrusterEvent, ThrusterFailureRevision
 from suave_des.vehicle.vehicle import ThrusterState, Vehicle
 
 

@@ -20,8 +20,8 @@ from suave_des.kb.states import ManagingSettings
 from suave_des.kb.tracing import Derivation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import local_name
+from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import write_rule
 from suave_des.knowledge.state import Reasoning
 from suave_des.metrics.result import KnowledgeRecord, MissionResult
@@ -189,7 +189,7 @@ def _base(mission: Recorded) -> tuple[Ontology, str]:
     )
     base = read_base(mission.scenario, ontologies, rules)
     for path in (*ontologies, *rules):
-        files.ontology(path)
+        files.note(path)
     before = {Path(name).name: digest for name, digest in mission.record.inputs.items()}
     changed = [
         Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest

@@ -24,7 +24,7 @@ from suave_des.errors import InputError, did_you_mean, line_error, number_of
 from suave_des.records.runs import Runs, read_runs
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import Replacements, load_scenario
-from suave_des.scenario.quantities import Number, Strict, ordered, wrong
+from suave_des.scenario.models import Number, Strict, ordered, wrong
 from suave_des.scenario.schema import validated
 from suave_des.scenario.yamlfile import read_yaml
 

@@ -10,13 +10,10 @@ from typing import Any, Protocol, TypedDict, Unpack
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.resources import find
-from suave_des.scenario.models import REASONERS, Scenario
+from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
-from suave_des.scenario.physical import SignalTable, TableSignal, read_table
 from suave_des.scenario.schema import validated
 from suave_des.scenario.yamlfile import InputFiles, Layer, Location, find_named, scenario_layer
-
-_FILE_NAMES = "return a list of file names as text"
 
 
 class _DeclaresFiles(Protocol):
@@ -86,20 +83,17 @@ class LoadedScenario:
         Raises:
             InputError: a file does not exist, or the class does not declare a list of names.
         """
-        settings = self.manager_settings(manager)
         try:
-            names = kind.input_files(settings)
+            names = kind.input_files(self.manager_settings(manager))
             names = names if isinstance(names, str) else tuple(names)
         except InputError:
             raise
         except Exception as error:
             problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
-            is_missing = isinstance(error, KeyError) and error.args and error.args[0] not in settings
-            remedy = f"give the setting, as in --manager-option {error.args[0]}=..." if is_missing else _FILE_NAMES
-            raise InputError(problem, remedy=remedy) from error
+            raise InputError(problem, remedy="give the settings that it needs, as in --manager-option") from error
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             problem = f"manager {manager}: input_files gave {shown(names)}"
-            raise InputError(problem, remedy=_FILE_NAMES)
+            raise InputError(problem, remedy="return a list of file names as text")
         for name in names:
             yield name, self.manager_file(manager, name)
 
@@ -112,12 +106,11 @@ class LoadedScenario:
         part, _, name = (error.place or "").partition(".")
         if error.file is not None or part not in ("values", "disabled_rules"):
             return error
-        if part == "values":
-            return self.layer.error(error.problem, ("knowledge", part, name), error.remedy)
-        in_file = self.layer.data.get("knowledge", {}).get(part, [])
+        in_file = self.layer.data.get("knowledge", {}).get(part, ())
         if name not in in_file:
             return InputError(error.problem, place="--disable-rule", remedy=error.remedy)
-        return self.layer.error(error.problem, ("knowledge", part, in_file.index(name)), error.remedy)
+        key = name if part == "values" else in_file.index(name)
+        return self.layer.error(error.problem, ("knowledge", part, key), error.remedy)
 
 
 class Replacements(TypedDict, total=False):
@@ -177,10 +170,8 @@ def load_scenario(
     scenario = validated(layer, Scenario)
     knowledge = scenario.knowledge
 
-    if modes_file is None:
-        modes_path = find_named(layer, ("modes_file",), scenario.modes_file, "scenarios")
-    else:
-        modes_path = find(modes_file, "scenarios")
+    named = find_named(layer, ("modes_file",), scenario.modes_file, "scenarios") if modes_file is None else None
+    modes_path = named or find(modes_file or "", "scenarios")
     modes = modes_of(files.yaml(modes_path))
     modes.check(scenario, layer)
     ontologies = tuple(find(each, "ontology") for each in replacements.get("ontologies", ())) or tuple(
@@ -196,7 +187,7 @@ def load_scenario(
         *map(Path, replacements.get("rules", ())),
     )
     for each in (*ontologies, *rules):
-        files.ontology(each)
+        files.note(each)
     tables = {}
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):

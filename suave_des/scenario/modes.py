@@ -20,8 +20,7 @@ from pydantic import (
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MODE
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown, similar
-from suave_des.scenario.models import Scenario
-from suave_des.scenario.quantities import Real, Strict, wrong
+from suave_des.scenario.models import Real, Scenario, Strict, wrong
 from suave_des.scenario.schema import input_error
 from suave_des.scenario.yamlfile import Layer, YamlDocument
 
@@ -116,19 +115,17 @@ class ModeTable:
             if UNGROUND_MODE not in self.modes(function):
                 remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
                 raise InputError(f"function {function} has no mode {UNGROUND_MODE}", file=self.source, remedy=remedy)
-        used: list[tuple[KeyPath, str, str | None]] = [
-            *((("functions", function), function, None) for function in scenario.functions),
+        used: list[tuple[KeyPath, str, str]] = [
+            *((("functions", function), function, DEFAULT_MODE) for function in scenario.functions),
             *((("default_modes", function), function, mode) for function, mode in scenario.default_modes.items()),
-            *(
-                (("managers", "bt", "search_modes", index), GENERATE_SEARCH_PATH, mode)
-                for index, mode in enumerate(scenario.managers.bt.search_modes)
-                # The default names the shipped modes, which another modes file need not have: it matters only to bt.
-                if ("managers", "bt", "search_modes", index) in layer.places
-            ),
         ]
+        for index, mode in enumerate(scenario.managers.bt.search_modes):
+            # The default names the shipped modes, which another modes file need not have: it matters only to bt.
+            if (path := ("managers", "bt", "search_modes", index)) in layer.places:
+                used.append((path, GENERATE_SEARCH_PATH, mode))
         for key_path, function, mode in used:
             try:
-                self.modes(function) if mode is None else self.mode(function, mode)
+                self.mode(function, mode)
             except InputError as error:
                 raise layer.error(error.problem, key_path, error.remedy) from None
 

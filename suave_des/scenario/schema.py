@@ -20,8 +20,6 @@ from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import Layer
 
 _WITH_NAMED_ENTRIES = (("Scenario", "signals"), ("KnowledgeSettings", "values"))
-_WHOLE = ("ThrusterEvent", "ThrusterDescription")
-"""Entries of lists, which no base completes."""
 _EVENT_TEXT = r"^\s*\(\s*[1-6]\s*,\s*(failure|recovery)\s*,[^,]+\)\s*$"
 
 
@@ -37,8 +35,7 @@ def scenario_schema() -> dict[str, Any]:
     for model in dict.fromkeys(model for _, model in models_within(Scenario)):
         for name, text in field_docs(model).items():
             definitions[model.__name__]["properties"][name]["description"] = text
-    for name, definition in definitions.items():
-        definitions[name] = _partial(definition, keep=name in _WHOLE)
+    definitions = {name: _partial(definition) for name, definition in definitions.items()}
     event = {"anyOf": [definitions["ThrusterEvent"], {"type": "string", "pattern": _EVENT_TEXT}]}
     definitions["ThrusterEvent"] = event
     for named in ("signals", "default_modes"):
@@ -63,15 +60,14 @@ def scenario_schema() -> dict[str, Any]:
     }
 
 
-def _partial(schema: Any, *, keep: bool) -> Any:
-    """The same schema with nothing required, unless `keep`; a mapping may then fit several members of a union."""
+def _partial(schema: Any) -> Any:
+    """The same schema with nothing required; a mapping may then fit several members of a union."""
     if isinstance(schema, list):
-        return [_partial(each, keep=keep) for each in schema]
+        return list(map(_partial, schema))
     if not isinstance(schema, dict):
         return schema
-    left_out = ("discriminator",) if keep else ("discriminator", "required")
-    names = {"oneOf": "anyOf"}
-    return {names.get(key, key): _partial(each, keep=keep) for key, each in schema.items() if key not in left_out}
+    kept = {key: each for key, each in schema.items() if key not in ("discriminator", "required")}
+    return {"anyOf" if key == "oneOf" else key: _partial(each) for key, each in kept.items()}
 
 
 def field_docs(model: type[BaseModel]) -> dict[str, str]:
@@ -103,8 +99,8 @@ def _classes(module: str) -> dict[str, ast.ClassDef]:
 
 _TAGGED = ("kind", "distribution", "type")
 """Keys whose word tells the members of a union apart."""
-_NAME, _INDEX = "NAME", "[]"
-"""Stand for any name, and any number of an entry, in the key path of a model."""
+_ANY = "*"
+"""Stands for any name or number of an entry in the key path of a model."""
 AnyModel = TypeVar("AnyModel", bound=BaseModel)
 
 
@@ -161,7 +157,7 @@ def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tup
         for name, field in wanted.model_fields.items():
             yield from models_within(field.annotation, (*path, name))
         return
-    entry = {dict: (_NAME,), tuple: (_INDEX,)}.get(typing.get_origin(wanted), ())
+    entry = (_ANY,) if typing.get_origin(wanted) in (dict, tuple) else ()
     for argument in typing.get_args(wanted):
         yield from models_within(argument, (*path, *entry))
 
@@ -198,7 +194,8 @@ def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | 
         case "missing":
             return "is missing", "add it"
         case "extra_forbidden":
-            return f"unknown key {shown(path[-1])}", _right_key(model, path, detail["loc"])
+            known = dict.fromkeys(_known_keys(model, path[:-1], detail["loc"]))
+            return f"unknown key {shown(path[-1])}", did_you_mean(path[-1], known)
         case "literal_error" | "union_tag_invalid":
             allowed = re.findall(r"'([^']*)'", str(context.get("expected", context.get("expected_tags"))))
             word = context.get("tag", value)
@@ -218,19 +215,10 @@ def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | 
     return f"{shown(value)} {sentence.partition(' ')[2]}", None
 
 
-def _right_key(model: Any, path: KeyPath, loc: KeyPath) -> str:
-    """Where a key that is known elsewhere belongs; else the nearest that is known here."""
-    key, above = str(path[-1]), [_INDEX if isinstance(part, int) else part for part in path[:-1]]
-    known, homes = dict[str, None](), dict[str, None]()
+def _known_keys(model: Any, path: KeyPath, loc: KeyPath) -> Iterator[str]:
+    """The keys that a model has at a key path; of the members of a union, those of the one in pydantic's location."""
     for place, each in models_within(model):
-        if len(place) == len(above) and all(part in (one, _NAME) for part, one in zip(place, above, strict=True)):
-            tags = [
-                typing.get_args(each.model_fields[name].annotation) for name in _TAGGED if name in each.model_fields
-            ]
-            if all(words[0] in loc for words in tags):  # else it is another member of a union
-                known |= dict.fromkeys(each.model_fields)
-        # Distributions are allowed anywhere: the homes of their parameters would not help.
-        elif key in each.model_fields and "distribution" not in each.model_fields:
-            text = ".".join(place).replace(f".{_INDEX}", _INDEX)
-            homes[f"under {text}" if text else "at the top level"] = None
-    return f"it belongs {' or '.join(homes)}" if homes else did_you_mean(key, known)
+        if len(place) == len(path) and all(part in (one, _ANY) for part, one in zip(place, path, strict=True)):
+            tags = (each.model_fields[name].annotation for name in _TAGGED if name in each.model_fields)
+            if all(typing.get_args(tag)[0] in loc for tag in tags):
+                yield from each.model_fields

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -75,22 +75,10 @@ class Layer:
         text = place_text(place.line, (*self.above, *key_path))
         return InputError(problem, file=place.file, place=text, remedy=remedy)
 
-    def without(self, key: str) -> Layer:
-        """The same without one key of the top level."""
-        data = {other: value for other, value in self.data.items() if other != key}
-        places = {path: place for path, place in self.places.items() if path[:1] != (key,)}
-        return Layer(data, places, above=self.above)
-
     def below(self, key: str) -> Layer:
         """The mapping under a key."""
         places = {path[1:]: place for path, place in self.places.items() if path[:1] == (key,)}
         return Layer(self.data[key], {(): self.place((key,)), **places}, above=(*self.above, key))
-
-    def replaced(self, key: str, value: Layer) -> Layer:
-        """The same with another mapping under a key."""
-        others = self.without(key)
-        places = {(key, *path): place for path, place in value.places.items()}
-        return Layer({**others.data, key: value.data}, {**others.places, **places})
 
 
 @dataclass(frozen=True)
@@ -206,7 +194,7 @@ class _Reading:
     def plain(self, node: yaml.Node, key_path: KeyPath) -> Any:
         """Data of a node."""
         if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
-            return self._mapping(node, key_path)
+            return dict(self._entries(node, key_path))
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
             return [self._below(item, item, (*key_path, index)) for index, item in enumerate(node.value)]
         tag = node.tag.replace(_TAG, "!!")
@@ -217,23 +205,21 @@ class _Reading:
         except (ValueError, KeyError):
             raise self._error(node, key_path, f"expected {tag}, got {shown(node.value)}", "remove the tag") from None
 
-    def _mapping(self, node: yaml.MappingNode, key_path: KeyPath) -> dict[str, Any]:
-        data: dict[str, Any] = {}
+    def _entries(self, node: yaml.MappingNode, key_path: KeyPath) -> Iterator[tuple[str, Any]]:
         for key_node, value_node in node.value:
             key = key_node.value
             if not isinstance(key_node, yaml.ScalarNode) or not key.isprintable() or len(key) > 200:
                 raise self._error(key_node, key_path, "a key must be short text", "write `key: value`")
-            if key in data:
+            if (*key_path, key) in self.places:
                 problem = f"the key {shown(key)} appears twice, first in line {self.places[(*key_path, key)].line}"
                 raise self._error(key_node, (*key_path, key), problem, "keep one of them")
-            data[key] = self._below(key_node, value_node, (*key_path, key))
-        return data
+            yield key, self._below(key_node, value_node, (*key_path, key))
 
     def _below(self, place: yaml.Node, node: yaml.Node, key_path: KeyPath) -> Any:
         self.places[key_path] = Location(self._depth, _line(place), self._path)
         if len(self.places) > _VALUES_LIMIT:
-            problem, line = f"expands to more than {_VALUES_LIMIT:,} values", self.places[key_path[:1]].line
-            raise InputError(problem, file=self._path, place=place_text(line, key_path[:1]), remedy="use fewer aliases")
+            problem = f"expands to more than {_VALUES_LIMIT:,} values"
+            raise self._error(place, key_path[:1], problem, "use fewer aliases")
         return self.plain(node, key_path)
 
     def _error(self, node: yaml.Node, key_path: KeyPath, problem: str, remedy: str) -> InputError:
@@ -249,7 +235,6 @@ _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 _PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
 """Parts of a scenario that may be the name of a file, or differ from one that they name as their base."""
 _ONTOLOGY_LIMIT_BYTES = 100_000_000
-_CHAIN_LIMIT = 20
 _DEFAULT_VEHICLE = "bluerov2"
 
 
@@ -269,13 +254,9 @@ class InputFiles:
         self.note(path, document.sha256)
         return document
 
-    def ontology(self, path: Path) -> None:
-        """Hash an ontology or a file of rules, which is parsed elsewhere."""
-        self.note(path, sha256_of(path, _ONTOLOGY_LIMIT_BYTES))
-
-    def note(self, path: Path, sha256: str) -> None:
-        """Store the hash of a file that was read."""
-        self.inputs[shown_name(path)] = sha256
+    def note(self, path: Path, sha256: str | None = None) -> None:
+        """Store the hash of a file that was read, or is an ontology or a file of rules, which are parsed elsewhere."""
+        self.inputs[shown_name(path)] = sha256 or sha256_of(path, _ONTOLOGY_LIMIT_BYTES)
 
 
 def sha256_of(path: Path, limit: int) -> str:
@@ -332,7 +313,9 @@ def scenario_layer(files: InputFiles, path: Path, over: Layer | None = None) -> 
     layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
     for part, folder in _PARTS.items():
         if "base" in (layer.data.get(part) or ()):
-            layer = layer.replaced(part, _over_its_base(files, layer.below(part), folder, (layer.place((part,)).file,)))
+            whole = _over_its_base(files, layer.below(part), folder, (layer.place((part,)).file,))
+            data = {**layer.data, part: whole.data}
+            layer = Layer(data, {**layer.places, **{(part, *path): place for path, place in whole.places.items()}})
     return Layer({**layer.data, "name": name}, layer.places)
 
 
@@ -352,12 +335,13 @@ def _over_its_base(files: InputFiles, layer: Layer, kind: str, chain: tuple[Path
         return layer
     path = find_named(layer, ("base",), layer.data["base"], kind)
     chain = (*chain, path)
-    if len({each.resolve() for each in chain}) < len(chain) or len(chain) > _CHAIN_LIMIT:
+    if len({each.resolve() for each in chain}) < len(chain):
         names = " -> ".join(each.name for each in chain)
         raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
     below: Layer = files.yaml(path, len(chain) - 1)
     below = _over_its_base(files, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
-    return merge(below, layer.without("base"))
+    own = {key: value for key, value in layer.data.items() if key != "base"}
+    return merge(below, Layer(own, layer.places, above=layer.above))
 
 
 def merge(base: Layer, over: Layer) -> Layer:
@@ -381,10 +365,9 @@ def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: 
             merged[key] = _merge(known, value, below, replaced)
             continue
         replaced.add(below)
+        merged[key] = value
         if value is None and key in base and path in _REMOVABLE_IN:
             del merged[key]
-        else:
-            merged[key] = value
     return merged
 
 

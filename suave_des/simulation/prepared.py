@@ -19,8 +19,7 @@ from suave_des.learned import read_learned
 from suave_des.managed.follow import InspectionPath
 from suave_des.registry import custom_functions, manager_class
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.models import Calibration
-from suave_des.scenario.physical import CurrentWaveDescription, VehicleDescription
+from suave_des.scenario.models import Calibration, CurrentWaveDescription, VehicleDescription
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
 from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle, track_rows

@@ -13,8 +13,7 @@ from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.models import Scenario
-from suave_des.scenario.physical import Battery
+from suave_des.scenario.models import Battery, Scenario
 
 MOTION, SEARCH, FOLLOW = "f_maintain_motion", "f_generate_search_path", "f_follow_pipeline"
 SCENARIOS = {"2023": load_scenario("seams2023"), "1.5": load_scenario("release15")}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import rdflib
+
 from suave_des.knowledge.ontology import Ontology
 from tests.helpers.owl_text import XSD
 
@@ -32,9 +34,11 @@ HEADER = f"""\
 
 def numbers_ontology(folder: Path) -> Ontology:
     """Write and load it: rule is_NAME says of each thing with a number like that of thing NAME is(thing, NAME)."""
-    owl, rules = folder / "numbers.ttl", folder / "numbers.swrl"
+    owl, rules = folder / "numbers.owl", folder / "numbers.swrl"
     things = [f":{name} a :Thing ; :first {text} ; :second {text} .\n" for name, text in NUMBERS.items()]
-    owl.write_text(HEADER + "".join(things), encoding="utf-8")
+    before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write numbers in one form
+    rdflib.Graph().parse(data=HEADER + "".join(things), format="turtle").serialize(owl, format="xml")
+    rdflib.NORMALIZE_LITERALS = before
     known = [f'is_{name}: first(?x, {text}) -> is(?x, "{name}")\n' for name, text in NUMBERS.items()]
     known += [
         "same: first(?x, ?v) ^ second(?y, ?v) -> same(?x, ?y)\n",

@@ -9,8 +9,8 @@ import simpy
 from suave_des.compiling import Array
 from suave_des.managed.node import SetPointSender
 from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.models import Revision
 from suave_des.scenario.modes import Mode
-from suave_des.scenario.revision import Revision
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle import kernel
 from suave_des.vehicle.model import GRAVITY_M_PER_S2

@@ -169,7 +169,7 @@ sys.exit(5)
         program = """
 import atexit, sys, threading
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.pellet import java
+from suave_des.knowledge.pellet import in_process as java
 from suave_des.knowledge.pellet import TimeLimit
 thread = java.java_class("java.lang.Thread")
 atexit.register(lambda: print([each.name for each in threading.enumerate() if each.name == "reasoner"]))

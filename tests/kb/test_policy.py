@@ -97,7 +97,7 @@ class TestPolicy:
             for function in policy.functions:
                 then = case[f"{function}_then"]
                 assert then == ("" if not case[f"{function}_now"] else reasoning.changes.get(function, "stays"))
-            assert "; ".join(sorted(reasoning.statuses)) == case["statuses"]
+            assert "; ".join(sorted(reasoning.inference.statuses)) == case["statuses"]
 
     def test_the_search_table_has_the_deployed_thresholds(self, policy):
         table = function_table(policy, SEARCH).table

@@ -15,8 +15,7 @@ from rdflib.term import Node
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
-from suave_des.knowledge.planning import plan
-from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.reasoner import Reasoner, plan
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
 from tests.helpers.number_ontology import numbers_ontology

@@ -7,9 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.ontology_file import read_ontology
 from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.knowledge_states import searching
 from tests.helpers.owl_text import individual, rule
@@ -25,8 +24,8 @@ BAD_FILES: dict[str, tuple[str, str]] = {
     ),
     "web page": ("<!DOCTYPE html>\n<html><body/></html>", "the root element is <html>"),
     "owl/xml": ('<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "the root element is <Ontology>"),
-    "turtle": ("# mine\n@prefix : <http://x.org/y#> .\n", "save it in Protégé as RDF/XML, or give it the ending"),
-    "json": ('{"@context": {}}', "give it the ending of what it is: .ttl, .nt"),
+    "turtle": ("# mine\n@prefix : <http://x.org/y#> .\n", "an OWL ontology in RDF/XML is expected"),
+    "json": ('{"@context": {}}', "an OWL ontology in RDF/XML is expected"),
     "bad rdf": (HEAD + '<owl:Ontology rdf:about="http://x.org/y" rdf:ID="z"/></rdf:RDF>', "not RDF/XML"),
     "spaces in an iri": (HEAD + '<owl:Ontology rdf:about="http://x.org/a b"/></rdf:RDF>', "is not an IRI"),
     "external entity": (
@@ -191,15 +190,6 @@ def test_a_rule_that_uses_an_object_property_for_data_is_an_error(suave_copy):
     assert f"{path}: rule odd: typeFD is declared as object property, but used as data property" in problem
 
 
-@pytest.mark.parametrize(("ending", "form"), [("ttl", "turtle"), ("nt", "nt")])
-def test_the_format_goes_by_the_ending(ending, form, kb, shipped, tmp_path):
-    path = tmp_path / f"suave.{ending}"
-    path.write_text(read_ontology(shipped / "suave.owl").graph.serialize(format=form), encoding="utf-8")
-    base = Ontology.load([path])
-    assert base.facts == kb.facts
-    assert {rule.text for rule in base.rules} == {rule.text for rule in kb.rules}
-
-
 @pytest.mark.parametrize("encoding", ["UTF-16", "ISO-8859-1"])
 def test_xml_is_read_in_the_encoding_that_it_declares(encoding, shipped, tmp_path):
     text = (shipped / "suave.owl").read_text(encoding="utf-8")
@@ -207,20 +197,6 @@ def test_xml_is_read_in_the_encoding_that_it_declares(encoding, shipped, tmp_pat
     path = tmp_path / "suave.owl"
     path.write_bytes(declared.replace("fd_spiral_low", "fd_spiral_bröd").encode(encoding))
     assert "fd_spiral_bröd" in Ontology.load([path]).designs("f_generate_search_path")
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "problem"),
-    [
-        ("bad.ttl", "@prefix a: <http://x.org/#> .\na:b a:c .\n", "line 2: not Turtle: "),
-        ("bad.nt", "<http://x.org/a> .\n", "not N-Triples: "),
-    ],
-)
-def test_a_file_that_cannot_be_read_is_reported_by_its_format(name, content, problem, tmp_path):
-    (tmp_path / name).write_text(content, encoding="utf-8")
-    with pytest.raises(KnowledgeError) as caught:
-        read_ontology(tmp_path / name)
-    assert problem in str(caught.value)
 
 
 def test_a_datatype_as_owlready2_saves_it_is_that_of_xml_schema(shipped, tmp_path):

@@ -1,6 +1,7 @@
 """The cached reasoner's answers are Pellet's: on several ontologies, around every threshold, and from a file."""
 
 import random
+from collections import Counter
 from decimal import Decimal
 from functools import lru_cache
 from pathlib import Path
@@ -88,7 +89,7 @@ def near(kb: Ontology) -> st.SearchStrategy[Decimal]:
 def states(draw: st.DrawFn, kb: Ontology) -> KnowledgeState:
     grounded = {SEARCH: draw(st.sampled_from(kb.designs(SEARCH))), MOTION: draw(st.sampled_from(kb.designs(MOTION)))}
     functions = draw(st.lists(st.sampled_from([SEARCH, MOTION]), unique=True))
-    measured = draw(st.lists(st.sampled_from(kb.quality_attributes), unique=True, max_size=3))
+    measured = draw(st.lists(st.sampled_from(sorted(kb.model.attributes)), unique=True, max_size=3))
     return KnowledgeState.of(
         [ObjectiveState(name) for name in functions],
         groundings={name: grounded[name] for name in functions if draw(st.booleans())},
@@ -98,18 +99,16 @@ def states(draw: st.DrawFn, kb: Ontology) -> KnowledgeState:
 
 
 def moved(draw: random.Random, kb: Ontology, state: KnowledgeState) -> KnowledgeState:
-    """The state with its values moved about inside their gaps, their order kept where they share one."""
+    """The state with each value that has a gap to itself moved about inside it."""
     regions = regions_of(kb)
     bounds = [Decimal(-10), *regions.thresholds, Decimal(100)]
-    gaps: dict[int, list[Decimal]] = {}
-    for _, value in state.measurements:
-        gaps.setdefault(regions.region(value), []).append(value)
+    shared = Counter(regions.region(value) for _, value in state.measurements)
     fresh: dict[Decimal, Decimal] = {}
-    for region, values in gaps.items():
+    for _, value in state.measurements:
+        region = regions.region(value)
         low, high = bounds[region // 2], bounds[min(region // 2 + 1, len(bounds) - 1)]
-        places = sorted(draw.sample(range(1, 1000), len(set(values))))
-        for value, place in zip(sorted(set(values)), places, strict=True):
-            fresh[value] = value if region % 2 else low + (high - low) * place / 1000
+        is_moved = region % 2 == 0 and shared[region] == 1
+        fresh[value] = low + (high - low) * draw.randrange(1, 1000) / 1000 if is_moved else value
     return KnowledgeState.of(
         state.objectives,
         groundings=dict(state.groundings),

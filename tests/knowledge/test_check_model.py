@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import Finding, KnowledgeError, Level
 from suave_des.kb.check import check
 from suave_des.knowledge.checks import Subject
@@ -30,24 +29,11 @@ from tests.helpers.command import command_here
 from tests.helpers.exemplar_files import write_as_owlready2_saves_it, write_exemplar_files, write_files_of_2023
 
 
-def test_a_component_that_nothing_reports_is_noted(tmp_path):
-    status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
-    extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
-    reported = dict.fromkeys(THRUSTER_NAMES, ("FALSE",))
-    findings = found(tmp_path, extra=extra, reported=reported)
-    assert [one.message for one in findings if "reports the status" in one.message] == [
-        "nothing in the simulation reports the status of component c_camera, so missions never have one"
-    ]
-    assert only(findings, "component c_camera").level is Level.INFO
-    assert not any("reports the status" in one.message for one in found(tmp_path, extra=extra))
-
-
 def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy, tmp_path):
     path = suave_copy(replace={'water_visibility"': 'water_visability"'}, name="mine.owl")
     findings = findings_of(Subject([path], measured=["water_visibility"]))
     unknown = only(findings, "missions measure water_visibility, but no ontology has")
     assert (unknown.level, unknown.file, unknown.remedy) == (Level.WARN, str(path), "did you mean water_visability?")
-    assert only(findings, "do not measure water_visability, so what").level is Level.INFO
     assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
 
 
@@ -133,29 +119,6 @@ def test_a_file_as_owlready2_saves_it_with_a_placeholder_has_no_error(kind, tmp_
     assert errors(findings_of(Subject([write_as_owlready2_saves_it(tmp_path / "suave.owl", kind)]))) == []
 
 
-@pytest.mark.parametrize(
-    ("body", "column", "message"),
-    [
-        ("hasQAvalue(?q, ?g) ^ hasValue(?q, 2.0)", 25, "?q is a FunctionGrounding in hasQAvalue, but a QAvalue in"),
-        ("FunctionDesign(?d) ^ hasQAvalue(?d, ?q)", 25, "?d is a FunctionDesign, but a FunctionGrounding in"),
-        ('fg_status(fd_spiral_low, "IN_ERROR_NFR")', 4, "fd_spiral_low is a FunctionDesign, but a FunctionGroun"),
-    ],
-)
-def test_a_thing_of_two_kinds_in_a_rule(tmp_path, body, column, message):
-    finding = only(found(tmp_path, f"A: {body} -> Role(fd_spiral_low)"), message)
-    assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", column)
-
-
-def test_a_thing_may_be_of_two_kinds_if_the_ontology_or_a_rule_says_so(tmp_path):
-    rule = "A: Component(?c) ^ fd_realisability(?c, false) -> Role(?c)\n"
-    assert any("?c is a Component" in one.message for one in found(tmp_path, rule))
-    both = individual("c_and_fd", "Component", f'<rdf:type rdf:resource="{TOMASYS}FunctionDesign"/>')
-    below = "".join(f'<rdfs:subClassOf rdf:resource="{TOMASYS}{name}"/>' for name in ("Component", "FunctionDesign"))
-    subclass = f'<owl:Class rdf:about="{SUAVE}Module">{below}</owl:Class>'
-    for more, extra in (("", both), ("", subclass), ("B: Role(?c) -> FunctionDesign(?c)", "")):
-        assert not any("?c is a Component" in one.message for one in found(tmp_path, rule + more, extra))
-
-
 def same(name: str) -> str:
     return f'<owl:sameAs rdf:resource="{SUAVE}{name}"/>'
 
@@ -188,11 +151,6 @@ WRONG = {
     "fact that leads to another class": (
         individual("c_new", "Component", f'<mros:requiredBy rdf:resource="{SUAVE}qa_water_visibility_low"/>'),
         "qa_water_visibility_low: requiredBy: it is of another class than the one that the property leads to",
-    ),
-    "measured value that is not measured": (
-        individual("obs_current", "QAvalue", link("isQAtype", "current") + value("hasValue", "2.5"))
-        + individual("current", "QualityAttributeType", value("qa_comparison_operator", "&lt;", "string")),
-        "hasValue of obs_current is not used: current has the value that missions measure",
     ),
 }
 

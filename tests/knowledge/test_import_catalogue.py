@@ -6,8 +6,7 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.planning import plan
-from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.reasoner import Reasoner, plan
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 

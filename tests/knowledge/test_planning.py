@@ -7,9 +7,8 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.planning import plan
 from suave_des.knowledge.rdf import QA_OPERATOR, Lit
-from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.reasoner import Reasoner, plan
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import individual

@@ -11,7 +11,7 @@ import pytest
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import java
+from suave_des.knowledge.pellet import in_process as java
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.reasoner import BACKENDS, Reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState, exact

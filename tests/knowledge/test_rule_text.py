@@ -12,8 +12,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import MROS, SWRLB, TOMASYS, XSD, Lit
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.rules import Atom, Named, Place, Rule, Variable, full_name, naming, write_rule
-from suave_des.knowledge.rules.checks import fatal_problems
-from suave_des.knowledge.rules.files import rule_from_text
+from suave_des.knowledge.rules.files import fatal_problems, rule_from_text
 from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
 from tests.helpers.owl_text import rule as rule_in_owl
 
@@ -74,7 +73,7 @@ def full(name: str) -> str:
         ("A: B(?x -> C(?x)", "line 1, column 9", "expected , or )"),
         ("A: B(?x)) -> C(?x)", "line 1, column 9", "expected ^ or ->"),
         ("A: B(?x)\n  C(?x) -> D(?x)", "line 2, column 3", "expected ^ or -> instead of 'C'"),
-        ("A B(?x) -> C(?x)", "line 1, column 3", "expected : after A, instead of 'B'"),
+        ("A B(?x) -> C(?x)", "line 1, column 3", "expected : instead of 'B'"),
         ("A: B(?x) ->", "line 1, column 12", "the text ends here"),
         ('A: B(?x) -> c(?x, "open)', "line 1, column 19", "no closing quote"),
         (r'A: B(?x) -> c(?x, "\q")', "line 1, column 19", r"unknown escape \q"),
@@ -144,10 +143,14 @@ def test_after_a_mistake_the_other_rules_are_read():
         ("hasValue(?f, 2) -> Role(?f)", 17, "write 2.0"),
         ("hasValue(?q, ?v) ^ Role(?v) -> Role(?q)", 28, "?v stands for an individual and for a value"),
         ("Role(?x) -> lessThan(1, 2)", 16, "occurs in the head"),
-        ("isQAtype(?q, turbidity) -> Role(?q)", 17, "declare it: an individual turbidity of QualityAttributeType"),
-        ("c_status(?c, FALSE) -> Role(?c)", 17, 'FALSE is not defined (write "FALSE" for a text, ?FALSE for a'),
-        ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (write false)"),
-        ("hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)", 23, "not 3 (write decimals with a point)"),
+        ("isQAtype(?q, turbidity) -> Role(?q)", 17, "declare it, or write"),
+        ("c_status(?c, FALSE) -> Role(?c)", 17, 'FALSE is not defined (declare it, or write "FALSE" for a text'),
+        ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (declare it"),
+        (
+            "hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)",
+            23,
+            "not 3 (arguments are separated by",
+        ),
     ],
 )
 def test_rules_that_pellet_would_ignore_are_refused(rule, column, words, tmp_path):

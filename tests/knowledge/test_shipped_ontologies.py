@@ -69,8 +69,8 @@ def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped):
 
 def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
     assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
-    assert kb.components == tuple(f"c_thruster_{n}" for n in range(1, 7))
-    assert set(kb.quality_attributes) == {"water_visibility", "battery_level", "performance", "energy", "safety"}
+    assert tuple(kb.model.components) == tuple(f"c_thruster_{n}" for n in range(1, 7))
+    assert set(kb.model.attributes) == {"water_visibility", "battery_level", "performance", "energy", "safety"}
     visibility = {d: kb.expected(d)["water_visibility"] for d in kb.designs("f_generate_search_path")}
     assert visibility == {
         "fd_spiral_high": Decimal("3.25"),

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.managed.detection import PipelineDetector
-from suave_des.scenario.physical import Pipeline
+from suave_des.scenario.models import Pipeline
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_point_in_view, sample_points

@@ -9,7 +9,7 @@ from suave_des.managed.destinations import GenerateRechargePath
 from suave_des.managed.motion import MaintainMotion
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryMeasurements, Timing
-from suave_des.scenario.physical import Battery
+from suave_des.scenario.models import Battery
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, revision, sender
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])

@@ -7,7 +7,7 @@ import pytest
 from suave_des import InputError, run_campaign, run_mission
 from suave_des.registry import is_built_in, manager_class
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.quantities import support
+from suave_des.scenario.models import support
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.managers_at_work import FOLLOW, MODES, MOTION, SEARCH, AtWork
 

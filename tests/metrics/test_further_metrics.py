@@ -12,10 +12,8 @@ from suave_des.errors import InputError
 from suave_des.metrics.further import FurtherMetrics, covered_area_m2, measured_at_rows
 from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.models import FURTHER_METRICS, Requirement
+from suave_des.scenario.models import FURTHER_METRICS, Requirement, ThrusterEvent, ThrusterFailureRevision
 from suave_des.scenario.modes import Mode
-from suave_des.scenario.physical import ThrusterEvent
-from suave_des.scenario.revision import ThrusterFailureRevision
 from suave_des.simulation.simulator import Simulator
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing, region_of
 from suave_des.monitor.thrusters import thruster_monitor
-from suave_des.scenario.physical import ThrusterEvent
+from suave_des.scenario.models import ThrusterEvent
 from suave_des.world.signals import constant, sinusoid, step
 
 VISIBILITY = sinusoid(80.0, 1.25, 3.75)

@@ -37,8 +37,6 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "start: {x: 1}\nfoo: 1\nbar: 2\n", "line 2, start.x", "and 2 more"),
         ("signals: {}\n", "line 1, signals", "no signal named water_visibility"),
         (WHOLE + "{kind: constant, value: 2}\n  my sea: {kind: constant, value: 1}\n", "line 4, ", "'my sea' is not a"),
-        # keys in the wrong place
-        (HEAD + "time_limit_s: 300\n", "line 2, time_limit_s", "it belongs under mission"),
         # numbers
         (HEAD + "start: {x_m: .inf}\n", "line 2, start.x_m", ".inf should be a finite number"),
         (VISIBILITY + "{period_s: '80'}\n", "line 3, signals.water_visibility.period_s", "'80' should be a number"),
@@ -75,7 +73,7 @@ def refused(write, content: str, **options: object) -> InputError:
         # other parts
         (HEAD + "mission:\n", "line 2, mission", "nothing should be a mapping"),
         (HEAD + "pipeline: {vertices_m: [[1, 2], [3, 4, 5]]}\n", "line 2, pipeline.vertices_m[0][2]", "is missing"),
-        (HEAD + "managers: {'mine:Manager': {starts_s: .inf}}\n", "line 2, managers.mine:Manager", "not finite"),
+        (HEAD + "managers: {'mine:Manager': {starts_s: .inf}}\n", "line 2, managers.mine:Manager", "finite number"),
         (HEAD + "knowledge: {ontologies: suave.owl}\n", "line 2, knowledge.ontologies", "'suave.owl' should be a list"),
         (HEAD + "knowledge:\n  reasoner: pelet\n", "line 3, knowledge.reasoner", "did you mean 'pellet'? allowed"),
         # revisions and vehicles

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario, with_values
-from suave_des.scenario.quantities import Distribution, draw, support
+from suave_des.scenario.models import Distribution, draw, support
 from suave_des.simulation.simulator import Simulator
 
 ADAPTER: TypeAdapter[Distribution] = TypeAdapter(Distribution)

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.cli.main import main
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import REVISIONS
-from suave_des.scenario.exemplar.exporting import MISSION_FILE, RUNNER_FILE, export_config
-from suave_des.scenario.exemplar.importing import import_config
+from suave_des.scenario.exemplar import MISSION_FILE, REVISIONS, RUNNER_FILE, export_config, import_config
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.yamlfile import parse_yaml
 

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from suave_des.campaign.campaign import run_campaign
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
-from suave_des.scenario.models import Calibration
-from suave_des.scenario.physical import TableSignal, ThrusterEvent
-from suave_des.scenario.quantities import Normal
+from suave_des.scenario.models import Calibration, Normal, TableSignal, ThrusterEvent
 from tests.helpers.command import command_here
 
 HEAD = "base: seams2023.yaml\n"

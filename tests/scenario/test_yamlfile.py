@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.scenario.physical import read_table
+from suave_des.scenario.models import read_table
 from suave_des.scenario.yamlfile import SIZE_LIMIT_BYTES, read_yaml
 
 
@@ -152,7 +152,7 @@ def test_columns_may_be_in_any_order_and_excel_may_have_written_it(write):
 @pytest.mark.parametrize(
     ("content", "place", "problem"),
     [
-        ("", "line 1", "the first line must be t_s,value"),
+        ("", "line 1", "under the first line t_s,value"),
         ("0,3.5\n60,1\n", "line 1", "the columns are '0,3.5'"),
         ("t_s,value\n", "line 1", "has no row under its header"),
         ("t_s,value\n0,1\n60\n", "line 3", "'60' is not two numbers"),

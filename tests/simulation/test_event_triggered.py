@@ -10,7 +10,7 @@ from suave_des.errors import MissionError
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
-from suave_des.scenario.physical import ConstantSignal
+from suave_des.scenario.models import ConstantSignal
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import OUTSIDE, outside_managers
 from tests.helpers.polling import each_pair, effects

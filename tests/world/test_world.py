@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from suave_des.scenario.physical import Pipeline
+from suave_des.scenario.models import Pipeline
 from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points
 from suave_des.world.signals import sinusoid, step, table
 

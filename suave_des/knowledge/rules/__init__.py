@@ -153,27 +153,6 @@ class Rule:
             if atom.kind == "data" and len(atom.arguments) == 2 and isinstance(atom.arguments[1], Variable):
                 yield atom.arguments[1].name, atom.predicate
 
-    @property
-    def properties(self) -> frozenset[tuple[str, bool]]:
-        """(property, whether it is used as a data property) of all atoms."""
-        return _properties(self.atoms)
-
-    @property
-    def head_properties(self) -> frozenset[tuple[str, bool]]:
-        """(property, whether its values are data) that the head asserts."""
-        return _properties(self.head)
-
-    @property
-    def head_classes(self) -> frozenset[str]:
-        """Classes that the head asserts membership in."""
-        return frozenset(atom.predicate for atom in self.head if atom.kind == "class" and atom.predicate != EXPRESSION)
-
-
-def _properties(atoms: Iterable[Atom]) -> frozenset[tuple[str, bool]]:
-    return frozenset(
-        (atom.predicate, atom.kind == "data") for atom in atoms if atom.kind in ("object", "data") and atom.predicate
-    )
-
 
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
     """Texts that atoms mention as values of a property."""

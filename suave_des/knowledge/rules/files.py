@@ -1,10 +1,11 @@
-"""Rules in files: as RDF in ontologies, and as text, whose names are looked up and which is checked."""
+"""Rules in files: the names that they may use, checks of one rule, rules as text, and rules as RDF in ontologies."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -13,29 +14,307 @@ from rdflib import BNode, Graph, Literal, URIRef
 from rdflib.namespace import RDF, RDFS
 from rdflib.term import Node
 
-from suave_des.errors import InputError
+from suave_des.errors import Finding, InputError, KnowledgeError, Level, nearest, with_article
 from suave_des.files import decode, read_bytes
+from suave_des.knowledge import rdf
+from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import IS_QA_TYPE, OWL, SWRL, SWRLA, SWRLB, XSD, Lit, RdfTriple, literal, local_name
-from suave_des.knowledge.rules import (
-    DIFFERENT,
-    EXPRESSION,
-    KINDS,
-    SAME,
-    Atom,
-    AtomKind,
-    Named,
-    ParsedRule,
-    Place,
-    Rule,
-    RuleError,
-    Term,
-    Variable,
-    distinct_variables,
-    rule_text,
-)
-from suave_des.knowledge.rules.checks import Vocabulary, first_error
+from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rules import Atom, AtomKind, Named, ParsedRule, Place, Rule, RuleError, Term, Variable
 from suave_des.knowledge.rules.parser import ParsedRules, parse_rule, parse_rules
+
+# The names that rules may use, and checks of one rule for mistakes that Pellet drops in silence, or that none can use.
+# Which mistakes Pellet ignores was found by giving it each of them (owlready2 0.51's Pellet).
+
+_DECLARED: Final = {
+    rdf.OWL + "Class": "class",
+    rdf.RDFS + "Class": "class",
+    rdf.OWL + "ObjectProperty": "object property",
+    rdf.OWL + "DatatypeProperty": "data property",
+    rdf.OWL + "AnnotationProperty": "annotation property",
+    rdf.RDFS + "Datatype": "datatype",
+    rdf.OWL + "NamedIndividual": "individual",
+}
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """The names that rules may use.
+
+    Attributes:
+        kinds: what each IRI is declared as or used as: class, object property, data property, annotation property,
+            datatype, individual.
+        by_name: IRIs by their last part.
+        ranges: datatypes that the values of a data property can have, where that is one datatype or a choice of them.
+        enumerations: the values that a data property can have, where its range lists them.
+    """
+
+    kinds: Mapping[str, frozenset[str]]
+    by_name: Mapping[str, tuple[str, ...]]
+    ranges: Mapping[str, frozenset[str]]
+    enumerations: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        triples: Collection[rdf.Triple],
+        individuals: Iterable[str] = (),
+        enumerations: Mapping[str, frozenset[str]] | None = None,
+    ) -> Vocabulary:
+        """Collect the names in triples.
+
+        Args:
+            triples: of the ontologies.
+            individuals: further ones, that exist only in states.
+            enumerations: the values that data properties can have, where their ranges list them.
+        """
+        kinds: dict[str, set[str]] = defaultdict(set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}})
+        ranges: dict[str, set[str]] = defaultdict(set)
+        by_name: dict[str, list[str]] = defaultdict(list)
+        for subject, predicate, value in triples:
+            if predicate == rdf.RDF_TYPE and isinstance(value, str):
+                if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
+                    kinds[subject].add(_DECLARED.get(value, "individual"))
+            elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
+                kinds[subject].add("individual")
+                if isinstance(value, str):
+                    kinds[value].add("individual")
+            elif predicate == rdf.RDFS + "range" and isinstance(value, str) and value.startswith(rdf.XSD):
+                ranges[subject].add(value)
+        for iri in individuals:
+            kinds[iri].add("individual")
+        for iri in sorted(kinds):
+            by_name[local_name(iri)].append(iri)
+        return cls(
+            {iri: frozenset(found) for iri, found in kinds.items()},
+            {name: tuple(found) for name, found in by_name.items()},
+            # All ranges of a property hold at once; which values several of them leave is not worked out.
+            {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
+            | dict.fromkeys(enumerations or (), frozenset((rdf.XSD + "string",))),
+            enumerations or {},
+        )
+
+    def candidates(self, name: str) -> tuple[str, ...]:
+        """IRIs that a bare name can mean: those of TOMASys and mros take precedence over others."""
+        found = self.by_name.get(name, ())
+        shared = tuple(iri for iri in found if iri.startswith((rdf.TOMASYS, rdf.MROS)))
+        return shared or found or ((rdf.SWRLB + name,) if rdf.SWRLB + name in swrl.BUILTINS else ())
+
+    def means_itself(self, iri: str) -> bool:
+        """Whether the bare name of an IRI means that IRI."""
+        return self.candidates(local_name(iri)) == (iri,)
+
+    def guess(self, name: str, wanted: Collection[str]) -> str | None:
+        """Suggest a name of the wanted kinds, as a question."""
+        bare = local_name(name)
+        known = [each for each, iris in self.by_name.items() if any(self.kinds[iri] & {*wanted} for iri in iris)]
+        if "builtin" in wanted:
+            known += map(local_name, swrl.BUILTINS)
+        if bare in known and bare != name:
+            return f"did you mean {' or '.join(self.candidates(bare))}?"
+        return nearest(bare, known)
+
+
+#: What is wrong in a rule: where, in words, and what would be right, if that is known.
+Problem = tuple[Place | None, str, str | None]
+_DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
+_ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
+
+
+def about_rule(
+    rule: Rule,
+    message: str,
+    place: Place | None = None,
+    remedy: str | None = None,
+    level: Level = Level.ERROR,
+    begins: str | None = None,
+) -> Finding:
+    """Make a finding about a rule, with the line where it begins, or where an atom of it is.
+
+    Args:
+        rule: the rule.
+        message, remedy, level: of the finding.
+        place: of the atom or argument.
+        begins: where an ontology has the rule, as "line 12".
+    """
+    begins = rule.place or begins
+    line = place.line if place and rule.place else int(begins.removeprefix("line ")) if begins else None
+    return Finding(level, message, str(rule.file), line, rule.name, place.column if place else None, remedy)
+
+
+def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[Finding]:
+    """Find the problems with which a rule cannot work, in the order of its text."""
+    found = list(_variable_problems(rule))
+    for number, atom in enumerate(rule.atoms):
+        found += _atom_problems(atom, vocabulary, is_head=number >= len(rule.body))
+    if not rule.head:
+        found.append((None, "the rule concludes nothing", "write at least one atom after ->"))
+    ordered = sorted(found, key=lambda problem: (problem[0] or Place(0, 0), problem[1]))
+    return [about_rule(rule, message, place, remedy) for place, message, remedy in ordered]
+
+
+def check_rule(rule: Rule, vocabulary: Vocabulary) -> Rule:
+    """Return a rule of a text file that can work.
+
+    Raises:
+        RuleError: it cannot; with line and column.
+    """
+    for each in fatal_problems(rule, vocabulary):
+        place = f"line {each.line}, column {each.column}" if each.column else rule.place
+        raise RuleError(f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy)
+    return rule
+
+
+def check_property_use(rules: Iterable[Rule], vocabulary: Vocabulary) -> None:
+    """Check that rules use each property as it is declared.
+
+    Otherwise Pellet drops every rule with that property, and names the wrong ones.
+
+    Raises:
+        KnowledgeError: with the file and the rule.
+    """
+    for rule in rules:
+        for atom in rule.atoms:
+            others = vocabulary.kinds.get(atom.predicate, frozenset()) & {"object property", "data property"}
+            wanted = _DECLARED_AS.get(atom.kind, "")
+            if atom.kind in ("object", "data") and others and wanted not in others:
+                problem = f"{local_name(atom.predicate)} is declared as {min(others)}, but used as {wanted}"
+                remedy = f"the rule is: {rule.text}"
+                raise KnowledgeError(problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy)
+
+
+def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterator[Problem]:
+    name = local_name(atom.predicate)
+    for number, term in enumerate(atom.arguments):
+        if isinstance(term, Lit) and not rdf.is_well_formed(term):
+            yield atom.place(number), f"{term.text!r} is not an xsd:{local_name(term.datatype)}", None
+            return
+    if atom.kind == "builtin":
+        yield from _builtin_problems(atom, name, is_head=is_head)
+    elif atom.kind == "" or not atom.predicate:
+        yield atom.place(), "an atom without a kind that SWRL knows, or without a name", None
+    elif (wrong := _predicate_problem(atom, name, vocabulary)) is not None:
+        yield wrong
+    elif len(atom.arguments) != (wanted := _ARGUMENTS[atom.kind]):
+        words = "one argument" if wanted == 1 else "two arguments"
+        yield atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None
+    else:
+        for number, term in enumerate(atom.arguments):
+            yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
+
+
+def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem | None:
+    """Check that a class, property or datatype is declared, and used as declared."""
+    declared = vocabulary.kinds.get(atom.predicate, frozenset())
+    if atom.kind == "range":
+        is_known = atom.predicate.startswith(rdf.XSD) or "datatype" in declared
+        return None if is_known else (atom.place(), f"datatype {name} is not defined", None)
+    wanted = _DECLARED_AS.get(atom.kind)
+    if wanted is None or wanted in declared or atom.predicate == swrl.EXPRESSION:
+        return None
+    if not declared:
+        kinds = ("class",) if atom.kind == "class" else ("object property", "data property")
+        remedy = vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
+        return atom.place(), f"{wanted} {name} is not defined", remedy
+    if "class" in declared:
+        return atom.place(), f"{name} is a class, but is used as a property", f"write {name}(?x)"
+    found = next((kind for kind in ("object property", "data property") if kind in declared), min(declared))
+    return atom.place(), f"{name} is {with_article(found)}, but is used as {with_article(wanted)}", None
+
+
+def _argument_problems(
+    atom: Atom, number: int, term: Term, vocabulary: Vocabulary, *, is_head: bool
+) -> Iterator[Problem]:
+    """Check that an argument is an individual or a value, as required, and possible for that property."""
+    name, place, takes_value = local_name(atom.predicate), atom.place(number), atom.takes_value(number)
+    if isinstance(term, Lit) and not takes_value:
+        yield place, f"{name}: {swrl.literal_text(term)} is a value, but an individual is needed", None
+    elif isinstance(term, Named):
+        thing = local_name(term.iri)
+        if takes_value:
+            problem = f"{name}: {thing} is an individual where a value is needed"
+            yield place, problem, f'a text needs quotes: "{thing}"'
+        elif "individual" not in vocabulary.kinds.get(term.iri, ()):
+            yield place, f"individual {thing} is not defined", vocabulary.guess(term.iri, ("individual",))
+    elif isinstance(term, Lit) and atom.kind == "data":
+        consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
+        ranges = vocabulary.ranges.get(atom.predicate, frozenset({term.datatype}))
+        values = vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))
+        whole = term.datatype == rdf.XSD + "integer" and rdf.XSD + "decimal" in ranges  # matches no decimal, but is one
+        if term.datatype not in ranges and not (whole and is_head):
+            wanted = " or ".join(sorted(map(local_name, ranges)))
+            problem = f"{swrl.literal_text(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
+            yield place, problem, f"write {term.text}.0" if whole else f"a value of {wanted}"
+        elif term.text not in values:
+            problem = f"{swrl.literal_text(term)} is not among the values of {name}: it {consequence}"
+            yield place, problem, nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
+
+
+def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Problem]:
+    counts = swrl.BUILTINS.get(atom.predicate)
+    if counts is None:
+        known = sorted(map(local_name, swrl.BUILTINS))
+        suggestion = nearest(name, known) or f"known: {', '.join(known)}"
+        yield atom.place(), f"there is no builtin {name} in Pellet", suggestion
+        return
+    if is_head:
+        yield atom.place(), f"builtin {name} occurs in the head", "Pellet takes builtins in bodies only"
+    least, most = counts
+    if not least <= len(atom.arguments) <= most:
+        wanted = str(least) if least == most else f"{least} or more" if most == 99 else f"{least} to {most}"
+        remedy = "arguments are separated by commas, and decimals have a point"
+        yield atom.place(), f"{name} takes {wanted} arguments, not {len(atom.arguments)}", remedy
+    for number, term in enumerate(atom.arguments):
+        if isinstance(term, Named):
+            yield (
+                atom.place(number),
+                f"{name}: {local_name(term.iri)} is an individual where a value is needed",
+                None,
+            )
+
+
+def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
+    """(atom, number of the argument, name) of each variable."""
+    for atom in atoms:
+        for number, term in enumerate(atom.arguments):
+            if isinstance(term, Variable):
+                yield atom, number, term.name
+
+
+def _variable_problems(rule: Rule) -> Iterator[Problem]:
+    """Find unbound variables, and variables that stand for both an individual and a value."""
+    individuals: dict[str, Place] = {}
+    values: dict[str, Place] = {}
+    for atom, number, name in _uses(rule.atoms):
+        (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number) or Place(0, 0))
+    for name in sorted(individuals.keys() & values.keys()):
+        yield max(individuals[name], values[name]), f"?{name} stands for an individual and for a value", None
+    bound = {
+        name for atom in rule.body if atom.kind in ("class", "object", "data", "same") for name in atom.variables()
+    }
+    builtins = [atom for atom in rule.body if atom.kind == "builtin" and atom.arguments]
+    while more := _computed(builtins, bound) - bound:
+        bound |= more
+    for atom, number, name in _uses(builtins):
+        if name not in bound:
+            problem = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
+            yield atom.place(number), problem, nearest(name, bound)
+    for atom, number, name in _uses(rule.head):
+        if name not in bound:
+            problem = f"?{name} occurs in the head, but the body does not bind it"
+            yield atom.place(number), problem, nearest(name, bound)
+
+
+def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
+    """Variables that builtins compute: the first argument, once all others have values."""
+    return {
+        first.name
+        for first, *others in (atom.arguments for atom in builtins if atom.computes)
+        if isinstance(first, Variable) and all(not isinstance(term, Variable) or term.name in bound for term in others)
+    }
+
+
+# Rules as text.
 
 MAX_BYTES: Final = 8 * 2**20
 
@@ -84,9 +363,10 @@ class RulesFile:
         if self.parsed.errors:
             raise self.parsed.errors[0]
         for name, rule in self.looked_up(vocabulary):
-            if isinstance(rule, Rule) and rule.enabled:
-                rule = first_error(rule, vocabulary) or rule
-            yield name, rule
+            try:
+                yield name, check_rule(rule, vocabulary) if isinstance(rule, Rule) and rule.enabled else rule
+            except RuleError as error:
+                yield name, error
 
     def rules(self, vocabulary: Vocabulary) -> tuple[Rule, ...]:
         """Look up and check its rules.
@@ -94,13 +374,11 @@ class RulesFile:
         Raises:
             RuleError: a rule cannot be read or used; with line and column.
         """
-        return tuple(_usable(rule) for _, rule in self.checked(vocabulary))
-
-
-def _usable(rule: Rule | RuleError) -> Rule:
-    if isinstance(rule, RuleError):
-        raise rule
-    return rule
+        found = tuple(rule for _, rule in self.checked(vocabulary))
+        for rule in found:
+            if isinstance(rule, RuleError):
+                raise rule
+        return tuple(rule for rule in found if isinstance(rule, Rule))
 
 
 def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
@@ -114,8 +392,7 @@ def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
     Raises:
         RuleError: it is not one rule, or cannot be used.
     """
-    rule = rule_from_text(parse_rule(text, file), vocabulary, file)
-    return _usable(first_error(rule, vocabulary) or rule)
+    return check_rule(rule_from_text(parse_rule(text, file), vocabulary, file), vocabulary)
 
 
 def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Rule:
@@ -125,7 +402,7 @@ def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Ru
         RuleError: a name is unknown or ambiguous; with line and column.
     """
     body, head = (tuple(_resolved(atom, vocabulary, file) for atom in side) for side in (parsed.body, parsed.head))
-    text, place = rule_text(body, head), f"line {parsed.place.line}"
+    text, place = swrl.rule_text(body, head), f"line {parsed.place.line}"
     return with_triples(Rule(parsed.name, text, file, parsed.enabled, BNode(), (), body, head, place))
 
 
@@ -134,20 +411,11 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
     predicate = _iri(atom.predicate, atom.place(), vocabulary, file, kinds)
 
     def named(number: int, word: str) -> Named:
-        otherwise = _not_a_name(word, number, predicate)
+        otherwise = f'declare it, or write "{word}" for a text, ?{word} for a variable'
         return Named(_iri(word, atom.place(number), vocabulary, file, ("individual",), otherwise))
 
     arguments = tuple(named(n, term.iri) if isinstance(term, Named) else term for n, term in enumerate(atom.arguments))
     return replace(atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments)
-
-
-def _not_a_name(word: str, number: int, predicate: str) -> str:
-    """Say how to write what is perhaps no individual's name, but a truth value, a text or a variable."""
-    if predicate == IS_QA_TYPE and number == 1:
-        return f"declare it: an individual {word} of QualityAttributeType"
-    if word in ("True", "False"):
-        return f"write {word.lower()}"
-    return f"write ?{word} for a variable" if number == 0 else f'write "{word}" for a text, ?{word} for a variable'
 
 
 def _iri(
@@ -156,7 +424,7 @@ def _iri(
     if ":" in name:
         return name
     if name in ("sameAs", "differentFrom") and "class" in kinds:
-        return OWL + name
+        return rdf.OWL + name
     found = vocabulary.candidates(name)
     if len(found) > 1:
         fitting = tuple(iri for iri in found if vocabulary.kinds[iri] & {*kinds})
@@ -172,11 +440,11 @@ def _iri(
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:
     """Return the kind of an atom's name: as declared if possible, otherwise as its arguments suggest."""
-    if predicate in (SAME, DIFFERENT):
-        return "same" if predicate == SAME else "different"
-    if predicate.startswith(SWRLB):
+    if predicate in (swrl.SAME, swrl.DIFFERENT):
+        return "same" if predicate == swrl.SAME else "different"
+    if predicate.startswith(rdf.SWRLB):
         return "builtin"
-    if predicate.startswith(XSD):
+    if predicate.startswith(rdf.XSD):
         return "range"
     declared = vocabulary.kinds.get(predicate, frozenset())
     if "datatype" in declared:
@@ -189,9 +457,9 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
     return "data" if isinstance(arguments[1], Lit) else "object"
 
 
-IMP: Final = URIRef(SWRL + "Imp")
-_VARIABLE: Final = URIRef(SWRL + "Variable")
-ENABLED: Final = URIRef(SWRLA + "isRuleEnabled")
+IMP: Final = URIRef(rdf.SWRL + "Imp")
+_VARIABLE: Final = URIRef(rdf.SWRL + "Variable")
+ENABLED: Final = URIRef(rdf.SWRLA + "isRuleEnabled")
 _PREDICATE_OF: Final = {
     "object": "propertyPredicate",
     "data": "propertyPredicate",
@@ -199,7 +467,7 @@ _PREDICATE_OF: Final = {
     "range": "dataRange",
     "builtin": "builtin",
 }
-_CLASS_OF: Final = {kind: name for name, kind in KINDS.items()}
+_CLASS_OF: Final = {kind: name for name, kind in swrl.KINDS.items()}
 #: Ends the names that rules without one get.
 WITHOUT_NAME: Final = "without a name"
 #: Beginnings of the IRIs that Protégé and owlready2 give to variables.
@@ -215,7 +483,7 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
 def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
     rules, unnamed = list[Rule](), 0
     found = [(node, _sides(graph, node)) for node in graph.subjects(RDF.type, IMP)]
-    texts = [(rule_text(*sides), node, sides) for node, sides in found]
+    texts = [(swrl.rule_text(*sides), node, sides) for node, sides in found]
     for text, node, (body, head) in sorted(texts, key=lambda each: (each[0], str(each[1]))):
         label = graph.value(node, RDFS.label)
         name = str(label) if label is not None else local_name(str(node))
@@ -227,7 +495,7 @@ def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
 
 
-def _closure(graph: Graph, start: Node) -> Iterator[RdfTriple]:
+def _closure(graph: Graph, start: Node) -> Iterator[rdf.RdfTriple]:
     """The triples of a rule: its own, and those of its lists and atoms, in a fixed order."""
     waiting, seen = [start], {start}
     while waiting:
@@ -241,10 +509,8 @@ def _closure(graph: Graph, start: Node) -> Iterator[RdfTriple]:
 
 def _is_part_of_rule(graph: Graph, node: Node) -> bool:
     """Whether a named node is a list or an atom of a rule, as older editors write them."""
-    return isinstance(node, URIRef) and any(
-        str(kind).startswith(SWRL) and (str(kind).endswith(("Atom", "AtomList")))
-        for kind in graph.objects(node, RDF.type)
-    )
+    kinds = map(str, graph.objects(node, RDF.type)) if isinstance(node, URIRef) else ()
+    return any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
 
 
 def _items(graph: Graph, start: Node | None) -> Iterator[Node]:
@@ -257,10 +523,10 @@ def _items(graph: Graph, start: Node | None) -> Iterator[Node]:
 def _sides(graph: Graph, rule: Node) -> tuple[tuple[Atom, ...], tuple[Atom, ...]]:
     """Body and head, with short names for variables."""
     body, head = (
-        [_read_atom(graph, atom) for atom in _items(graph, graph.value(rule, URIRef(SWRL + side)))]
+        [_read_atom(graph, atom) for atom in _items(graph, graph.value(rule, URIRef(rdf.SWRL + side)))]
         for side in ("body", "head")
     )
-    names = distinct_variables((*body, *head))
+    names = swrl.distinct_variables((*body, *head))
 
     def renamed(atom: Atom) -> Atom:
         terms = (Variable(names[each.name]) if isinstance(each, Variable) else each for each in atom.arguments)
@@ -271,26 +537,21 @@ def _sides(graph: Graph, rule: Node) -> tuple[tuple[Atom, ...], tuple[Atom, ...]
 
 def _read_atom(graph: Graph, node: Node) -> Atom:
     kinds = sorted(str(kind) for kind in graph.objects(node, RDF.type))
-    kind: AtomKind = next((KINDS[name] for name in kinds if name in KINDS), "")
-    predicates = (graph.value(node, URIRef(SWRL + name)) for name in dict.fromkeys(_PREDICATE_OF.values()))
+    kind: AtomKind = next((swrl.KINDS[name] for name in kinds if name in swrl.KINDS), "")
+    predicates = (graph.value(node, URIRef(rdf.SWRL + name)) for name in dict.fromkeys(_PREDICATE_OF.values()))
     predicate = next((term for term in predicates if term is not None), None)
+    arguments = [graph.value(node, URIRef(rdf.SWRL + name)) for name in ("argument1", "argument2")]
     if kind == "builtin":
-        arguments = list(_items(graph, graph.value(node, URIRef(SWRL + "arguments"))))
-    else:
-        given = [graph.value(node, URIRef(SWRL + name)) for name in ("argument1", "argument2")]
-        arguments = [term for term in given if term is not None]
-    if isinstance(predicate, BNode):
-        name = EXPRESSION
-    elif predicate is not None:
-        name = str(predicate)
-    else:
-        name = {"same": SAME, "different": DIFFERENT}.get(kind, "")
-    return Atom(kind, name, tuple(_read_term(graph, term) for term in arguments))
+        arguments = [*_items(graph, graph.value(node, URIRef(rdf.SWRL + "arguments")))]
+    name = {"same": swrl.SAME, "different": swrl.DIFFERENT}.get(kind, "") if predicate is None else str(predicate)
+    name = swrl.EXPRESSION if isinstance(predicate, BNode) else name
+    return Atom(kind, name, tuple(_read_term(graph, term) for term in arguments if term is not None))
 
 
 def _read_term(graph: Graph, term: Node) -> Term:
-    if isinstance(term, Literal):
-        return literal(term)
+    value = rdf.term_of(term)
+    if isinstance(value, Lit):
+        return value
     if (term, RDF.type, _VARIABLE) in graph or str(term).startswith(VARIABLE_IRIS):
         return Variable(str(term))
     return Named(str(term))
@@ -298,12 +559,12 @@ def _read_term(graph: Graph, term: Node) -> Term:
 
 def with_triples(rule: Rule) -> Rule:
     """Add the RDF of a rule that was read from text."""
-    triples: list[RdfTriple] = [(rule.node, RDF.type, IMP), (rule.node, RDFS.label, Literal(rule.name))]
+    triples: list[rdf.RdfTriple] = [(rule.node, RDF.type, IMP), (rule.node, RDFS.label, Literal(rule.name))]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
         triples.append((_write_term(Variable(variable)), RDF.type, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
-        triples.append((rule.node, URIRef(SWRL + side), _write_list(nodes, SWRL + "AtomList", triples)))
+        triples.append((rule.node, URIRef(rdf.SWRL + side), _write_list(nodes, rdf.SWRL + "AtomList", triples)))
     return replace(rule, triples=tuple(triples))
 
 
@@ -317,21 +578,21 @@ def _write_term(term: Term) -> Node:
     return Literal(term.text, datatype=URIRef(term.datatype), normalize=False)
 
 
-def _write_atom(atom: Atom, triples: list[RdfTriple]) -> Node:
+def _write_atom(atom: Atom, triples: list[rdf.RdfTriple]) -> Node:
     node = BNode()
     triples.append((node, RDF.type, URIRef(_CLASS_OF[atom.kind])))
     if atom.kind in _PREDICATE_OF:
-        triples.append((node, URIRef(SWRL + _PREDICATE_OF[atom.kind]), URIRef(atom.predicate)))
+        triples.append((node, URIRef(rdf.SWRL + _PREDICATE_OF[atom.kind]), URIRef(atom.predicate)))
     if atom.kind == "builtin":
         arguments = _write_list([_write_term(term) for term in atom.arguments], str(RDF.List), triples)
-        triples.append((node, URIRef(SWRL + "arguments"), arguments))
+        triples.append((node, URIRef(rdf.SWRL + "arguments"), arguments))
     else:
         for number, term in enumerate(atom.arguments[:2], start=1):
-            triples.append((node, URIRef(f"{SWRL}argument{number}"), _write_term(term)))
+            triples.append((node, URIRef(f"{rdf.SWRL}argument{number}"), _write_term(term)))
     return node
 
 
-def _write_list(items: Sequence[Node], kind: str, triples: list[RdfTriple]) -> Node:
+def _write_list(items: Sequence[Node], kind: str, triples: list[rdf.RdfTriple]) -> Node:
     rest: Node = RDF.nil
     for item in reversed(items):
         node = BNode()

@@ -31,37 +31,6 @@ if TYPE_CHECKING:
 
 MAX_DIGITS: Final = 400
 _WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
-#: Where a rule's name is expected, lark's contextual lexer reads a word alone; elsewhere "my:seen" is a prefixed name.
-_GRAMMAR: Final = rf"""
-start: (prefix | rule)*
-prefix: PREFIX NAME _COLON IRI
-rule: DISABLED? rule_name _COLON body _ARROW atoms
-rule_name: NAME | STRING
-body: atoms?
-atoms: atom ((_AND | _COMMA) atom)*
-atom: name _LPAR (term (_COMMA term)*)? _RPAR
-term: VARIABLE | NUMBER | STRING (_DATATYPE name | LANGUAGE)? | name
-name: IRI | PREFIXED | NAME
-
-PREFIX.3: /prefix(?![\w.-])(?!(\s|#[^\n]*)*:)/
-DISABLED.3: /disabled(?![\w.-])(?!(\s|#[^\n]*)*:)/
-PREFIXED.2: /({_WORD})?:(?!\d)[\w.-]*\w/
-NAME: /{_WORD}/
-IRI: /<[^<>"{{}}|\\^`\s\x00-\x20]+>/
-VARIABLE: /\?[\w-]+/
-NUMBER: /[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{{1,4}})?(?![\w.])/
-STRING: /"([^"\\\n]|\\.)*"/
-LANGUAGE: /@[A-Za-z]+(-[A-Za-z0-9]+)*/
-_DATATYPE: "^^"
-_ARROW: /->|→/
-_AND: /\^|∧/
-_COMMA: ","
-_COLON: ":"
-_LPAR: "("
-_RPAR: ")"
-%ignore /\s+/
-%ignore /#[^\n]*/
-"""
 #: What stands for the terminals of which the first is expected, and what would be right; the first that fits counts.
 _EXPECTED: Final = (
     ("VARIABLE", 'an argument, such as ?o, 2.5, "text", true or an individual,', None),
@@ -146,15 +115,15 @@ def _parser() -> tuple[Lark, _Builder]:
     from lark import Lark
 
     builder = _Builder()
-    return Lark(_GRAMMAR, parser="lalr", lexer="contextual", transformer=builder), builder
+    return Lark.open("grammar.lark", rel_to=__file__, parser="lalr", lexer="contextual", transformer=builder), builder
 
 
 def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> RuleError:
     """Describe the token that was found, and those that were expected."""
-    before = text[:at].split()[-1:] if len(accepted) == 1 else []
-    if before and accepted <= {"_COLON", "_LPAR"} and before[0].lower() in ("and", "or", "not"):
-        at = text.rindex(before[0], 0, at)  # it was taken for the name of a rule or of a predicate
-        before, accepted = [], {"_ARROW"} if "_COLON" in accepted else {"PREFIXED"}
+    words = text[:at].split()[-1:]
+    if words and accepted <= {"_COLON", "_LPAR"} and words[0].lower() in ("and", "or", "not"):
+        at = text.rindex(words[0], 0, at)  # it was taken for the name of a rule or of a predicate
+        accepted = {"_ARROW"} if "_COLON" in accepted else {"PREFIXED"}
     place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
     for word, lacking, remedy in _LACKING:
         if word.match(text, at):
@@ -162,10 +131,6 @@ def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> R
     if text.startswith('"', at) and "STRING" in accepted:
         return RuleError("this text has no closing quote on its line", file=file, place=place)
     expected, right = next((words, right) for name, words, right in _EXPECTED if name in accepted)
-    if before == ["^^"] or text[:at].endswith("^^"):
-        expected = "a datatype, such as xsd:decimal,"
-    elif accepted & {"_COLON", "_LPAR"} and before:
-        expected += f" after {before[0][-30:]},"
     found = _FOUND.match(text, at)
     instead = f"instead of {shown(found.group(), 32)}" if found else "but the text ends here"
     return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=right)

@@ -1,45 +1,157 @@
-"""Import of the exemplar's own configuration files as a scenario, and as a campaign if one is configured."""
+"""The exemplar's own configuration files: their import as a scenario and a campaign, and the way back.
+
+The table of their keys, exemplar_keys.csv, says which revisions read each, what it is here, and its default; the page
+docs/reference/exemplar-files.md shows it. Source: kas-lab/suave (Apache-2.0) at the tags v1.2.1, v1.3.0, v1.4.0 and
+v1.5.0; `2023` made the published runs, `2025` is d5e97be. What the code of 1.2 to 1.4 does otherwise was not read:
+there it counts as 1.5's.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import random
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
+import yaml
 from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
-from suave_des.resources import find, shipped_folder
-from suave_des.scenario.exemplar import (
-    CAMPAIGN,
-    DRAWN,
-    EXPERIMENT,
-    KEYS,
-    LAUNCH,
-    NEWEST,
-    NODES,
-    PERTURBED,
-    REASONER,
-    REVISIONS,
-    RUNNER,
-    node_of,
-    path_of,
-    read_by,
-    read_instead,
-    revision_of,
-)
-from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at
-from suave_des.scenario.models import Scenario
+from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at, with_values
+from suave_des.scenario.models import LONGEST_S, Real, Scenario, mean, ordered
 from suave_des.scenario.modes import modes_of
-from suave_des.scenario.quantities import LONGEST_S, Real, ordered
 from suave_des.scenario.schema import validated
-from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, read_yaml
+from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, parse_yaml, read_yaml
+
+RUNNER, REASONER, LAUNCH, EXPERIMENT = "suave_runner_node", "reasoner", "experiment_launch", "experiments[]"
+"""A campaign's node; any node with a reasoning_period; arguments NAME:=VALUE of a launch; keys of an experiment."""
+CAMPAIGN = "campaign."
+"""Begins what is a key of a campaign file here, and not of a scenario."""
+REVISIONS: Mapping[str, str] = {
+    "2023": "seams2023",
+    "1.2": "release15",
+    "1.3": "release15",
+    "1.4": "release15",
+    "2025": "planta_exp1",
+    "1.5": "release15",
+}
+"""Shipped scenario that an import builds on, by revision, the oldest first."""
+_ORDER = tuple(REVISIONS)
+OLDEST, NEWEST = _ORDER[0], _ORDER[-1]
+FIRST_WITH_RUNNER, FIRST_WITH_BRINGUP = "1.4", "1.5"
+
+
+def is_since(revision: str, first: str) -> bool:
+    """Whether a revision is another one or came after it."""
+    return _ORDER.index(revision) >= _ORDER.index(first)
+
+
+class Key(NamedTuple):
+    """A parameter of a node, or a key of an experiment.
+
+    Attributes:
+        node: that has it.
+        name: of the parameter.
+        path: key path of the scenario, or of the campaign file after CAMPAIGN; empty: nothing here corresponds to it.
+        default: of the exemplar's code, None if there is none or it is not known; its type is the parameter's in ROS 2.
+        meaning: for people.
+        since, until: first and last revision whose code reads it.
+    """
+
+    node: str
+    name: str
+    path: str
+    default: Any
+    meaning: str
+    since: str
+    until: str
+
+    def is_read_by(self, revision: str) -> bool:
+        """Whether the code of a revision reads it."""
+        return is_since(revision, self.since) and is_since(self.until, revision)
+
+
+_TABLE, _REVISIONS_TABLE = (
+    [*csv.DictReader(Path(__file__).with_name(name).read_text(encoding="utf-8").splitlines())]
+    for name in ("exemplar_keys.csv", "exemplar_revisions.csv")
+)
+KEYS = tuple(Key(**{**row, "default": json.loads(row["default"] or "null")}) for row in _TABLE)
+"""The table; the runner gives its parameters to each mission, and draws from its intervals in this order."""
+PERTURBED = f"{CAMPAIGN}perturbations."
+DRAWN = tuple(key for key in KEYS if key.path.startswith(PERTURBED))
+"""The runner's intervals."""
+NODES = tuple(dict.fromkeys(key.node for key in KEYS if key.node not in (REASONER, LAUNCH, EXPERIMENT)))
+ALIASES = {"parent_mission_node": "mission_node", "random_reasoner_node": "task_bridge"}
+"""Other names of nodes; the second is that of 2023."""
+
+_TELLING = {row["name"]: (row["since"], row["until"]) for row in _REVISIONS_TABLE}
+"""First and last revision with a node, a parameter, or the package of a launch."""
+
+
+def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
+    """Tell which revision files are of, and why.
+
+    Args:
+        found: nodes, node.parameter and launched packages in the files.
+        name: of the revision, if the user gave it.
+
+    Raises:
+        InputError: there is none of that name, or the files fit several, or none.
+    """
+    if name is not None:
+        if name in REVISIONS:
+            return name, "as requested"
+        problem = f"there is no revision {shown(name)} of the exemplar"
+        raise InputError(problem, place="--revision", remedy=did_you_mean(name, REVISIONS))
+    fitting, telling = list(_ORDER), ""
+    for each, (first, last) in _TELLING.items():
+        if each in found:
+            left = [revision for revision in fitting if is_since(revision, first) and is_since(last, revision)]
+            telling = each if len(left) < len(fitting) else telling
+            fitting = left
+    if len(fitting) == 1:
+        return fitting[0], f"only revision {fitting[0]} has {telling}"
+    if not fitting:
+        problem = f"no revision of the exemplar has all of {', '.join(each for each in _TELLING if each in found)}"
+        raise InputError(problem, remedy="say which it is: --revision")
+    problem = f"the files fit revisions {', '.join(fitting)} of the exemplar, which differ in their code"
+    raise InputError(problem, remedy=f"say which it is, as in --revision {fitting[-1]}")
+
+
+def read_by(revision: str) -> tuple[Key, ...]:
+    """Return the keys that the code of a revision reads, and that a scenario has."""
+    return tuple(key for key in KEYS if key.path and not key.path.startswith(CAMPAIGN) and key.is_read_by(revision))
+
+
+def path_of(node: str, name: str, unknown: str = "") -> str:
+    """Return the key path of a parameter here; empty if it has none."""
+    return next((key.path for key in KEYS if (key.node, key.name) == (node, name)), unknown)
+
+
+def read_instead(node: str, name: str, revision: str) -> tuple[str | None, str | None]:
+    """Return a parameter's key path, None if it is unknown, and what a revision reads that does not read it."""
+    own = [key for key in KEYS if (key.node, key.name) == (node, name)]
+    if not own or not own[0].path or any(key.is_read_by(revision) for key in own):
+        return (own[0].path if own else None), None
+    others = [f"{key.node}.{key.name}" for key in read_by(revision) if key.path == own[0].path]
+    return own[0].path, (*others, "nothing of the kind")[0]
+
+
+def node_of(entry: str, given: Collection[str], name: str) -> str:
+    """Return the node of the table that an entry of a file is, with these parameters, for one of them; or nothing."""
+    bare = ALIASES.get(entry.removeprefix("/"), entry.removeprefix("/"))
+    if bare in ("**", "*"):  # the parameter is given to every node
+        return next((key.node for key in KEYS if key.name == name and key.node not in (LAUNCH, EXPERIMENT)), "")
+    return bare if bare in NODES else REASONER if "reasoning_period" in given else ""
+
+
+# The import.
 
 PARAMETERS = "ros__parameters"
 EXTENDED = "suave_extended"
@@ -47,8 +159,7 @@ EXTENDED = "suave_extended"
 TREES = {"suave_bt": "bt", "suave_bt_extended": "bt_extended"}
 """Manager by the name of the behaviour tree's executable."""
 _VISIBILITY = "signals.water_visibility."
-_SHIFT = f"{_VISIBILITY}shift_s"
-_NO_COSINE = "the visibility of the base is no cosine"
+_NO_COSINE = "not taken over: the visibility of the base is no cosine"
 
 
 @dataclass(frozen=True)
@@ -57,7 +168,7 @@ class Imported:
 
     Attributes:
         loaded: the scenario.
-        base: name or path of the scenario that it builds on.
+        base: name of the shipped scenario that it builds on.
         why: the reason for its revision.
         scenario: text of its file.
         campaign: text of the campaign file; None if none was requested.
@@ -77,7 +188,6 @@ def import_config(
     out: Path,
     *,
     managers: Collection[str],
-    base: str | None = None,
     revision: str | None = None,
     campaign: Path | None = None,
     runner_seed: int | None = None,
@@ -88,8 +198,7 @@ def import_config(
         files: the exemplar's files, in any order; any revision's.
         out: path of the scenario to be, which determines how it names other files.
         managers: names of the managers that can be run.
-        base: scenario to build on; None: the shipped one of the files' revision.
-        revision: which the files are read as; None: the base's, or the only one that they fit.
+        revision: which the files are read as; None: the only one that they fit.
         campaign: path of the campaign to be; None: no campaign is imported.
         runner_seed: of the exemplar's own draws, which become the campaign's conditions; None: values are drawn anew.
 
@@ -109,27 +218,19 @@ def import_config(
         raise InputError(f"there is no campaign to import: no node {RUNNER} in the files", remedy=remedy)
     experiments = [] if runner is None else list(_experiments(runner, notes))
 
-    of_base = None if base is None else load_scenario(base).scenario.revision.name
-    if revision is None and of_base is not None:
-        revision = of_base if of_base in REVISIONS else NEWEST
     found = {name for each in parameters for name in (each.entry.removeprefix("/"), f"{each.node}.{each.name}")}
     found |= {word for each in experiments for word in each.launch.split()[2:3]}
     revision, why = revision_of(found, revision)
-    base_path = find(base or REVISIONS[revision], "scenarios")
-    if base_path.resolve() == out.resolve():
-        raise InputError("cannot be its own base", file=out, remedy="give --out another name")
-    plain = load_scenario(base_path)
+    base = REVISIONS[revision]
+    plain = load_scenario(base)
     values = _values(parameters, revision, plain, notes) | _battery_constraint(experiments, notes)
-    if of_base is None and plain.scenario.revision.name != revision:
+    if plain.scenario.revision.name != revision:
         values["revision"] = Value(revision, why)
+    if any(other.sha256 != modes[0].sha256 for other in modes):
+        raise InputError("there are two System Modes files", file=modes[-1].path, remedy="give one of them")
     if modes:
-        if any(other.sha256 != modes[0].sha256 for other in modes):
-            raise InputError("there are two System Modes files", file=modes[-1].path, remedy="give one of them")
         values["modes_file"] = Value(str(modes[0].path.resolve()), "as it is")
-    try:
-        loaded = load_scenario(base_path, over=_layer(values, base_path))
-    except InputError as error:
-        raise _in_their_terms(error, values) from None
+    loaded = load_scenario(base, over=_layer(values, plain.path))
 
     mission = None if runner is None else runner.parameters.get("mission_config_file")
     if mission is not None and Path(str(mission.value)).name not in {each.path.name for each in documents}:
@@ -142,14 +243,12 @@ def import_config(
     elif runner is not None:
         listed = ", ".join(name for name in runner.parameters if path_of(RUNNER, name).startswith(CAMPAIGN))
         notes.append(f"no counterpart in a scenario; --campaign FILE writes a campaign file: {RUNNER}: {listed}")
-    is_shipped = base_path.is_relative_to(shipped_folder("scenarios"))
-    named = base_path.stem if is_shipped else _relative(base_path, out)
     order = list(Scenario.model_fields)
-    content = {("base",): (named, why)}
+    content = {("base",): (base, why)}
     for path in sorted(values, key=lambda path: (order.index(path.split(".")[0]), path.split(".")[:-1])):
         value = _relative(modes[0].path, out) if path == "modes_file" else values[path].value
         content[tuple(path.split("."))] = (value, values[path].comment)
-    return Imported(loaded, named, why, _text(documents, content, notes), text, tuple(notes))
+    return Imported(loaded, base, why, _text(documents, content, notes), text, tuple(notes))
 
 
 # The files.
@@ -173,10 +272,9 @@ class Parameter:
     value: Any
     node: str
 
-    @property
-    def key_path(self) -> KeyPath:
-        """Key path in its file."""
-        return (self.entry, PARAMETERS, self.name)
+    def line(self, *below: str | int) -> int:
+        """The line of its value, or of a part of that."""
+        return self.document.place((self.entry, PARAMETERS, self.name, *below)).line
 
     @property
     def keys(self) -> str:
@@ -186,12 +284,12 @@ class Parameter:
     @property
     def place(self) -> str:
         """File, line, node and parameter, for the user."""
-        return f"{self.document.path}: line {self.document.place(self.key_path).line}, {self.keys}"
+        return f"{self.document.path}: line {self.line()}, {self.keys}"
 
     @property
     def source(self) -> str:
         """File and line, for a comment."""
-        return f"{self.document.path.name}, line {self.document.place(self.key_path).line}"
+        return f"{self.document.path.name}, line {self.line()}"
 
 
 def _parameters(documents: Sequence[YamlDocument], notes: list[str]) -> tuple[list[Parameter], list[YamlDocument]]:
@@ -209,16 +307,18 @@ def _parameters(documents: Sequence[YamlDocument], notes: list[str]) -> tuple[li
                 remedy = f"a configuration of the exemplar has NODE: {{{PARAMETERS}: {{KEY: VALUE}}}}"
                 raise document.error(f"{entry} has no mapping {PARAMETERS}", (entry,), remedy)
             given = content[PARAMETERS] or {}
-            found = [Parameter(document, entry, name, given[name], node_of(entry, given, name)) for name in given]
-            parameters += [_events(each, notes) for each in found if each.node]
+            nodes = {name: node_of(entry, given, name) for name in given}
+            for name in filter(nodes.get, given):
+                value = _in_time(given[name]) if name == "thruster_events" else given[name]
+                parameters.append(Parameter(document, entry, name, value, nodes[name]))
             place = f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
             if beside := [other for other in content if other != PARAMETERS]:
                 notes.append(f"{place}: not taken over: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone")
-            if any(each.node for each in found) or (not found and node_of(entry, given, "")):
-                is_ours = True
-                continue
-            remedy = did_you_mean(entry.removeprefix("/"), NODES)
-            notes.append(f"{place}: not taken over: {', '.join(given)}: the node is not known ({remedy})")
+            is_known = any(nodes.values()) or (not given and bool(node_of(entry, given, "")))
+            is_ours = is_ours or is_known
+            if not is_known:
+                remedy = did_you_mean(entry.removeprefix("/"), NODES)
+                notes.append(f"{place}: not taken over: {', '.join(given)}: the node is not known ({remedy})")
         if not is_ours:
             first = next(iter(document.data), "")
             remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
@@ -226,20 +326,15 @@ def _parameters(documents: Sequence[YamlDocument], notes: list[str]) -> tuple[li
     return parameters, modes
 
 
-_NEGATIVE_TIME = re.compile(r",-[^,]*\)$")
+def _in_time(events: Any) -> Any:
+    """Thruster events without spaces, and without empty ones, as ROS 2 writes an empty list.
 
-
-def _events(parameter: Parameter, notes: list[str]) -> Parameter:
-    """The same with thruster events without spaces; those before the start are at the start, as there."""
-    if parameter.name != "thruster_events" or not isinstance(parameter.value, list):
-        return parameter
-    events = ["".join(each.split()) if isinstance(each, str) else each for each in parameter.value]
-    events = [each for each in events if each != ""]  # as ROS 2 writes a list without entries
-    for index, event in enumerate(events):
-        if isinstance(event, str) and _NEGATIVE_TIME.search(event):
-            notes.append(f"{parameter.place}[{index}]: {event} is before the start, and happens at 0 s")
-            events[index] = _NEGATIVE_TIME.sub(",0)", event)
-    return replace(parameter, value=events)
+    Those before the start are at the start: the exemplar triggers them at its first tick.
+    """
+    if not isinstance(events, list):
+        return events
+    texts = ["".join(each.split()) if isinstance(each, str) else each for each in events]
+    return [re.sub(r",-[^,]*\)$", ",0)", each) if isinstance(each, str) else each for each in texts if each != ""]
 
 
 # The scenario's values.
@@ -261,26 +356,28 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
     """
     found, unneeded = dict[str, Parameter](), list[str]()
     has_runner = any(each.node == RUNNER for each in parameters)
+    # The runner passes what has a default to each mission, with or without a value in its file.
+    passed = {key.path for key in read_by(revision) if has_runner and key.node == RUNNER and key.default is not None}
     for parameter in sorted(parameters, key=lambda each: each.node != RUNNER):
         path, read = read_instead(parameter.node, parameter.name, revision)
+        why = None
         if path is None:
             remedy = did_you_mean(parameter.name, [key.name for key in KEYS if key.node == parameter.node])
-            notes.append(f"{parameter.place}: not taken over: unknown key ({remedy})")
+            why = f"unknown key ({remedy})"
         elif not path:
             unneeded.append(f"{parameter.keys} ({parameter.source})")
         elif read is not None:
-            notes.append(f"{parameter.place}: not taken over: revision {revision} reads {read}")
-        elif path == _SHIFT and has_runner and parameter.node != RUNNER:
-            notes.append(f"{parameter.place}: not taken over: {RUNNER} gives each mission its own; without one, 0")
-        elif not path.startswith(CAMPAIGN):
-            other = found.setdefault(path, parameter)
-            if other is parameter or other.value == parameter.value:
-                continue
+            why = f"revision {revision} reads {read}"
+        elif path in passed and parameter.node != RUNNER:
+            why = f"{RUNNER} gives each mission its own; without one, 0"
+        elif not path.startswith(CAMPAIGN) and (other := found.setdefault(path, parameter)).value != parameter.value:
             if other.node != RUNNER or parameter.node == RUNNER:
                 problem, place = f"contradicts {other.place}", parameter.place.partition(": ")[2]
                 remedy = "make them alike, or leave one of them out"
                 raise InputError(problem, file=parameter.document.path, place=place, remedy=remedy)
-            notes.append(f"{parameter.place}: not taken over: the campaign's value counts ({other.place})")
+            why = f"the campaign's value counts ({other.place})"
+        if why is not None:
+            notes.append(f"{parameter.place}: not taken over: {why}")
     if unneeded:
         notes.append(f"no counterpart here, and none needed: {', '.join(unneeded)}")
     values = {path: Value(each.value, f"{each.source}: {each.keys}", each) for path, each in found.items()}
@@ -290,7 +387,7 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
     for key in read_by(revision):
         if key.default is None or key.path in values or not (has_mission or (has_runner and key.node == RUNNER)):
             continue
-        if has_runner and key.path == _SHIFT and key.node != RUNNER:
+        if key.path in passed and key.node != RUNNER:
             continue
         omitted.setdefault(key.node, []).append(key.name)
         if at(base, key.path) != key.default:
@@ -302,9 +399,8 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
         return values
     if has_mission:
         return {f"{_VISIBILITY}kind": Value("sinusoid", "as water_visibility_observer_node has it"), **values}
-    if _SHIFT in found:
-        notes.append(f"{found[_SHIFT].place}: not taken over: {_NO_COSINE}")
-    return {path: each for path, each in values.items() if path != _SHIFT}
+    notes += [f"{each.place}: {_NO_COSINE}" for path, each in found.items() if path.startswith(_VISIBILITY)]
+    return {path: each for path, each in values.items() if not path.startswith(_VISIBILITY)}
 
 
 def at(loaded: LoadedScenario, path: str) -> Any:
@@ -326,21 +422,11 @@ def _layer(values: Mapping[str, Value], base: Path) -> Layer:
             here = here.setdefault(key, {})
         here[last] = value
         if parameter is not None:
-            places[path] = parameter.document.place(parameter.key_path)
+            file = parameter.document.path
+            places[path] = Location(0, parameter.line(), file)
             for index in range(len(value) if isinstance(value, list) else 0):
-                places[(*path, index)] = parameter.document.place((*parameter.key_path, index))
+                places[(*path, index)] = Location(0, parameter.line(index), file)
     return Layer(data, places)
-
-
-def _in_their_terms(error: InputError, values: Mapping[str, Value]) -> InputError:
-    """Return the same error with node and parameter instead of the key path, if it is about a value of the files."""
-    line, _, here = (error.place or "").partition(", ")
-    for path, (_, _, parameter) in values.items():
-        is_about_it = here == path or here.startswith((f"{path}.", f"{path}["))
-        if is_about_it and parameter is not None and error.file == str(parameter.document.path):
-            place = f"{line}, {parameter.keys}{here.removeprefix(path)}"
-            return InputError(error.problem, file=error.file, place=place, remedy=error.remedy)
-    return error
 
 
 # The campaign.
@@ -395,20 +481,12 @@ def _runner(parameters: Sequence[Parameter]) -> Runner | None:
     found = {each.name: each for each in parameters if each.node == RUNNER}
     if not found:
         return None
-    document, entry = next((each.document, each.entry) for each in found.values())
-    return Runner(found, validated(document.below(entry).below(PARAMETERS), _RunnerSettings))
+    first = next(iter(found.values()))
+    return Runner(found, validated(first.document.below(first.entry).below(PARAMETERS), _RunnerSettings))
 
 
 class Experiment(NamedTuple):
-    """Missions of one manager.
-
-    Attributes:
-        place: for the user.
-        manager: the manager's name here.
-        runs: number of missions.
-        launch: the command that launches them.
-        level: of the battery below which they are aborted; None: they go on.
-    """
+    """Missions of one manager, and the level of the battery below which they are aborted; None: they go on."""
 
     place: str
     manager: str
@@ -421,8 +499,8 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
     """The experiments, each by its own launch and mission; notes about what is not simulated."""
     parameter = runner.parameters["experiments"]
     for index, each in enumerate(runner.settings.experiments):
-        line, launch = parameter.document.place((*parameter.key_path, index)).line, each.experiment_launch
-        place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
+        launch, file = each.experiment_launch, parameter.document.path
+        place = f"{file}: line {parameter.line(index)}, {parameter.keys}[{index}]"
         arguments = dict(re.findall(r"(\w+):=(\S*)", launch))
         for node, names in ((EXPERIMENT, json.loads(parameter.value[index])), (LAUNCH, arguments)):
             unknown = [" ".join(name.split()) for name in names if path_of(node, name, "?") == "?"]
@@ -449,12 +527,12 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
 def _battery_constraint(experiments: Sequence[Experiment], notes: list[str]) -> dict[str, Value]:
     """The level below which missions are aborted; a campaign has one for all managers."""
     levels = {each.level for each in experiments}
-    if len(levels) == 1 and (level := levels.pop()) is not None:
-        return {"battery.mission_ends_at_level": Value(level, "battery_constraint_value")} if level > 0 else {}
     why = "not all experiments have it; import this one from a file of its own"
-    given = [each for each in experiments if each.level is not None]
-    notes += [f"{each.place}: not taken over: battery_constraint_value {each.level:g}: {why}" for each in given]
-    return {}
+    for each in experiments if len(levels) > 1 else ():
+        if each.level is not None:
+            notes.append(f"{each.place}: not taken over: battery_constraint_value {each.level:g}: {why}")
+    level = levels.pop() if len(levels) == 1 else None
+    return {"battery.mission_ends_at_level": Value(level, "battery_constraint_value")} if level else {}
 
 
 Entries = dict[tuple[str, ...], tuple[Any, str]]
@@ -486,11 +564,8 @@ def _campaign(
     if not runs:
         raise InputError("none of its managers can be run", place="experiments", remedy=f"known: {', '.join(known)}")
     most = max(runs.values())
-    if fewer := [f"{manager} {number}" for manager, number in runs.items() if number < most]:
-        listed = ", ".join(fewer)
-        notes.append(
-            f"every manager gets {most} runs, although fewer were requested ({listed}); the first are the same"
-        )
+    if fewer := ", ".join(f"{manager} {number}" for manager, number in runs.items() if number < most):
+        notes.append(f"every manager gets {most} runs, although fewer were requested ({fewer}); the first are the same")
     drawn = list(_perturbations(runner, loaded, notes))
     where = runner.comment("experiments")
     entries: Entries = {
@@ -540,7 +615,7 @@ def _perturbations(
                 notes.append(f"{runner.parameters[key.name].place}: shifts nothing: {RUNNER} has no {path}")
         for each in paths:
             if (around := at(loaded, each)) is None:
-                notes.append(f"{runner.parameters[key.name].place}: not taken over: {_NO_COSINE}")
+                notes.append(f"{runner.parameters[key.name].place}: {_NO_COSINE}")
                 continue
             source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {around:g}"
             yield each, number, around, low, high, source
@@ -549,7 +624,6 @@ def _perturbations(
 # YAML with comments that name the source of each value.
 
 _COMMENT_COLUMN = 43
-_WORDS = ("true", "false", "null", "yes", "no", "on", "off")
 
 
 def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[str]) -> str:
@@ -561,26 +635,166 @@ def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[s
             if above[: depth + 1] != path[: depth + 1]:
                 lines.append(f"{'  ' * depth}{key}:")
         above = path
-        line = f"{'  ' * (len(path) - 1)}{path[-1]}: {_flow(value)}"
+        line = f"{'  ' * (len(path) - 1)}{path[-1]}: {json.dumps(value)}"
         lines.append(f"{line:<{_COMMENT_COLUMN}} # {comment}" if comment else line)
     lines += ["", "# About the files:", *(f"#   {note}" for note in notes)] if notes else []
     # No line ends, and no characters that YAML does not allow, from names in the user's files.
     return "".join("".join(char if char.isprintable() else "?" for char in line) + "\n" for line in lines)
 
 
-def _flow(value: Any) -> str:
-    """A value in YAML's flow style."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_flow(key)}: {_flow(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_flow, value)) + "]"
-    if isinstance(value, str) and re.fullmatch(r"[A-Za-z][\w./-]*", value, re.ASCII) and value.lower() not in _WORDS:
-        return value  # plain, where YAML of any version reads just that text
-    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    return json.dumps(value)
-
-
 def _relative(path: Path, file: Path) -> str:
     """How a file names another: relative to its own folder."""
     return Path(os.path.relpath(path.resolve(), file.resolve().parent)).as_posix()
+
+
+# The way back, and what the exemplar cannot express.
+
+MISSION_FILE, RUNNER_FILE = "mission_config.yaml", "runner_config.yml"
+MANAGERS = ("none", "random", "metacontrol", *TREES.values())
+_NOT_COMPARED = ("name", "description", "campaign", "scenario")
+
+
+def export_config(
+    loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str | None = None
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Write a scenario and a campaign as the exemplar's mission and runner files. No file is written.
+
+    Args:
+        loaded: the scenario.
+        campaign: content of a campaign file: managers, runs, seed, runs_per_draw, perturbations, and others.
+        revision: of the exemplar that reads the files; None: the scenario's.
+
+    Returns:
+        The texts by file name, and a line for each key that the exemplar cannot express: import_config would give
+        another value.
+
+    Raises:
+        InputError: there is no such revision, or it has none of the managers.
+    """
+    revision = revision or loaded.scenario.revision.name
+    if revision not in REVISIONS:
+        remedy = did_you_mean(revision, REVISIONS, "give --revision, one of")
+        raise InputError(f"the exemplar has no revision {shown(revision)}", file=loaded.path, remedy=remedy)
+    measured = loaded.scenario.signals[WATER_VISIBILITY]
+    if measured.publishing_period_s is None:
+        period_s = loaded.scenario.revision.monitors.visibility_publishing_period_s
+        loaded = with_values(loaded, {f"signals.{WATER_VISIBILITY}.publishing_period_s": period_s})
+    mission, runner = _mission(loaded, revision), dict[str, Any]()
+    if is_since(revision, FIRST_WITH_RUNNER):
+        runner = {RUNNER: {**mission.pop(RUNNER, {}), **_runner_of(loaded, campaign, revision)}}
+    files = {name: nodes for name, nodes in ((MISSION_FILE, mission), (RUNNER_FILE, runner)) if nodes}
+    head = f"# Written by `suave-des export-config` from {loaded.path.name}, for revision {revision} of the exemplar.\n"
+    texts = dict[str, str]()
+    for name, nodes in files.items():
+        content = {f"/{node}": {PARAMETERS: given} for node, given in nodes.items()}
+        texts[name] = head + yaml.safe_dump(content, sort_keys=False, width=1_000_000)
+    again = import_config(
+        [parse_yaml(text, Path(name)) for name, text in texts.items()],
+        loaded.path.with_name(f"again_{loaded.path.name}"),
+        managers=MANAGERS,
+        revision=revision,
+        campaign=Path("campaign.yaml") if runner else None,
+    )
+    there = yaml.safe_load(again.campaign or "{}")
+    campaign = {key: value for key, value in campaign.items() if value not in (None, {}, [])}
+    lost = list(_differences(loaded.scenario.model_dump(mode="json"), again.loaded.scenario.model_dump(mode="json")))
+    if runner:
+        lost += _differences(campaign, there)
+    elif campaign:
+        lost.append(f"{', '.join(campaign)}: no runner before {FIRST_WITH_RUNNER}")
+    return texts, tuple(lost)
+
+
+def _mission(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, Any]]:
+    """The parameters of each node of which the scenario has a value of their type."""
+    nodes: dict[str, dict[str, Any]] = {}
+    for key in read_by(revision):
+        value = _value(loaded, key.path, key.default)
+        # The reasoner's file is another one. What the runner does anyway may have no key in an older revision.
+        if value is not None and key.node != REASONER and (key.node, value) != (RUNNER, key.default):
+            node = "random_reasoner_node" if (key.node, revision) == ("task_bridge", "2023") else key.node
+            nodes.setdefault(node, {})[key.name] = value
+    return nodes
+
+
+def _value(loaded: LoadedScenario, path: str, default: Any) -> Any:
+    """A value of the scenario in the type of a default, as ROS 2 demands; None if it has none."""
+    if path == "thruster_events":
+        events = loaded.scenario.thruster_events
+        times_s = [mean(each.time_s) for each in events]
+        texts = [str(int(time_s)) if time_s.is_integer() else repr(time_s) for time_s in times_s]
+        return [f"({each.thruster},{each.event},{time_s})" for each, time_s in zip(events, texts, strict=True)]
+    value = at(loaded, path)
+    if value is None and path.endswith((".minimum", ".maximum")):  # of another signal than a cosine
+        value = at(loaded, f"{path.rpartition('.')[0]}.value")
+    if isinstance(default, int | float) and isinstance(value, int | float):
+        return round(value) if isinstance(default, int) else float(value)
+    return value if type(value) is type(default) or (default is None and isinstance(value, str)) else None
+
+
+def _runner_of(loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str) -> dict[str, Any]:
+    """The parameters of the runner that the scenario does not have.
+
+    Raises:
+        InputError: the exemplar has none of the managers.
+    """
+    drawn, found = campaign.get("perturbations") or {}, dict[str, Any]()
+    for key in DRAWN:
+        path = key.path.removeprefix(PERTURBED)
+        events = range(len(loaded.scenario.thruster_events))
+        paths = [f"{path}.{index}.time_s" for index in events] if path == "thruster_events" else [path]
+        intervals = [_interval(drawn.get(each), at(loaded, each)) for each in paths]
+        if intervals and intervals[0] is not None and intervals.count(intervals[0]) == len(intervals):
+            found[key.name] = intervals[0]
+    found["random_interval"] = campaign.get("runs_per_draw", 1)
+    if is_since(revision, FIRST_WITH_BRINGUP):
+        found["random_seed"] = campaign["seed"]
+    managers = [each for each in campaign["managers"] if each in MANAGERS]
+    if not managers:
+        problem = f"the exemplar has none of the managers {', '.join(campaign['managers'])}"
+        raise InputError(problem, file=loaded.path, remedy=f"it has {', '.join(MANAGERS)}")
+    files = {"mission_config_pkg": "suave_missions", "mission_config_file": f"config/{MISSION_FILE}"}
+    experiments = [_experiment(each, campaign["runs"], loaded, revision) for each in managers]
+    return {**found, **files, "experiments": [json.dumps(each) for each in experiments]}
+
+
+def _interval(distribution: Any, at: Any) -> list[float] | None:
+    """What a uniform distribution adds to a value; None if it is no such distribution, or the value is none."""
+    if not isinstance(at, float) or not isinstance(distribution, dict) or distribution["distribution"] != "uniform":
+        return None
+    return [round(distribution[bound] - at, 9) for bound in ("minimum", "maximum")]
+
+
+def _experiment(manager: str, runs: int, loaded: LoadedScenario, revision: str) -> dict[str, Any]:
+    is_extended = manager == "bt_extended"
+    name = manager.removesuffix("_extended")
+    launch = f"ros2 launch suave_{name} suave_{manager}.launch.py"
+    if is_since(revision, FIRST_WITH_BRINGUP):
+        launch = f"ros2 launch suave_bringup mission.launch.py adaptation_manager:={name}"
+        launch += " bt_executable:=suave_bt_extended" if is_extended else ""
+        battery = loaded.scenario.battery
+        if battery is not None and battery.mission_ends_at_level is not None:
+            launch += f" battery_constraint:=true battery_constraint_value:={battery.mission_ends_at_level!r}"
+    mission = EXTENDED if is_extended else EXTENDED.removesuffix("_extended")
+    return {"experiment_launch": launch, "num_runs": runs, "adaptation_manager": name, "mission_name": mission}
+
+
+def _differences(here: Mapping[str, Any], there: Mapping[str, Any], above: str = "") -> Iterator[str]:
+    """Yield a line for each key of which the exemplar has another value."""
+    for key in dict.fromkeys((*here, *there)):
+        one, other = _rounded(here.get(key)), _rounded(there.get(key))
+        if one == other or (not above and key in _NOT_COMPARED):
+            continue
+        if key == "revision" and one["name"] != other["name"]:
+            yield f"revision: {one['name']} here; the code that reads the files is {other['name']}'s"
+        elif isinstance(one, dict) and isinstance(other, dict) and one.get("kind") == other.get("kind"):
+            yield from _differences(one, other, f"{above}{key}.")
+        elif isinstance(one, dict) and isinstance(other, dict):
+            yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
+        else:
+            yield f"{above}{key}: {shown(one)} here, {shown(other)} in the exemplar"
+
+
+def _rounded(value: Any) -> Any:
+    """Plain data without rounding errors."""
+    return json.loads(json.dumps(value), parse_float=lambda text: float(f"{float(text):.9g}"))
