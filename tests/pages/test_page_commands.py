@@ -84,7 +84,7 @@ def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_pat
         (("{mission}", "--seed", "3"), "--seed cannot be used with DIR"),
         (("{mission}", "--scenario", "seams2023"), "both DIR and --scenario"),
         (("{campaign}", "--run", "9"), "run: 9 "),
-        (("{campaign}", "--managers", "bd"), "its managers: none, bt"),
+        (("{campaign}", "--managers", "bd"), "there is no manager 'bd'"),
         (("{campaign}", "--point", "4"), "point: 4 "),
         (("--scenario", "seams2023", "--managers", "none,bt,random"), "2 side by side at most"),
         (("--scenario", "seams2023", "--run", "0"), "run: 0 is out of range"),
