@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 CompareFormat = Literal["table", "csv", "json", "markdown", "latex"]
-FigureKind = Literal["auto", "map", "timeline", "distributions", "sweep"]
+FigureKind = Literal["auto", "map", "timeline", "distributions", "differences", "sweep", "heatmap"]
 """As in results.figures, which is not imported for --help."""
 
 
@@ -279,7 +279,9 @@ def figure(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
     kind: Annotated[
         FigureKind,
-        typer.Option(help="Of a mission: map, timeline; of a campaign: distributions; of a sweep: sweep."),
+        typer.Option(
+            help="Of a mission: map, timeline; of a campaign: distributions, differences; of a sweep: sweep, heatmap."
+        ),
     ] = "auto",
     parameters: Annotated[
         str | None, typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all")

@@ -28,6 +28,8 @@ from suave_des.results.missions import (
     chosen_metrics,
     counted,
     grouped,
+    least_and_greatest,
+    listed,
     missions_of,
     mostly_lost,
     read_half_widths,
@@ -41,6 +43,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from suave_des.results.assisted import AssistedComparison, Source
+
+
+_WORSE = 0.9
+"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
 
 
 def _ends(name: str) -> tuple[str, ...]:
@@ -194,7 +200,7 @@ def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
         " ".join(_conclusions(groups, metrics[0], found, means)),
         pandas.DataFrame(summaries, columns=_SUMMARY).astype({"horizon_s": "Int64"}),
         differences.astype(counts),
-        (*missions.notes, *notes, *caveats(groups, metrics)),
+        (*missions.notes, *notes, *caveats(groups, metrics), *_worse_paired(found)),
         metrics,
         counted(groups),
         *_largest(() if unpaired else pairs, metrics[0], missions.folders),
@@ -210,8 +216,7 @@ def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapp
             continue
         apart = (x - y).dropna()
         if apart.any():
-            runs = apart.index.get_level_values("run")
-            ends = [(float(apart.iloc[at]), int(runs[at])) for at in (int(apart.argmin()), int(apart.argmax()))]
+            ends = least_and_greatest(apart)
             cells = (text for value, run in ends for text in (metric.number(value), str(run)))
             rows.append((f"{first.name} - {second.name}", *cells))
             firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
@@ -228,17 +233,31 @@ def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapp
 def _conclusions(
     groups: Sequence[Group], metric: Metric, differences: Sequence[Row], means: Mapping[str, float]
 ) -> Iterator[str]:
-    """Yield the conclusion; of several points of a sweep at which managers are compared, one for each that differs."""
+    """Yield the conclusion; of points of a sweep at which managers are compared, one for those that have the same."""
     points = dict.fromkeys(group.point for group in groups)
     if len(points) == 1 or len(points) == len(groups):
         points = {"": None}
+    points_of: dict[str, list[str]] = {}
     for point in points:
         own = [group for group in groups if not point or group.point == point]
         names = [group.name for group in own]
         text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
         if metric.name == SEARCH_TIME:
             text = mostly_lost(own) + text
-        yield f"{point.removeprefix(', ')}: {text.replace(point, '')}" if point else text
+        points_of.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
+    for text, where in points_of.items():
+        yield f"{'; '.join(where)}: {text}" if where[0] else text
+
+
+def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
+    """Yield a note on pairs whose differences vary more than those of independent runs would."""
+    worse = [
+        f"{each['group']} - {each['other']} in {each['metric']}, {1.0 / each['variance_ratio']:.1f} times"
+        for each in differences
+        if each["variance_ratio"] is not None and each["variance_ratio"] < _WORSE
+    ]
+    if worse:
+        yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:

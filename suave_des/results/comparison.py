@@ -31,6 +31,7 @@ _EFFECTS = {
 _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
 _MOST_SENTENCES = 3
 """Of a metric of which neither more nor less is better, in the conclusion from all differences."""
+_OPEN = "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
 ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
 """Methods that write a comparison, by the ending of a file's name."""
 
@@ -336,12 +337,13 @@ def conclusion(found: Row, metric: Metric) -> str:
     if not found["test"]:
         return f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
     apart, ranks = estimate_in(found, "difference"), _direction_of_ranks(found)
-    if found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval:
+    if _is_equal(found):
         return f"{group} and {other} have the same {metric.title} in all {number_of(found['n'], 'pair')}."
     test, interval = f"{_basis(found)}, {p_text(found['p_holm'])}", _interval(found, metric)
     mean = f"{group} - {other}: {metric.amount(apart.value)}, {interval}"
     if found["p_holm"] >= SIGNIFICANCE:
-        return f"No difference in {metric.title} is shown between {group} and {other} ({mean}; {test})."
+        but = f" by the test, though {_OPEN}" if _is_open(found) else ""
+        return f"No difference in {metric.title} is shown between {group} and {other}{but} ({mean}; {test})."
     if not _is_claimed(found):
         claim = _rank_claim(found, metric, ranks)
         return f"By ranks, {claim} ({test}), but no difference of the means is shown ({mean})."
@@ -362,6 +364,18 @@ def _rank_claim(found: Row, metric: Metric, ranks: float) -> str:
         return f"{greater} mostly exceeds {less} in {metric.title}"
     first, phrase, second = (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
     return f"{first} {phrase.format('mostly')} {second}"
+
+
+def _is_equal(found: Row) -> bool:
+    """Whether the two have the same value in each pair."""
+    apart = estimate_in(found, "difference")
+    return bool(found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval)
+
+
+def _is_open(found: Row) -> bool:
+    """Whether the interval of the mean shows a difference, and the corrected test does not."""
+    apart = estimate_in(found, "difference")
+    return bool(found["p_holm"] >= SIGNIFICANCE and apart.has_interval and not apart.contains(0.0))
 
 
 def _is_claimed(found: Row) -> bool:
@@ -402,13 +416,15 @@ def overall_conclusion(
     best = max(means, key=lambda name: metric.better * means[name])
     against = [each for each in own if best in (each["group"], each["other"])]
     claimed = [each for each in against if _is_claimed(each) and _favours(each, best, metric)]
-    alike = [_other(each, best) for each in against if each["p_holm"] >= SIGNIFICANCE]
+    alike = [_not_shown(each, best) for each in against if each["p_holm"] >= SIGNIFICANCE]
     sentences = []
     if claimed:
         sentences.append(_claims(best, metric, claimed, alike, len(tested)))
     elif alike:
-        is_shown = f"No difference in {metric.title} is shown between {best}, which has the best mean,"
-        sentences.append(f"{is_shown} and {_and(alike)}.")
+        has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
+        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean,"
+        over = f", after Holm's correction over {number_of(len(tested), 'test')}" if any(map(_is_open, against)) else ""
+        sentences.append(f"{is_shown} and {_and(alike)}{over}.")
     others = [each["conclusion"] for each in against if each["p_holm"] < SIGNIFICANCE and each not in claimed]
     return " ".join([*sentences, *others])
 
@@ -416,6 +432,13 @@ def overall_conclusion(
 def _favours(found: Row, name: str, metric: Metric) -> bool:
     """Whether a group is the better one in the runs that are compared, which need not be all that have a mean."""
     return bool((1.0 if found["group"] == name else -1.0) * metric.better * found["difference"] > 0.0)
+
+
+def _not_shown(found: Row, best: str) -> str:
+    """Name the other one, and what speaks for a difference, or that there is none at all."""
+    if _is_equal(found):
+        return f"{_other(found, best)} (equal in all {number_of(found['n'], 'pair')})"
+    return f"{_other(found, best)} ({_OPEN})" if _is_open(found) else _other(found, best)
 
 
 def _claims(best: str, metric: Metric, claimed: Sequence[Row], alike: Sequence[str], tests: int) -> str:

@@ -1,10 +1,11 @@
-"""Figures of results folders: of a mission, and of a campaign distributions, and means over a sweep."""
+"""Figures of results folders: of a mission; of a campaign distributions, differences, and means over a sweep."""
 
 from __future__ import annotations
 
 import io
 import math
 from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
 from pathlib import Path
 from textwrap import fill
 from types import MappingProxyType
@@ -20,6 +21,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
 
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import mean_of
@@ -33,6 +35,7 @@ from suave_des.results.missions import (
     Missions,
     first_alike,
     grouped,
+    least_and_greatest,
     missions_of,
     read_missions,
     runs_sharing_draw,
@@ -43,9 +46,25 @@ from suave_des.results.style import folded, key_words, value_words
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-AUTO, DISTRIBUTIONS, SWEEP, MAP, TIMELINE = "auto", "distributions", "sweep", "map", "timeline"
+AUTO, MAP, TIMELINE, SWEEP, HEAT_MAP = "auto", "map", "timeline", "sweep", "heatmap"
+DISTRIBUTIONS, DIFFERENCES = "distributions", "differences"
+_ROW_IN = 0.62
+"""Height of a row of a figure that has one for each pair of managers."""
 _LEGEND_LINE_IN, _HANDLE_IN = 0.2, 0.6
 """Height of a line of a legend, and width of an entry without its text."""
+_DOTS = 400
+"""More differences are drawn as so many, evenly taken in the order of their values."""
+_EACH_WITH_EACH = 4
+"""More groups have too many pairs for one figure."""
+_MEAN: dict[str, Any] = {
+    "fmt": "D",
+    "ms": 3,
+    "mfc": "white",
+    "mew": 0.8,
+    "elinewidth": 1.2,
+    "capsize": 2.5,
+    "color": "k",
+}
 
 
 def draw_distributions(groups: Sequence[Group]) -> style.Picture:
@@ -80,6 +99,70 @@ def _mark_limit(axes: Axes, groups: Sequence[Group]) -> None:
         axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
         look: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
         axes.text(limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
+
+
+def _jitter(number: int, height: float) -> NDArray[np.floating]:
+    """Spread points evenly over a height by the golden ratio: no random numbers, equal data give equal figures."""
+    places: NDArray[np.floating] = height * ((np.arange(number) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0)
+    return places
+
+
+def draw_differences(groups: Sequence[Group]) -> style.Picture:
+    """Draw the differences between groups run by run: each run, and the mean with its 95% interval.
+
+    With more than four groups each is compared with the first one only.
+
+    Raises:
+        InputError: no two groups have runs that share their random numbers.
+    """
+    pairs = [(one, groups[0]) for one in groups[1:]]
+    if len(groups) <= _EACH_WITH_EACH:
+        pairs = list(combinations(groups, 2))
+    colours = {group.name: style.line(number)["color"] for number, group in _looks(groups)}
+    rows = []
+    for one, other in pairs:
+        parts = [(one.by_run(metric), other.by_run(metric)) for metric in PAPER_METRICS]
+        apart = [(x - y).dropna() for x, y in parts if x is not None and y is not None]
+        if len(apart) == len(parts) and all(map(len, apart)):
+            rows.append((one, other, apart))
+    if not rows:
+        problem = "no two of these have runs that share their random numbers"
+        raise InputError(problem, place="kind", remedy="give campaigns of two managers or more with the same seed")
+    height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
+    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
+    for place, (axes, _, title) in enumerate(_metric_panels(figure)):
+        axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
+        for row, (one, _, apart) in enumerate(rows):
+            _draw_row_of_differences(axes, row, apart[place], colours[one.name], has_numbers=not shares)
+        axes.set_xlabel(f"difference in {title}")
+        axes.margins(x=0.22)
+        axes.grid(axis="y", visible=False)
+    left = figure.axes[0]
+    names = [f"{one.name}\n\N{MINUS SIGN} {other.name} (n = {len(apart[0]):,})" for one, other, apart in rows]
+    left.set_yticks(range(len(rows)), [style.text(folded(name)) for name in names])
+    left.set_ylim(len(rows) - 0.4, -0.6)
+    handles: list[Artist] = [
+        Line2D([], [], lw=1.2, marker="D", ms=3, mfc="white", color=style.BLACK, label="mean, 95% interval"),
+        Line2D([], [], color=style.GREY, marker="o", ms=2.5, lw=0, label="draw" if shares else "run"),
+    ]
+    _legend(figure, handles, [str(handle.get_label()) for handle in handles])
+    return figure
+
+
+def _draw_row_of_differences(
+    axes: Axes, row: int, apart: pandas.Series[float], colour: str, *, has_numbers: bool
+) -> None:
+    values = apart.sort_values(kind="stable").to_numpy()
+    rain = values[np.unique(np.linspace(0, len(values) - 1, _DOTS).astype(int))]
+    axes.plot(rain, row + 0.08 + _jitter(len(rain), 0.24), "o", color=colour, ms=2.4, alpha=0.6, mew=0)
+    found = mean_of(values.tolist())
+    errors = [[found.value - found.low], [found.high - found.value]] if found.has_interval else None
+    axes.errorbar(found.value, row - 0.1, xerr=errors, **_MEAN)
+    ends = zip(least_and_greatest(apart), (("right", -4), ("left", 4)), strict=True)
+    for (value, run), (side, shift) in ends if has_numbers else ():
+        look: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
+        axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **look)
 
 
 def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
@@ -121,6 +204,8 @@ def _text_width_in(label: str) -> float:
 # Sweeps
 
 _MOST_PARAMETERS = 3
+_MOST_CELLS = 10
+"""Values of a parameter in a heat map."""
 _MOST_VALUES = 16
 """A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
 _BINS = 8
@@ -176,6 +261,62 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     else:
         write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))
     return figure
+
+
+def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.Picture:
+    """Draw means over two swept parameters as numbers in a grid, a row of panels for each manager.
+
+    Args:
+        missions: of a sweep; other swept parameters are averaged over.
+        parameters: across and up; empty: the two that are swept.
+
+    Raises:
+        InputError: one of them is not swept, there are not two, or their values are too many for numbers.
+    """
+    parameters = list(parameters or missions.swept)
+    missions.check_swept(parameters, "parameters")
+    if len(parameters) != 2:
+        problem = f"a heat map is of two swept parameters, and there are {len(parameters)}: {', '.join(parameters)}"
+        raise InputError(problem, place="parameters", remedy="choose two with --parameters")
+    across, up = parameters
+    frame = missions.frame
+    names = _names(frame)
+    managers = list(dict.fromkeys(names))
+    means = {metric: frame.groupby([names, up, across], sort=False)[metric].mean() for metric in PAPER_METRICS}
+    columns, rows = (list(pandas.unique(frame[name])) for name in (across, up))
+    rows, columns = (sorted(each) if not isinstance(each[0], str) else each for each in (rows, columns))
+    if max(len(rows), len(columns)) > _MOST_CELLS:
+        problem = f"{len(columns)} by {len(rows)} means are too many for numbers"
+        raise InputError(
+            problem, place="parameters", remedy=f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
+        )
+    height = len(managers) * (0.24 * len(rows) + 0.3) + 0.9
+    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
+    for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
+        low, high = means[metric].min(), means[metric].max()
+        for axes, manager in zip(of_metric, managers, strict=True):
+            grid = means[metric][manager].unstack(across).reindex(index=rows, columns=columns)
+            image = axes.imshow(grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
+            for (row, column), value in np.ndenumerate(grid.to_numpy(float)):
+                ink = "white" if value < (low + high) / 2.0 else style.BLACK
+                number = METRICS[metric].number(value) if np.isfinite(value) else ""
+                axes.text(column, row, number, color=ink, ha="center", va="center", fontsize=6.5)
+            axes.set_title(style.text(folded(manager)))
+            axes.grid(visible=False)
+        figure.colorbar(image, ax=of_metric, label=f"mean {METRICS[metric].heading}")
+        of_metric[-1].set_xlabel(_folded(key_words(across)))
+        for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
+            axis.set_ticks(range(len(values)), [_folded(style.text(_value_text(each)), 14) for each in values])
+    figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
+    counts = frame.groupby([names, up, across])["run"].nunique().tolist()
+    others = [name for name in missions.swept if name not in parameters]
+    write_below(figure, _averaged(counts, others))
+    return figure
+
+
+def _value_text(value: object) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else value_words(value)
 
 
 def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:
@@ -364,17 +505,20 @@ def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
 
 
 def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:
-    if kind == SWEEP or (kind == AUTO and missions.swept):
+    if kind in (SWEEP, HEAT_MAP) or (kind == AUTO and missions.swept):
         if not missions.swept:
             raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")
-        return draw_sweep(missions, parameters)
+        return draw_heat_map(missions, parameters) if kind == HEAT_MAP else draw_sweep(missions, parameters)
     if parameters:
         raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
-    if kind not in (AUTO, DISTRIBUTIONS):
-        remedy = did_you_mean(kind, (DISTRIBUTIONS, SWEEP))
+    if kind not in (AUTO, DISTRIBUTIONS, DIFFERENCES):
+        remedy = did_you_mean(kind, (DISTRIBUTIONS, DIFFERENCES, SWEEP, HEAT_MAP))
         raise InputError(f"there is no figure {shown(kind)} of a campaign", place="kind", remedy=remedy)
-    figure = draw_distributions(grouped(missions, averages=False)[0])
+    is_of_means = kind == DIFFERENCES
+    groups = grouped(missions, averages=is_of_means)[0]
+    figure = draw_differences(groups) if is_of_means else draw_distributions(groups)
     if missions.swept:
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)
-        write_below(figure, f"missions at all points of the sweep: {swept}")
+        shown_are = "means of each run over" if is_of_means else "missions at"
+        write_below(figure, f"{shown_are} all points of the sweep: {swept}")
     return figure

@@ -253,6 +253,12 @@ class Group:
         return pandas.MultiIndex.from_frame(self.frame[["seed", "run"]])
 
 
+def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
+    """Return the least and the greatest of values by (seed, run), each with its run."""
+    runs = values.index.get_level_values("run")
+    return [(float(values.iloc[at]), int(runs[at])) for at in (int(values.argmin()), int(values.argmax()))]
+
+
 def counted(groups: Sequence[Group]) -> str:
     """Return what the rows of groups are: "mission", "run", "draw", or "value" where they differ."""
     kinds = {group.is_of_missions for group in groups}

@@ -178,6 +178,38 @@ class TestSweep:
         assert "period_s 80: " in found.conclusion and "bt, period_s" not in found.conclusion
 
 
+def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_named_as_such(tmp_path):
+    values = {"thruster_events.0.time_s": [400.0, 500.0]}  # after the time limit
+    run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
+    found = compare_folders([tmp_path / "out"], by=["thruster_events.0.time_s"])
+    assert found.conclusion.startswith("time_s 400; time_s 500: ")
+    ties = compare_frame(runs(a=[100.0, 110.0], b=[100.0, 110.0], c=[150.0, 151.0])).conclusion
+    assert ties.startswith(
+        "No difference in search time is shown between a, which has, with others, the best mean, and"
+    )
+    assert "b (equal in all 2 pairs)" in ties
+
+
+def test_an_interval_without_0_that_the_corrected_test_does_not_support_is_named():
+    b = [100.0 + 0.1 * number for number in range(8)]
+    a = [value - 20.0 - 5.0 * (number % 3) for number, value in enumerate(b)]
+    a[0] = b[0] + 3.0
+    found = compare_frame(runs(a=a, b=b, c=[150.0, 90.0] * 4, d=[80.0, 160.0] * 4, e=[150.0, 95.0] * 4))
+    pair = difference(found, "a", "b")
+    assert pair.p < 0.05 <= pair.p_holm
+    assert interval(pair, "difference")[1] < 0.0
+    open_one = "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
+    assert f"b ({open_one})" in found.conclusion and f"by the test, though {open_one} (a - b: " in pair.conclusion
+    assert f"Holm's correction over {found.differences['test'].notna().sum()} tests" in found.conclusion
+
+
+def test_pairs_that_vary_more_than_independent_runs_are_noted():
+    times = [100.0 + 5.0 * number for number in range(10)]
+    against = compare_frame(runs(a=times, b=times[::-1])).notes
+    assert any("larger, not smaller (a - b in search_time_s, 2.0 times" in note for note in against)
+    assert not any("larger, not smaller" in note for note in compare_frame(runs(a=times, b=times)).notes)
+
+
 def test_that_most_missions_did_not_find_the_pipeline_comes_first():
     lost = [300.0] * 15 + [120.0] * 5
     found = compare_frame(runs(a=[130.0] * 11 + [300.0] * 9, b=lost))

@@ -17,6 +17,7 @@ from suave_des.results.figures import (
     draw_distributions,
     draw_folder,
     draw_frame,
+    draw_heat_map,
     draw_results,
     draw_sweep,
     write_picture,
@@ -24,6 +25,7 @@ from suave_des.results.figures import (
 from suave_des.results.mission import adaptations, failure_spans, mode_spans
 from suave_des.results.mission_figures import draw_map, draw_timeline
 from suave_des.results.missions import grouped, missions_of, read_missions
+from suave_des.results.paper import published_runs
 
 
 @pytest.fixture(scope="module")
@@ -201,11 +203,12 @@ class TestBattery:
 LONG = "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerName" + "ForItsManager" * 5
 
 
-def test_a_long_name_is_shown_whole(campaign, tmp_path):
+@pytest.mark.parametrize("kind", ["distributions", "differences"])
+def test_a_long_name_is_shown_whole(kind, campaign, tmp_path):
     frame = read_missions([campaign]).frame
     frame = frame.assign(manager=frame["manager"].astype(str) + LONG)
     with style.publication():
-        figure = draw_distributions(grouped(missions_of(frame))[0])
+        figure = draw_frame(frame, kind)
         figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
         width_px = figure.bbox.width
         texts = [each for each in figure.findobj(Text) if LONG[:8] in each.get_text()]
@@ -236,6 +239,39 @@ def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits
     texts = texts_of(draw_frame(two_limits, "distributions"))
     assert "none (n = 4)" in texts
     assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
+
+
+class TestDifferences:
+    """Differences between managers, run by run."""
+
+    def test_show_each_run_the_mean_and_the_runs_at_the_ends(self):
+        frame = sweep_frame(1, 5).drop(columns=["start.x_m", "start.y_m"])
+        other = frame.assign(manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0])
+        axes = draw_frame(pandas.concat([frame, other]), "differences").axes[0]
+        rain = next(line for line in axes.get_lines() if len(line.get_xdata()) == 5)
+        assert sorted(rain.get_xdata()) == [1.0, 2.0, 3.0, 4.0, 40.0]
+        assert [text.get_text() for text in axes.texts] == ["run 1", "run 5"]
+        low, high = axes.containers[0][2][0].get_segments()[0][:, 0]
+        assert (low, high) == pytest.approx(mean_of([1.0, 2.0, 3.0, 4.0, 40.0]).interval)
+
+    def test_of_a_sweep_are_of_means_of_runs(self, two_limits):
+        both = pandas.concat([two_limits, two_limits.assign(manager="other")])
+        texts = texts_of(draw_frame(both, "differences"))
+        assert any(text.endswith("other (n = 2)") for text in texts)
+        assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
+
+    def test_need_runs_with_the_same_random_numbers(self):
+        with pytest.raises(InputError, match="share their random numbers"):
+            draw_frame(read_missions([published_runs()]).frame, "differences")
+
+
+def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs():
+    frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
+    figure = draw_heat_map(missions_of(frame), ["depth", "start.y_m"])
+    assert [text.get_text() for text in figure.axes[0].texts] == ["115.00"] * 4
+    assert "means of n = 2 runs, each averaged over start: x (m)" in texts_of(figure)
+    with pytest.raises(InputError, match="of two swept parameters, and there are 3"):
+        draw_heat_map(missions_of(frame))
 
 
 def test_a_sweep_says_of_how_many_runs_its_means_are():
