@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
+from suave_des.arguments import check_names, plain_arguments
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.inputs import check_inputs, provenance
 from suave_des.campaign.progress import OnProgress, is_live, shown
-from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, check_range
+from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range
 from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.metrics.result import MissionResult
 from suave_des.records.mission_folder import KNOWLEDGE_FILE, mission_files, record_of
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from suave_des.results.compare import CampaignFrame
 
 
-_CALLER = 3
+_CALLER = 4
 """Stack level of who calls a function here, seen from `_frame_of`."""
 
 
@@ -58,6 +59,7 @@ class RecordedMission(MissionResult):
         return draw_mission(record_of(self, self.loaded), kind)
 
 
+@plain_arguments
 def run_mission(
     scenario: str | Path | LoadedScenario,
     manager: ManagerLike = "metacontrol",
@@ -109,6 +111,7 @@ def run_mission(
     return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
 
 
+@plain_arguments
 def run_campaign(
     scenario: str | Path | LoadedScenario,
     managers: ManagerLike | Iterable[ManagerLike] | None = None,
@@ -157,16 +160,21 @@ def run_campaign(
         WorkerError: worker processes end again and again; finished missions are kept.
         StoreError: the disk is full, or the folder was removed.
     """
+    internal = "replacements", "command", "folder"
+    known = [*CampaignSpec.model_fields.keys() - internal, *Replacements.__annotations__]
+    check_names("run_campaign", options, sorted(known))
     given = scenario, managers, runs, seed, workers, out
     return _frame_of(scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options))
 
 
+@plain_arguments
 def resume_campaign(
     folder: str | Path,
     workers: int = 1,
     *,
     runs: int | None = None,
     scheduler: str | None = None,
+    managers: Sequence[str] = (),
     confirmed: bool = False,
     progress: bool | None = None,
 ) -> CampaignFrame:
@@ -177,6 +185,7 @@ def resume_campaign(
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
+        managers: those of the campaign's that are not installed; their code is run only if they are named here.
         confirmed: whether to run the code of all managers that the folder names.
         progress: whether to show progress; by default in a notebook and on a terminal.
 
@@ -184,7 +193,7 @@ def resume_campaign(
         InputError: there is no campaign, or something that determines results has changed; the error names it.
         WorkerError, StoreError: as run_campaign.
     """
-    changed: dict[str, Any] = {"runs": runs, "scheduler": scheduler, "confirmed": confirmed}
+    changed: dict[str, Any] = {"runs": runs, "scheduler": scheduler, "managers": managers, "confirmed": confirmed}
     return _frame_of(
         folder, progress, lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed)
     )

@@ -305,7 +305,9 @@ def remarks(manager: ManagingSubsystem) -> Iterator[str]:
 def refusals(modes: ModeManager) -> Iterator[str]:
     """Yield what was wrong with requests for modes that were refused, and what would be right."""
     for function, mode in modes.refused:
-        if known := modes.available_modes(function):
+        if function not in modes.table and mode in modes.table:
+            yield f"change_mode({shown(function)}, {shown(mode)}) has its arguments swapped (function, then mode)"
+        elif known := modes.available_modes(function):
             yield f"{function} has no mode {shown(mode)} ({did_you_mean(mode, known)})"
         else:
             near = did_you_mean(function, modes.nodes, "functions")

@@ -18,12 +18,12 @@ from suave_des.campaign.inputs import (
     read_campaign,
     trained_on,
 )
-from suave_des.campaign.missions import Campaign, Executor, MissionRunner, Remark, WorkerError
+from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignSpec, read_campaign_file
 from suave_des.campaign.workers import LocalWorkers, in_process
-from suave_des.errors import InputError, SuaveDesError
+from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.files import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.records.store import (
     FILES,
@@ -99,6 +99,7 @@ def resume_campaign(
     runs: int | None = None,
     on_progress: OnProgress | None = None,
     scheduler: str | None = None,
+    managers: Collection[str] = (),
     confirmed: bool = False,
 ) -> CampaignResult:
     """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it has.
@@ -114,7 +115,7 @@ def resume_campaign(
     changed = {"runs": runs, "workers": workers, "scheduler": scheduler, "out": Path(folder)}
     changed = {name: value for name, value in changed.items() if value is not None}
     with ExitStack() as stack:
-        store, campaign = stack.enter_context(_stored(Path(folder), changed, confirmed=confirmed))
+        store, campaign = stack.enter_context(_stored(Path(folder), changed, managers, confirmed=confirmed))
         return _run(stack, campaign.spec, lambda: campaign, store, on_progress)
 
 
@@ -149,6 +150,11 @@ def _stored(
             request = CampaignSpec.read({**stored.stored(), **changed})
             file = read_campaign_file(request.scenario)
             campaign = read_campaign(request, file)
+        known = {*campaign.spec.managers, *campaign.code()}
+        if unknown := [name for name in named if name not in known]:
+            problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
+            remedy = f"{did_you_mean(unknown[0], sorted(known), 'its managers')}; {_MORE_MANAGERS}"
+            raise InputError(problem, file=folder, remedy=remedy)
         check_trusted(campaign, named, folder, confirmed=confirmed)
         yield store, campaign
 
@@ -253,7 +259,8 @@ def _work(
 ) -> tuple[KeyboardInterrupt | SuaveDesError | None, list[Remark]]:
     """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
     with store.reading():
-        remarks = {Remark(manager, text) for manager, text, *_ in store.about("remarks", default=[])}
+        kept = store.about("remarks", default=[])
+    remarks = {Remark(manager, text) for manager, text, *_ in kept if text != GIVEN_UP}
     done = failed = 0
     stopped: KeyboardInterrupt | SuaveDesError | None = None
     try:

@@ -12,8 +12,10 @@ import importlib.util
 import json
 import logging
 import platform
+import shlex
 import sys
 import sysconfig
+from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -96,7 +98,7 @@ def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, c
         raise InputError(
             f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
             file=folder,
-            remedy="if you trust it, give --yes",
+            remedy=f"if you trust it, give --managers {shlex.quote(','.join(unknown))} or --yes",
         )
 
 
@@ -127,13 +129,13 @@ def check_campaign(campaign: Campaign) -> dict[str, str]:
         InputError: an input is invalid.
     """
     spec = campaign.spec
-    useless: dict[str, None] = {}
     with _located(campaign.file):
         check_drawn(campaign.loaded, campaign.variation)
-    for point in sorted(set(campaign.variation.sweep.each_value())):
-        useless.update(dict.fromkeys(campaign.variation.scenario(campaign.loaded, point).scenario.without_effect()))
-    for words in useless:
-        logging.getLogger(MISTAKES_LOGGER).warning("note: %s", words)
+    points = sorted(set(campaign.variation.sweep.each_value()))
+    scenarios = (campaign.variation.scenario(campaign.loaded, point).scenario for point in points)
+    for words, number in Counter(words for each in scenarios for words in each.without_effect()).items():
+        where = f", at {number} of {len(points)} swept values" if len(points) > 1 else ""
+        logging.getLogger(MISTAKES_LOGGER).warning("note: %s%s", words, where)
     return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, spec.replacements)}
 
 

@@ -32,6 +32,8 @@ NOT_REPEATABLE = (
     " to the next, or has its own source of randomness, so results depend on the number of workers."
     " To learn, use `suave-des train`; for random numbers, system.stream"
 )
+GIVEN_UP = "its first 3 missions here took too long, and none was finished, so the others were left out"
+_IN_VAIN = 3
 _REPEATED_AFTER = {2, *(4**power for power in range(1, 11))}
 """Missions of a manager in a process after which its first is run again, as its class may keep state"""
 _REPEAT_S = 1.0
@@ -137,6 +139,7 @@ class MissionRunner:
         self._point, self._simulators = -1, dict[int | None, "Simulator"]()
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
         self._number = Counter[int]()
+        self._too_long, self._in_time = Counter[int](), set[int]()
 
     def run(self, manager: str, run: int, point: int = 0) -> tuple[LoadedScenario, MissionResult]:
         """Run a mission of the campaign again, with its record; return its scenario and result.
@@ -157,9 +160,17 @@ class MissionRunner:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
         """
         for key in missions:
+            if key.manager not in self._in_time and self._too_long[key.manager] >= _IN_VAIN:
+                continue
             manager = self.campaign.spec.managers[key.manager]
             outcome, remarks = self._outcome(key)
             yield key, outcome
+            if not (isinstance(outcome, MissionFailure) and not outcome.lasting):
+                self._in_time.add(key.manager)
+            elif key.manager not in self._in_time:
+                self._too_long[key.manager] += 1
+                if self._too_long[key.manager] == _IN_VAIN:
+                    yield key, Remark(manager, GIVEN_UP)
             if not is_built_in(manager) and not isinstance(outcome, MissionFailure) and self._differs(key, outcome):
                 yield key, Remark(manager, NOT_REPEATABLE)
             for remark in remarks:

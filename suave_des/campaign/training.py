@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
+from suave_des.arguments import plain_arguments
 from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, check_range
 from suave_des.errors import InputError
@@ -19,6 +20,7 @@ TRAINING_SEED = 0
 """Not that of campaigns, so that a campaign has missions that training has not seen."""
 
 
+@plain_arguments
 def train(
     scenario: str | Path,
     manager: str,

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.estimates import known, mean_of, t_quantile
 from suave_des.files import as_number, read_csv
@@ -276,6 +277,7 @@ def short_mission(loaded: LoadedScenario) -> MissionResult:
 # Ensembles.
 
 
+@plain_arguments
 def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
     """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
 

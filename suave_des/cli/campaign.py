@@ -25,6 +25,8 @@ from suave_des.cli.options import (
     Trusted,
     check_no_use,
     command_line,
+    complete_managers,
+    complete_scenarios,
     flags,
 )
 from suave_des.errors import InputError, number_of
@@ -42,7 +44,7 @@ _RUNS = 200
 _FAILURES_SHOWN = 20
 _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
-_MAY_CHANGE = ("runs", "workers", "scheduler")
+_MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
 """Options of a campaign that is resumed, too."""
 
 
@@ -59,12 +61,13 @@ def campaign(
             metavar="SCENARIO",
             help="A scenario or campaign file, or a shipped scenario.",
             show_default=False,
+            autocompletion=complete_scenarios,
         ),
     ] = None,
     *,
     options: Annotated[
         Given,
-        Fields(("out", "managers", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite")),
+        Fields(("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite")),
     ],
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
@@ -234,7 +237,10 @@ def run(
             {"out": "Folder for mission.json, events.csv, trajectory.csv, knowledge.jsonl."},
         ),
     ],
-    manager: Annotated[str, typer.Option(metavar="NAME", help="A manager's name, or module:Class.")] = "metacontrol",
+    manager: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="A manager's name, or module:Class.", autocompletion=complete_managers),
+    ] = "metacontrol",
     run_number: Annotated[
         int,
         typer.Option("--run", metavar="K", help="Run number."),

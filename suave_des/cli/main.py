@@ -132,7 +132,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         context: Any = getattr(error, "ctx", None)
         path = "suave-des" if context is None else context.command_path
-        status = _report(f"{error.format_message().rstrip('.')} (see {path} --help)", BAD_INPUT)
+        names = "several names have commas between them, without blanks; " if "extra argument" in str(error) else ""
+        status = _report(f"{error.format_message().rstrip('.')} ({names}see {path} --help)", BAD_INPUT)
     _leave(status, by_force=_abandoned() > abandoned)
 
 

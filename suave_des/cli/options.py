@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from itertools import chain
 from pathlib import Path
@@ -17,12 +17,48 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des.errors import InputError, shown
+from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
     from suave_des.scenario.loader import Replacements
 
 
-Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
+def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """What a shell is offered for the last of several names with commas between them."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, begun = incomplete.rpartition(",")
+        return [f"{before}{comma}{name}" for name in names() if name.startswith(begun)]
+
+    return complete
+
+
+def _managers() -> Iterable[str]:
+    from suave_des.registry import manager_names
+
+    return manager_names()
+
+
+def _metrics() -> Iterable[str]:
+    from suave_des.records.metrics import METRICS
+
+    return METRICS
+
+
+def _scenarios() -> Iterable[str]:
+    return sorted(path.stem for path in shipped_folder("scenarios").glob("*.yaml") if "_modes" not in path.stem)
+
+
+complete_managers, complete_metrics, complete_scenarios = map(_completing, (_managers, _metrics, _scenarios))
+
+Scenario = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A scenario file, or the name of a shipped one.",
+        autocompletion=complete_scenarios,
+    ),
+]
 Results = Annotated[
     list[Path],
     typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files."),
@@ -38,7 +74,13 @@ SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", sh
 """For commands that may go on from results, which have a seed already."""
 Workers = Annotated[int, typer.Option("--workers", help="Worker processes.")]
 ManagersInData = Annotated[
-    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
+    str | None,
+    typer.Option(
+        "--managers",
+        metavar="NAME,...",
+        help="Managers to compare; by default all in the data.",
+        autocompletion=complete_managers,
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings.")]
 Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
@@ -85,6 +127,7 @@ class Fields:
                 metavar=shown_as.metavar,
                 help=self.help.get(name) or " ".join(texts[name].split()),
                 show_default=self.default.get(name) or shown_as.default or _written(declared.default) or False,
+                autocompletion=complete_managers if name == "managers" else None,
             )
             default, accepted = (False, bool) if kind is bool else (None, kind | None)
             yield _keyword(name, default, Annotated[accepted, given])

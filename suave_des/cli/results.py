@@ -21,6 +21,8 @@ from suave_des.cli.options import (
     check_no_use,
     comma_separated,
     command_line,
+    complete_managers,
+    complete_metrics,
 )
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, check_output_folder, make_output_folder, write_files
@@ -41,7 +43,13 @@ FigureKind = Literal["auto", "map", "timeline", "distributions", "differences", 
 def compare(
     results: Results,
     managers: Annotated[
-        str | None, typer.Option(metavar="NAME,...", help="Only these, in this order.", show_default="all")
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="Only these, in this order.",
+            show_default="all",
+            autocompletion=complete_managers,
+        ),
     ] = None,
     against: Annotated[
         str | None,
@@ -53,6 +61,7 @@ def compare(
             metavar="COLUMN,...",
             help="Columns of runs.csv.",
             show_default="search time, distance, found, reaction time",
+            autocompletion=complete_metrics,
         ),
     ] = None,
     by: Annotated[
@@ -324,6 +333,7 @@ def replay(
             "--manager",
             metavar="NAME,...",
             help="One or two managers.",
+            autocompletion=complete_managers,
             show_default="metacontrol; for a campaign, the last and the first",
         ),
     ] = None,

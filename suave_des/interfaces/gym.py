@@ -16,16 +16,17 @@ from suave_des.domain import BATTERY_LEVEL, FOLLOW_PIPELINE, GENERATE_RECHARGE_P
 from suave_des.errors import InputError, shown
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.resources import DEFAULT_SCENARIO
-from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.models import AnyDistribution, Exponential, Normal, support
 from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
 NOT_MEASURED: Final = -1.0
-_LARGEST: Final = float(np.finfo(np.float32).max)
-"""Bound of what is measured: a signal may have any value."""
 SEED_LIMIT: Final = 2**31
+_SPREADS: Final = 6.0
+"""So many standard deviations are taken for the bounds of a normal distribution that has none."""
 REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
 """Weights of a step's events: a metre of pipeline that was inspected, a second of search, finding the pipeline, and an
 adaptation. A metre earns what 10 s of search cost; a mission gives about -10 to 60."""
@@ -55,6 +56,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         scenario: path of a scenario file, name of a shipped one, or a Simulator, which several environments may share.
         period_s: mission time of a step.
         reward: weights by name in place of those in `REWARD`.
+        render_mode: "rgb_array": `render` draws the vehicle's way so far and the pipeline, from above.
 
     Attributes:
         observation_names: names of the observation's entries.
@@ -64,11 +66,14 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         InputError: something given cannot be used, or an action is out of range.
     """
 
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012
+
     def __init__(
         self,
         scenario: str | Path | Simulator = DEFAULT_SCENARIO,
         period_s: float = 2.0,
         reward: Mapping[str, float] = REWARD,
+        render_mode: str | None = None,
     ) -> None:
         if not 0.05 <= period_s < inf:
             raise InputError(f"period_s: {period_s} is out of range", remedy="give 0.05 s or more")
@@ -76,7 +81,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             raise InputError(f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}")
         self._weights = REWARD | dict(reward)
         self._simulator = scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
-        self._period_s = period_s
+        self._period_s, self.render_mode = period_s, render_mode
         loaded, duration_s = self._simulator.loaded, self._simulator.duration_s
         self._limit_s = loaded.scenario.mission.time_limit_s
         has_battery = loaded.scenario.battery is not None
@@ -88,7 +93,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
         }
         entries = (
-            *((name, -_LARGEST, _LARGEST) for name in self._attributes),
+            *((name, *_bounds(loaded, name)) for name in self._attributes),
             *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
             ("distance_inspected_m", 0.0, 2.0 * sum(self._simulator.path.lengths_m)),
             ("time_share", 0.0, duration_s / self._limit_s),
@@ -134,6 +139,29 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             self._task_changed(mission)
         reward = self._reward(mission)
         return self._observation(mission), reward, mission.is_over, False, self._info(mission)
+
+    def render(self) -> NDArray[np.uint8]:
+        """Draw the vehicle's way so far and the pipeline, from above.
+
+        Raises:
+            InputError: the environment was made without render_mode="rgb_array", or there is no mission.
+        """
+        if self.render_mode is None or self._mission is None:
+            raise InputError("there is nothing to draw", remedy='make it with render_mode="rgb_array", and call reset')
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(6.0, 4.0), dpi=100, layout="constrained")
+        axes = figure.add_subplot(aspect="equal", xlabel="x (east), m", ylabel="y (north), m")
+        way_m, pipeline_m, pose = self._mission.way_m(), self._simulator.points, self._mission.pose
+        axes.plot(pipeline_m[:, 0], pipeline_m[:, 1], color="0.6", linewidth=4.0, label="pipeline")
+        axes.plot(way_m[:, 0], way_m[:, 1], color="C0", label="vehicle")
+        axes.plot(pose.x_m, pose.y_m, "o", color="C0")
+        axes.set_title(f"{self._mission.now_s:.0f} s, {self._task.name if self._task else 'over'}")
+        axes.legend(loc="upper right")
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def close(self) -> None:
         """End the mission."""
@@ -189,6 +217,28 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         """Return mission time and task; at the end the metrics."""
         now = {"time_s": min(self._time_s, mission.now_s), "task": self._task.name if self._task else ""}
         return now | ({"metrics": mission.metrics()} if mission.is_over else {})
+
+
+def _bounds(loaded: LoadedScenario, attribute: str) -> tuple[float, float]:
+    """Return the least and the greatest value that can be observed of a quality attribute."""
+    if attribute == BATTERY_LEVEL:
+        return NOT_MEASURED, 1.0
+    signal = loaded.scenario.signals[attribute]
+    keys = "minimum", "maximum", "value", "before", "after"
+    stated = [getattr(signal, key) for key in keys if hasattr(signal, key)]
+    lows, highs = zip(*map(_span, stated or loaded.tables[attribute][1]), strict=True)
+    less, more = _span(signal.noise)
+    return min(NOT_MEASURED, min(lows) + less), max(highs) + more
+
+
+def _span(distribution: AnyDistribution) -> tuple[float, float]:
+    low, high = support(distribution)
+    if isinstance(distribution, Normal):
+        wide = _SPREADS * distribution.std
+        return max(low, distribution.mean - wide), min(high, distribution.mean + wide)
+    if isinstance(distribution, Exponential):
+        return low, low + _SPREADS**2 * distribution.mean
+    return low, high
 
 
 gymnasium.register(id="suave_des/PipelineInspection-v0", entry_point=f"{__name__}:PipelineInspection")

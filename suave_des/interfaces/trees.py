@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 import py_trees
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from suave_des.managing.base import ManagingSubsystem, System
+
+MAX_TICKED: Final = 100_000
+"""A tick that goes through more behaviours than this is assumed never to end."""
 
 
 class PyTreesManager(ManagingSubsystem):
@@ -54,8 +58,15 @@ class PyTreesManager(ManagingSubsystem):
         )
 
     def adapt(self) -> None:
-        """Tick the tree."""
-        self.root.tick_once()
+        """Tick the tree.
+
+        Raises:
+            RuntimeError: the tick does not end.
+        """
+        for ticked_before, behaviour in enumerate(self.root.tick()):
+            if ticked_before >= MAX_TICKED:
+                problem = f"a tick of the tree does not end: {MAX_TICKED:,} behaviours so far"
+                raise RuntimeError(f"{problem}, the last one {behaviour.name!r}")
         if self.system.recorded and (ticked := _ticked(self.root)) != self._logged:
             self._logged = ticked
             self.system.log("tick", ticked)

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from suave_des.arguments import plain_arguments
 from suave_des.kb.difference import PolicyDifference, compare_policies
 from suave_des.kb.explain import Explanation, explain
 from suave_des.kb.policy import OnCount, Policy, make_policy
@@ -54,6 +55,7 @@ class KnowledgeBase:
     limit: TimeLimit = field(repr=False)
 
     @classmethod
+    @plain_arguments
     def load(
         cls,
         ontologies: str | Path | Sequence[str | Path] = (),

@@ -19,6 +19,7 @@ import numpy as np
 import pandas
 from numpy.typing import NDArray
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.files import csv_pieces, read_csv
 from suave_des.records.metrics import COLUMN_TYPES, DISTANCE, FOUND, REACTION_TIME, SEARCH_TIME, metric_of
@@ -130,6 +131,7 @@ class Runs:
                 raise InputError(f"has no mission of manager {manager!r}", file=self.path, remedy=remedy)
 
 
+@plain_arguments
 def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
 

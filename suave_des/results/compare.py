@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
 import numpy as np
 import pandas
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import Estimate, interval_names, share_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
@@ -86,6 +87,7 @@ class Choices(TypedDict, total=False):
     unpaired: bool
 
 
+@plain_arguments
 def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> Comparison:
     """Compare the missions in folders or files of results.
 
@@ -129,6 +131,7 @@ class CampaignFrame(pandas.DataFrame):
             found.attrs[SHARING] = math.lcm(*known)
         return found
 
+    @plain_arguments
     def compare(self, **choices: Unpack[Choices]) -> Comparison:  # type: ignore[override]
         """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
 
@@ -158,6 +161,7 @@ class CampaignFrame(pandas.DataFrame):
 
         return compare_assisted(real, self, population, managers=managers, metrics=metrics)
 
+    @plain_arguments
     def figure(self, kind: str = "auto") -> Figure:
         """Draw the missions, as `suave-des figure` does.
 

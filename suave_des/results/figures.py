@@ -23,6 +23,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import mean_of
 from suave_des.files import write_files
@@ -412,6 +413,7 @@ def _folded(text: str, width: int = 26) -> str:
 # What is drawn
 
 
+@plain_arguments
 def draw_folder(folder: str | Path, out: str | Path) -> None:
     """Draw the contents of a results folder, and write the picture; see draw_results."""
     draw_results([Path(folder)], Path(out))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas
 
+from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import mean_of, std_of
 from suave_des.records.metrics import DISTANCE, METRICS, PAPER_METRICS, SEARCH_TIME
@@ -109,6 +110,7 @@ def published_runs() -> Path:
     return shipped_folder("scenarios") / "published" / "seams2023_runs.csv"
 
 
+@plain_arguments
 def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) -> PaperComparison:
     """Compare the missions of a campaign with published figures.
 

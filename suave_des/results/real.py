@@ -18,6 +18,7 @@ import pandas
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from suave_des.arguments import plain_arguments
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
 from suave_des.errors import InputError, did_you_mean, line_error, number_of
@@ -272,6 +273,7 @@ class RealRuns:
         return tuple(dict.fromkeys(wanted)) or self.managers
 
 
+@plain_arguments
 def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None) -> RealRuns:
     """Read real missions.
 

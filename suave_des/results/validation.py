@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas
 
+from suave_des.arguments import plain_arguments
 from suave_des.draws import Streams
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import interval_names, mean_of, percent, share_of, std_of
@@ -117,6 +118,7 @@ def _rounded(value: Any) -> Any:
     return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if isinstance(value, float) else value
 
 
+@plain_arguments
 def validate(
     published: pandas.DataFrame,
     simulated: pandas.DataFrame,

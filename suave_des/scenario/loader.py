@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, TypedDict, Unpack
 
+from suave_des.arguments import plain_arguments
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.resources import find
@@ -135,6 +136,7 @@ class Replacements(TypedDict, total=False):
     manager_options: Mapping[str, Mapping[str, Any]]
 
 
+@plain_arguments
 def load_scenario(
     name: str | Path | LoadedScenario, *, over: Layer | None = None, **replacements: Unpack[Replacements]
 ) -> LoadedScenario:
@@ -225,6 +227,7 @@ def _set(loaded: LoadedScenario, values: Mapping[str, Any], option: str) -> Load
     return loaded
 
 
+@plain_arguments
 def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
     """Replace the values at some key paths of a scenario.
 

@@ -12,7 +12,9 @@ from typing import ClassVar, Self, Unpack
 import simpy
 
 from suave_des import domain
+from suave_des.arguments import check_names
 from suave_des.clock import advance, stop_at
+from suave_des.compiling import Array
 from suave_des.domain import WATER_VISIBILITY, Task
 from suave_des.draws import Draws
 from suave_des.errors import InputError, MissionError, MissionTimeOut, SuaveDesError, did_you_mean, shown
@@ -39,8 +41,11 @@ from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.prepared import PreparedScenario, draw_start
+from suave_des.vehicle.kernel import POSITION
 from suave_des.vehicle.model import Pose
+from suave_des.vehicle.vehicle import row_at
 
+_ARGUMENTS = ("scenario", "manager", "run", "seed", "record")
 CALLER = "caller"
 """Name, in the metrics, of a managing subsystem that is the program which advances the mission."""
 
@@ -102,6 +107,8 @@ class Mission:
         for name, number in (("run", run), ("seed", seed)):
             if isinstance(number, bool) or not isinstance(number, int) or number < 0:
                 raise InputError(f"{name}: {shown(number)} is not a number of a {name}", remedy="give a whole number")
+        if replacements:
+            check_names("Mission", replacements, (*_ARGUMENTS, *Replacements.__annotations__))
         if not isinstance(scenario, PreparedScenario):
             scenario = PreparedScenario(load_scenario(scenario, **replacements))
         self._prepared = prepared = scenario
@@ -284,6 +291,11 @@ class Mission:
     def pose(self) -> Pose:
         """The vehicle's pose."""
         return self._vehicle.pose(self.env.now)
+
+    def way_m(self) -> Array:
+        """Return the vehicle's positions so far, one each 0.05 s: x, y and z, shape (n, 3)."""
+        self._vehicle.position(self.env.now)
+        return self._vehicle.track[: row_at(self.env.now) + 1, POSITION].copy()
 
     @property
     def distance_inspected_m(self) -> float:

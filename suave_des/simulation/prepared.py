@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suave_des.arguments import plain_arguments
 from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.draws import Draws
@@ -39,6 +40,7 @@ def draw_start(draws: Draws) -> tuple[tuple[float, float], tuple[float, float]]:
 class PreparedScenario:
     """A scenario with the parts that its missions share; see `Simulator` for the arguments."""
 
+    @plain_arguments
     def __init__(
         self,
         loaded: LoadedScenario,

@@ -16,7 +16,7 @@ import pytest
 from suave_des.campaign import progress as display
 from suave_des.campaign import workers
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.missions import WorkerError
+from suave_des.campaign.missions import GIVEN_UP, WorkerError
 from suave_des.campaign.progress import Progress
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD, rows_of
@@ -80,6 +80,38 @@ def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers):
         )
         assert re.fullmatch(f"manager {re.escape(told)} \\(awkward_managers.py, line \\d+\\)", str(failure))
     assert result.done == 24 - len(result.failures)
+
+
+LOOPS = """
+from pathlib import Path
+from suave_des.managing.simple import NoManager
+class Loops(NoManager):
+    def diagnostic(self, diagnostic):
+        while True:
+            pass
+class LoopsLater(NoManager):
+    def mission_started(self):
+        while Path("there").exists():
+            pass
+    def mission_ended(self, metrics):
+        Path("there").touch()
+"""
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_manager_whose_missions_all_take_too_long_is_given_up(workers, tmp_path, monkeypatch):
+    (tmp_path / "loops.py").write_text(LOOPS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    result = run_campaign("seams2023", ["loops:Loops", "none"], 200, 1, workers, tmp_path / "out", time_out_s=0.5)
+    assert result.done == 200 and 3 <= len(result.failures) <= 3 * workers
+    assert result.remarks == (f"manager loops:Loops: {GIVEN_UP}",)
+    for failure in result.failures:
+        assert re.fullmatch(r"not done after 0.5 s \(time-out\), in diagnostic \(loops.py, line [67]\)", failure.cause)
+    missions = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]
+    assert missions["left_out"] == 200 - len(result.failures)
+    later = run_campaign("seams2023", ["loops:LoopsLater"], 6, 1, time_out_s=0.3)
+    assert (later.done, len(later.failures), later.remarks) == (1, 5, ())  # one could be done: it is tried again
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des import InputError, run_campaign, run_mission
+from suave_des import InputError, NoManager, Simulator, load_scenario, run_campaign, run_mission
 from suave_des.campaign.training import train
 from tests.helpers import AWKWARD, OUTSIDE
 from tests.helpers.command import command_here, suave_des_command
@@ -86,6 +86,17 @@ def test_modes_that_there_are_not_are_reported(tmp_path):
         run_campaign("seams2023", [f"{AWKWARD}:Misspells"], 5, out=tmp_path / "out")
     (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
     assert remark.endswith("fd_spiral_high)")
+
+
+class Swaps(NoManager):
+    def task_requested(self, task):
+        self.system.change_mode("fd_spiral_high", "f_generate_search_path")
+
+
+def test_swapped_arguments_of_change_mode_are_told():
+    (remark,) = Simulator(load_scenario("seams2023")).run(Swaps, 1, 1).remarks
+    called = "change_mode('fd_spiral_high', 'f_generate_search_path')"
+    assert remark == f"{called} has its arguments swapped (function, then mode)"
 
 
 @pytest.mark.parametrize("workers", [1, 2])

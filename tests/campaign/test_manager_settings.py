@@ -184,13 +184,13 @@ class TestReceivedFolder:
 
     def test_a_folder_that_this_user_began_here_asks_for_nothing(self, own):
         done = command_here(*RESUME, cwd=own)
-        assert "give --yes" not in done.stderr and (own / "imported").exists()
+        assert "or --yes" not in done.stderr and (own / "imported").exists()
 
     def test_from_another_folder_it_is_asked_for_again(self, own):
         """There, another module of the same name might be found."""
         (own / "below").mkdir()
         done = command_here("campaign", "--resume", "../out", cwd=own / "below")
-        assert done.returncode == 2 and "give --yes" in done.stderr
+        assert done.returncode == 2 and "or --yes" in done.stderr
         assert not (own / "below" / "imported").exists()
 
     def test_its_managers_are_not_imported_unasked(self, received, settable):
@@ -198,8 +198,14 @@ class TestReceivedFolder:
         assert done.returncode == 2 and f"the code of {settable}" in done.stderr
         assert not (received / "imported").exists()
 
-    def test_they_are_when_the_user_says_so(self, received, settable):
-        done = command_here(*RESUME, "--yes", cwd=received)
+    def test_a_manager_that_the_campaign_has_not_is_refused(self, received, settable):
+        done = command_here(*RESUME, "--managers", settable[:-1], cwd=received)
+        assert done.returncode == 2 and f"did you mean '{settable}'" in done.stderr
+        assert not (received / "imported").exists()
+
+    @pytest.mark.parametrize("is_named", [True, False])
+    def test_they_are_when_the_user_says_so(self, received, settable, is_named):
+        done = command_here(*RESUME, *(("--managers", settable) if is_named else ("--yes",)), cwd=received)
         assert (received / "imported").exists()
         # the code is another one than the campaign began with
         assert f"files_sha256.{settable.partition(':')[0]}.py was" in done.stderr

@@ -117,11 +117,26 @@ class TestRunCampaign:
 
 
 class TestArguments:
-    def test_that_a_campaign_has_not_or_that_are_no_numbers_are_told_in_plain_words(self):
-        with pytest.raises(InputError, match=r"rnus: unknown .*did you mean 'runs'"):
-            suave_des.run_campaign("seams2023", rnus=3)
-        with pytest.raises(InputError, match=r"run: '1' is out of range"):
-            suave_des.run_mission("seams2023", "none", run="1")
+    @pytest.mark.parametrize(
+        ("call", "words"),
+        [
+            (lambda: run_mission("seams2023", mananger="none"), "run_mission has no argument 'mananger' .did you mean"),
+            (lambda: run_mission(), "run_mission: missing a required argument: 'scenario'"),
+            (lambda: run_mission(3), "scenario: expected a name, a path or a loaded scenario, got 3"),
+            (lambda: run_mission("seams2023", "none", run="1"), "run: expected a whole number, got '1'"),
+            (lambda: run_campaign("seams2023", runs="ten"), "runs: expected a whole number, got 'ten'"),
+            (lambda: run_campaign("seams2023", rnus=3), "no argument 'rnus' .did you mean 'runs'"),
+            (lambda: run_campaign("seams2023", command=["x"]), "no argument 'command'"),
+            (lambda: load_scenario("seams2023", rules="a.swrl"), "rules: expected a list, got 'a.swrl'"),
+            (lambda: with_values("seams2023", {}), "loaded: expected a loaded scenario, got 'seams2023'"),
+            (lambda: suave_des.Mission("seams2023", sed=3), "Mission has no argument 'sed' .did you mean 'seed'"),
+            (lambda: suave_des.KnowledgeBase.load(rulez="x"), "KnowledgeBase.load has no argument 'rulez'"),
+            (lambda: suave_des.CampaignFrame().compare(metrcs=["x"]), "compare has no argument 'metrcs' .did "),
+        ],
+    )
+    def test_that_a_function_has_not_or_of_another_type_are_told_in_plain_words(self, call, words):
+        with pytest.raises(InputError, match=words):
+            call()
 
     def test_numbers_may_be_of_numpy(self, scenario):
         assert len(suave_des.run_campaign(scenario, "none", runs=np.int64(2), seed=np.uint8(3))) == 2

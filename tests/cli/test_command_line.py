@@ -47,6 +47,26 @@ def test_help_imports_nothing_heavy():
     assert python("-c", code).stderr.strip() == "[]"
 
 
+@pytest.mark.parametrize(
+    ("begun", "offered"),
+    [
+        ("suave-des run release", "release15"),
+        ("suave-des campaign seams2023 --managers none,meta", "none,metacontrol"),
+        ("suave-des compare out --metrics search", "search_time_s"),
+    ],
+)
+def test_a_shell_completes_names(command, monkeypatch, begun, offered):
+    monkeypatch.setenv("_SUAVE_DES_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", begun)
+    monkeypatch.setenv("COMP_CWORD", str(len(begun.split()) - 1))
+    assert command("").out.split() == [offered]
+
+
+def test_names_with_a_blank_between_them_are_told_of_the_comma(command):
+    ended = command("campaign", "seams2023", "--managers", "none", "metacontrol", "--out", "out")
+    assert ended.status == 2 and "several names have commas between them" in ended.err
+
+
 def test_a_folder_with_brackets_is_named_as_it_is(command):
     folder = "new[b] :car:"
     ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", folder)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from suave_des import InputError, PipelineInspection, load_scenario
+from suave_des import InputError, PipelineInspection, load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.command import python
 
@@ -125,3 +125,29 @@ def test_observations_are_within_the_bounds_of_the_scenario(simulator):
     assert bounds["distance_inspected_m"][1] < 250.0 and bounds["time_share"][1] < 1.01
     seen, _, _ = play(environment, [1, 0], seed=2)
     assert all(environment.observation_space.contains(each) for each in seen)
+
+
+@pytest.mark.parametrize(
+    ("signal", "low", "high"),
+    [
+        ({"kind": "step", "time_s": 5.0, "before": -4.0, "after": 2.0}, -4.0, 2.0),
+        ({"kind": "constant", "value": 2.0, "noise": {"distribution": "normal", "mean": 0.0, "std": 0.5}}, -1.0, 5.0),
+        ({"kind": "constant", "value": {"distribution": "uniform", "minimum": 1.0, "maximum": 6.0}}, -1.0, 6.0),
+        ({"kind": "constant", "value": 0.0, "noise": {"distribution": "exponential", "mean": 0.1}}, -1.0, 3.6),
+    ],
+)
+def test_bounds_follow_from_what_the_scenario_says_of_a_signal(signal, low, high):
+    made = Simulator(with_values(load_scenario("seams2023"), {"signals.water_visibility": signal}))
+    space = gymnasium.make(NAME, scenario=made).observation_space
+    assert (space.low[0], space.high[0]) == pytest.approx((low, high))
+
+
+def test_it_draws_the_way_so_far(simulator):
+    environment = gymnasium.make(NAME, scenario=simulator, render_mode="rgb_array").unwrapped
+    environment.reset(seed=1)
+    before = environment.render()
+    for _ in range(20):
+        environment.step([1, 0])
+    after = environment.render()
+    assert before.shape == after.shape == (400, 600, 3) and before.dtype == np.uint8
+    assert (before != after).any()
