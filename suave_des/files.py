@@ -10,7 +10,7 @@ import math
 import os
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -309,7 +309,8 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
                 (folder / name).unlink(missing_ok=True)
     finally:
         for temporary in written.values():
-            temporary.unlink(missing_ok=True)
+            with suppress(OSError):  # what could not be written has been told of
+                temporary.unlink(missing_ok=True)
 
 
 def remove_parts(folder: Path, names: Iterable[str]) -> None:

@@ -91,7 +91,7 @@ class LoadedScenario:
             raise
         except Exception as error:
             problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
-            raise InputError(problem, remedy="give the settings that it needs, as in --manager-option") from error
+            raise InputError(problem, remedy="give its settings by --manager-option NAME=VALUE") from error
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             problem = f"manager {manager}: input_files gave {shown(names)}"
             raise InputError(problem, remedy="return a list of file names as text")

@@ -143,7 +143,7 @@ def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too():
         ("depends_on = {'water_visiblity': (3.25,)}", 3, "depends_on is {'water_visiblity': (3.25,)}; it must be like"),
         ("subscribes_to = ('visibility',)", 2, "subscribes_to is ('visibility',)"),
         ("def check(self, loaded): pass", 2, "write @classmethod def check(cls, loaded)"),
-        ("input_files = classmethod(lambda cls, settings: [settings['table']])", 2, "--manager-option table=..."),
+        ("input_files = classmethod(lambda cls, settings: [settings['table']])", 2, "--manager-option NAME=VALUE"),
     ],
 )
 def test_mistakes_in_a_class_are_reported_early(tmp_path, body, status, words):

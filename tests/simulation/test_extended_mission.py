@@ -131,4 +131,5 @@ def test_stock_pellet_infers_the_same_of_the_extended_ontology(level, design):
     assert ours == stock
     in_error = design == "fd_no_recharge" and level < 0.25
     assert (ours.grounding_status("generate_recharge_path") == "IN_ERROR_NFR") is in_error
-    assert ours.is_updatable("generate_recharge_path") is (design == "fd_recharge" and level >= 0.25)
+    updatable = ours.values("o_generate_recharge_path", "o_updatable")
+    assert (True in updatable) is (design == "fd_recharge" and level >= 0.25)
