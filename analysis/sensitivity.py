@@ -47,7 +47,7 @@ def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray
         panels = figure.subplots(1, len(METRICS))
         for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
             order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
-            for number, (offset, manager) in enumerate(zip((0.26, 0.0, -0.26), MANAGERS, strict=True)):
+            for offset, manager, hatch in zip((0.26, 0.0, -0.26), MANAGERS, ("", "////", "...."), strict=True):
                 panel.barh(
                     np.arange(len(names)) + offset,
                     effects[manager, metric][order],
@@ -55,7 +55,7 @@ def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray
                     facecolor=studies.COLOURS[manager],
                     edgecolor="white",
                     linewidth=0.0,
-                    hatch=style.hatch(number),
+                    hatch=hatch,
                     label=manager,
                 )
             panel.set_yticks(range(len(names)), [names[index] for index in order])

@@ -57,6 +57,13 @@ def test_a_small_repetition_gives_the_committed_figures_of_the_first_runs(study,
     assert again.to_numpy() == pytest.approx(before.to_numpy(), abs=1e-3)
 
 
+def test_the_effects_of_parameters_are_drawn(study, tmp_path):
+    module = study("sensitivity")
+    effects = {(manager, metric): np.arange(2.0) for manager in module.MANAGERS for metric in module.METRICS}
+    module.draw(tmp_path / "effects.png", ["a", "b"], effects)
+    assert (tmp_path / "effects.png").stat().st_size > 1_000
+
+
 def predictions() -> pandas.DataFrame:
     return pandas.read_csv(FOLDER / "predictions" / "predictions.csv", dtype={"condition": str})
 

@@ -130,6 +130,11 @@ def test_the_next_key_stops_at_adaptations_alone(opened_one, missions):
         opened_one.wait_until(f"Math.abs(Number(document.body.dataset.time) - {adaptation.t_s}) < 0.05")
 
 
+def test_the_legend_names_the_marks_of_the_timeline(opened_one):
+    legend = opened_one.page.text_content("#legend")
+    assert all(word in legend for word in ("adaptation", "thruster fails", "pipeline found", "visibility"))
+
+
 def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(opened_one):
     scrub_to(opened_one, 0)
     opened_one.value("document.activeElement.blur()")
@@ -158,6 +163,14 @@ def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):
         found.page.keyboard.press("End")
         found.wait_until("Number(document.body.dataset.time) > 299")
         assert place(found, 0) != place(found, 1)
+
+
+def test_two_managers_reasoning_is_in_sight_on_a_projector(both, browser):
+    with opened(browser, both, (1280, 800), hash_="#t=60") as found:
+        bottom = "document.querySelector('.phase.plan').getBoundingClientRect().bottom"
+        assert found.value(f"{bottom} < document.querySelector('.deck').getBoundingClientRect().top + 1")
+        found.page.keyboard.press("b")
+        assert found.value("getComputedStyle(document.body).zoom") == "1.4"
 
 
 def test_it_says_when_no_design_is_left(tmp_path, browser):
