@@ -260,7 +260,7 @@ def _work(
     """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
     with store.reading():
         kept = store.about("remarks", default=[])
-    remarks = {Remark(manager, text) for manager, text, *_ in kept if text != GIVEN_UP}
+        remarks = {Remark(manager, text) for manager, text, *_ in kept if text != GIVEN_UP}
     done = failed = 0
     stopped: KeyboardInterrupt | SuaveDesError | None = None
     try:
