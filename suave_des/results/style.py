@@ -54,10 +54,15 @@ OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
 def looks(names: Sequence[str]) -> list[int]:
     """Return for each manager the number of its look, which `line` and `marker` take.
 
-    Those of the exemplar keep theirs whoever is shown, and no other manager has one of these.
+    Those of the exemplar keep theirs whoever is shown, and no other manager has one of these. A manager of several
+    sources, whose names follow it in parentheses, has one colour.
     """
-    others = count(len(_KNOWN_MANAGERS))
-    return [_KNOWN_MANAGERS.index(name) if name in _KNOWN_MANAGERS else next(others) for name in names]
+    places = {name: place for place, name in enumerate(_KNOWN_MANAGERS)}
+    found: list[int] = []
+    for name in names:
+        place = places.setdefault(name.partition(" (")[0], len(places))
+        found.append(next(number for number in count(place, len(CYCLE)) if number not in found))
+    return found
 
 
 def line(number: int) -> dict[str, Any]:

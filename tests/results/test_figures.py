@@ -143,6 +143,9 @@ def test_a_manager_looks_the_same_in_every_figure():
     assert style.looks(["none", "random", "metacontrol", "bt"]) == [0, 1, 2, 3]
     assert style.looks(["mine", "metacontrol", "yours", "none"]) == [4, 2, 5, 0]
     assert style.looks(["mine", "yours"]) == [4, 5]
+    both = style.looks(["none (a)", "mine (a)", "none (b)", "mine (b)", "bt"])
+    assert [style.line(number)["color"] for number in both[2:4]] == [style.line(number)["color"] for number in both[:2]]
+    assert len({str(style.line(number)) for number in both}) == 5
     frame = sweep_frame(3, 4)
     both = missions_of(pandas.concat([frame.assign(manager=name) for name in ("metacontrol", "bt")]))
     curves = draw_distributions(grouped(both)[0]).axes[0].get_lines()
