@@ -158,7 +158,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         axes.plot(way_m[:, 0], way_m[:, 1], color="C0", label="vehicle")
         axes.plot(pose.x_m, pose.y_m, "o", color="C0")
         axes.set_title(f"{self._mission.now_s:.0f} s, {self._task.name if self._task else 'over'}")
-        axes.legend(loc="upper right")
+        axes.legend(loc="best")
         canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
