@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,10 +19,9 @@ from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publica
 _UNITS: Final = {"water_visibility": "m", "battery_level": "share of a full battery"}
 _FIXED: Final = {**MODE_COLOURS, INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", NO_GROUNDING: "#FFFFFF"}
 _LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
-_ROW_IN: Final = 0.21
+_ROW_IN: Final = 0.26
 _MOST_ROWS: Final = 60
-#: Of a name or a list of reports beside a row.
-_MOST_LETTERS: Final = 44
+_LABEL_LETTERS: Final = 52
 
 
 def draw_policy(policy: Policy, path: Path) -> None:
@@ -54,12 +54,13 @@ def draw_policy(policy: Policy, path: Path) -> None:
         )
         for axes, (name, table) in zip(grid.flat, drawn.items(), strict=True):
             _draw(axes, table, colours)
-            axes.set_title(f"{name}: what is grounded now (left), and then (colour)", loc="left")
+            axes.set_title(name, loc="left")
         handles = [
             Patch(facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name))
             for name, colour in colours.items()
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)))
+        title = "in use afterwards (rows: in use now, and what else matters)"
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)), title=title)
         try:
             write_picture(figure, path, bbox_inches="tight")
         finally:
@@ -86,15 +87,37 @@ def _draw(axes: Any, table: FunctionTable, colours: dict[str, str]) -> None:
     flips = np.array([[FLIP_FLOP in cell for cell in row[table.down :]] for row in rows])
     if flips.any():
         axes.pcolor(np.ma.masked_where(~flips, numbers), hatch="////", alpha=0.0)
-    axes.set_xticks(np.arange(numbers.shape[1]) + 0.5, table.table.headings[table.down :], rotation=30, ha="right")
-    labels = ["; ".join(text[:_MOST_LETTERS] for text in row[: table.down] if text) for row in rows]
-    axes.set_yticks(np.arange(len(rows)) + 0.5, labels)
+    axes.set_yticks(np.arange(len(rows)) + 0.5, _labels(table, rows))
+    axes.set_xticks([])
     if table.across:
+        axes.set_xticks(np.arange(numbers.shape[1]) + 0.5, map(_range, table.table.headings[table.down :]))
         unit = _UNITS.get(table.across)
         axes.set_xlabel(f"measured {table.across.replace('_', ' ')}" + (f", {unit}" if unit else ""))
     axes.invert_yaxis()
     axes.grid(False)
     axes.tick_params(length=0)
+
+
+def _labels(table: FunctionTable, rows: list[Sequence[str]]) -> list[str]:
+    """The design in use now, and below it what else the outcome depends on, shortened."""
+    headings = table.table.headings[1 : table.down]
+    reports = {report for row in rows for text in row[1 : table.down] for report in text.split(", ")}
+    labels = []
+    for now, *others in (row[: table.down] for row in rows):
+        words = [
+            f"{heading} {_range(text)}"
+            if heading != "components"
+            else "any report"
+            if len(text.split(", ")) == len(reports)
+            else text
+            for heading, text in zip(headings, others, strict=True)
+        ]
+        labels.append("\n".join(textwrap.shorten(text, _LABEL_LETTERS) for text in (now, "; ".join(words)) if text))
+    return labels
+
+
+def _range(words: str) -> str:
+    return words.replace(" <= . < ", " to ")
 
 
 def _low_to_high(design: str) -> tuple[int, str]:
