@@ -5,8 +5,10 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import rdflib
@@ -14,13 +16,18 @@ from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate
+from suave_des.kb.matching import Probes
 from suave_des.kb.policy import Policy
-from suave_des.kb.space import PolicySpace
+from suave_des.kb.space import PolicySpace, Situation
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
+from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.rules import literal_text
+from suave_des.knowledge.state import KnowledgeState
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, Metric, metric_of
-from suave_des.scenario.loader import Replacements
+from suave_des.scenario.loader import Replacements, load_scenario
+from suave_des.scenario_knowledge import open_base
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
@@ -220,9 +227,6 @@ class MissionDifference(NamedTuple):
 
     def lines(self) -> Iterator[str]:
         """Which missions differ."""
-        if not self.changed:
-            yield "no mission differs; kb try says whether the rules fire in recorded missions"
-            return
         more = len(self.changed) - _MOST_RUNS
         numbers = ", ".join(map(str, self.changed[:_MOST_RUNS]))
         yield f"runs that differ: {numbers}" + (f" and {more} more" if more > 0 else "")
@@ -263,6 +267,36 @@ def compare_missions(
         remedy = "suave-des campaign with the same files says why"
         raise InputError(f"{runs - len(common)} of {runs} missions failed", remedy=remedy)
     return paired(before.loc[common], after.loc[common])
+
+
+def firing_states(
+    scenario: str, runs: int, one: Replacements, other: Replacements, *, seed: int, limit: TimeLimit
+) -> tuple[int, int]:
+    """Count the states of missions with one knowledge base in which a rule fires that only one of the two has.
+
+    Args:
+        scenario, runs, one, other, seed: as of compare_missions.
+        limit: of Pellet's time for one state.
+
+    Returns:
+        how many states, and of how many.
+    """
+    from suave_des.api import run_mission
+
+    loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
+    bases = list(map(open_base, loaded))
+    rules = [{rule.text: rule.body for rule in base.content.enabled_rules} for base in bases]
+    probes = Probes(bases[1], limit, [(rules[0] | rules[1])[text] for text in rules[0].keys() ^ rules[1].keys()])
+    regions = regions_of(bases[1])
+    missions = (run_mission(loaded[0], _MANAGER, run, seed) for run in range(1, runs + 1))
+    states = Counter[Hashable]()
+    representatives: dict[Hashable, KnowledgeState] = {}
+    for record in chain.from_iterable(mission.knowledge for mission in missions):
+        key = regions.key(record.state)
+        representatives.setdefault(key, record.state)
+        states[key] += 1
+    firing = (key for key, state in representatives.items() if probes.holding(Situation(state)))
+    return sum(states[key] for key in firing), states.total()
 
 
 def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:

@@ -198,6 +198,9 @@ class _Explainer:
             candidates.append(replace(each, because=tuple(because)))
             if each.design == asked:
                 answer = f"{asked} is {each.verdict}: {each.reason}"
+                if decision.design is None:
+                    present = self.reasoning.inference.state.grounded(decision.function) or decision.function
+                    answer = f"no design is left, {present} stays; {answer}"
         status = (
             fact
             for fact in sorted(self.reasoning.inference.facts, key=str)

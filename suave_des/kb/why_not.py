@@ -33,7 +33,10 @@ from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import (
     C_STATUS,
     HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
     NUMERIC,
+    O_STATUS,
     TOMASYS,
     Lit,
     Triple,
@@ -62,6 +65,11 @@ _GIVEN_BY_STATES: Final[Mapping[str, str]] = {
     HAS_QA_VALUE: "measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
     TOMASYS + "Objective": "ask for a function: --at FUNCTION",
 }
+#: All that states assert.
+_IN_STATES: Final = frozenset(
+    {*_GIVEN_BY_STATES, HAS_VALUE, IS_QA_TYPE, O_STATUS}
+    | {TOMASYS + name for name in ("QAvalue", "typeF", "o_always_improve")}
+)
 
 
 class WhyNot(NamedTuple):
@@ -137,7 +145,8 @@ class RuleQuestions:
             bindings = with_bindings(shown_bindings(binding, self.base.names))
             said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
             return WhyNot(rule.name, f"it fires{bindings}, and concludes {said}", fires=True)
-        first = rule.body[failing[0]]
+        # What no state can bring comes first.
+        first = rule.body[min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))]
         reason = describe_failure(self._usable, first, binding, facts)
         others = len(failing) - 1
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
@@ -153,6 +162,13 @@ class RuleQuestions:
         )
         found = [self.of(rule, state, start) for rule, start in starts if start is not None]
         return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
+
+    def _is_fixed(self, atom: Atom) -> bool:
+        """Whether what an atom asks for is neither in states nor concluded by a rule."""
+        content = self._usable.content
+        concluded = content.head_properties() | content.head_classes()
+        of_states = {triple[1] for individual in self._usable.model.individuals() for triple in individual.own}
+        return atom.kind in FACT_KINDS and atom.predicate not in _IN_STATES | concluded | of_states
 
     @cached_property
     def _usable(self) -> Ontology:

@@ -16,6 +16,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
+from rdflib import URIRef
+
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
 from suave_des.knowledge import rdf
@@ -210,7 +212,11 @@ def undefined_names(material: Material) -> Iterator[Finding]:
             same = sorted(iri for iri in known if local_name(iri) == local_name(name))
             remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
             problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
-            yield material.about(Level.ERROR, local_name(subject), problem, remedy or "declare it, or correct the name")
+            is_attribute = predicate == rdf.IS_QA_TYPE and meant == ("individual",)
+            otherwise = (
+                "declare a QualityAttributeType of this name" if is_attribute else "declare it, or correct the name"
+            )
+            yield material.about(Level.ERROR, local_name(subject), problem, remedy or otherwise)
 
 
 def functions_without_design(material: Material) -> Iterator[Finding]:
@@ -246,6 +252,40 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
         designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
         problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
         yield material.about(Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <")
+    valued = {subject for subject, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE}
+    for name, each in model.measurements.items():
+        if measured is not None and each.iri in valued and name not in measured:
+            problem = f"hasValue of {local_name(each.iri)} is not used: {name} has the value that missions measure"
+            yield material.about(Level.WARN, local_name(each.iri), problem, "measure it in the scenario")
+
+
+def attributes_declared_twice(material: Material) -> Iterator[Finding]:
+    """Find the quality attribute types that several files declare: what each of them says of one holds."""
+    for name, iri in material.base.model.attributes.items():
+        declared = (URIRef(iri), URIRef(rdf.RDF_TYPE), URIRef(rdf.TOMASYS + "QualityAttributeType"))
+        files = [each for each in material.base.sources if declared in each.graph]
+        for each in files[:-1]:
+            problem = f"declares the quality attribute type {name}, and so does {relative_path(files[-1].path)}"
+            place = (str(each.path), each.line_of(name))
+            yield Finding(Level.WARN, problem, *place, remedy="declare it in one of them")
+
+
+def unknown_to_missions(material: Material) -> Iterator[Finding]:
+    """Note the components whose status nothing reports, and the attributes that designs expect and nothing measures."""
+    content, subject = material.content, material.subject
+    asserted = {each for each, predicate, _ in content.triples if predicate == rdf.C_STATUS}
+    if subject.reported is not None and rdf.C_STATUS not in content.head_properties():
+        for name, iri in sorted(material.base.model.components.items()):
+            if name not in subject.reported and iri not in asserted:
+                problem = (
+                    f"nothing in the simulation reports the status of component {name}, so it has none in missions"
+                )
+                yield material.about(Level.INFO, name, problem, f"reported are {', '.join(subject.reported)}")
+    for name in (
+        sorted(_expected(material.base.model).difference(subject.measured)) if subject.measured is not None else ()
+    ):
+        problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+        yield material.about(Level.INFO, name, problem)
 
 
 def without_operator(content: Content, model: Model, measured: Collection[str]) -> list[str]:
@@ -581,6 +621,8 @@ CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
     functions_without_design,
     designs_and_modes,
     attributes_that_do_not_fit,
+    attributes_declared_twice,
+    unknown_to_missions,
     thresholds_without_reaction,
     assumed_operators,
     another_revision,

@@ -35,6 +35,15 @@ from suave_des.resources import shipped_folder
 MAX_BYTES: Final = 64 * 2**20
 _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
+#: How files in the other notations that ontology editors save begin; comments may stand before.
+_OTHER_NOTATIONS: Final = {
+    "Turtle": r"@prefix|@base|prefix\s+[\w.-]*:\s*<|base\s+<",
+    "N-Triples": r"(<[^<>\s]+>|_:\w+)\s+<[^<>\s]+>\s",
+    "OWL in Functional Syntax": r"(Prefix|Ontology)\s*\(",
+    "OWL in Manchester Syntax": r"(Prefix|Ontology):",
+    "OWL/XML": r"(<!.*?>\s*)*<(\w+:)?Ontology\b",
+    "JSON-LD": r"[\[{]",
+}
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
 _EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
@@ -123,6 +132,9 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text_of(content), count=1)
     except UnicodeDecodeError as error:
         raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
+    for notation, start in _OTHER_NOTATIONS.items():
+        if re.match(rf"\s*(#.*\s+)*({start})", text, re.IGNORECASE):
+            raise KnowledgeError(f"this is {notation}", file=path, remedy="save it as RDF/XML, in Protégé by Save as")
     root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, text)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)

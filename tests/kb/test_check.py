@@ -56,7 +56,9 @@ def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report
         wanted = set(itertools.product(base.designs(function), ("FALSE", "RECOVERED")))
         assert {(state.grounded(function), state.components[0][1]) for state in states} == wanted
         wanted = set(itertools.product(base.designs(function), regions_of(base).thresholds))
-        assert {(state.grounded(function), *state.measured("water_visibility")) for state in states} > wanted
+        assert {
+            (state.grounded(function), dict(state.measurements).get("water_visibility")) for state in states
+        } > wanted
 
 
 def test_an_attribute_that_is_declared_again_with_the_same_operator_is_no_error(suave_copy):

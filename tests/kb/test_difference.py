@@ -13,10 +13,12 @@ from suave_des.kb.difference import (
     compare_axioms,
     compare_missions,
     compare_policies,
+    firing_states,
     paired,
 )
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import TimeLimit
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, TOMASYS
@@ -63,6 +65,18 @@ def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other
     (search, _, *_) = compare_missions("seams2023", 1, {}, {"values": {"mission.time_limit_s": 20}}).metrics
     one, other = search.pairs.loc[1]
     assert other <= 21 < one and search.difference.value == other - one
+
+
+@pytest.mark.parametrize("number", [0, 9])
+def test_states_are_counted_in_which_a_rule_fires_that_only_one_of_two_has(tmp_path, number):
+    """Visibility is above 0 in every mission, and never above 9 m, whichever of the two has the rule."""
+    body = f"isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ greaterThan(?v, {number})"
+    more = {"rules": [rules_file(tmp_path, f"own: {body} -> fd_realisability(fd_spiral_high, false)")]}
+    short = {"values": {"mission.time_limit_s": 20}}
+    for one, other in ((more, {}), ({}, more)):
+        firing, states = firing_states("seams2023", 1, {**short, **one}, {**short, **other}, seed=1, limit=TimeLimit())
+        assert states > 0
+        assert firing == (states if number == 0 else 0)
 
 
 def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):

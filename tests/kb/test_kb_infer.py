@@ -46,7 +46,7 @@ def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
     )
     assert knowledge.state(file).components == (("c_thruster_1", "FALSE"),)
     state = knowledge.state(file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"})
-    assert str(state.measured("water_visibility")[0]) == "3"
+    assert str(dict(state.measurements)["water_visibility"]) == "3"
     assert state.components == (("c_thruster_1", "RECOVERED"),)
 
 

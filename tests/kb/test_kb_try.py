@@ -50,7 +50,7 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
     expected = [
         record.t_s
         for record in result.knowledge
-        if record.state.grounded(SEARCH) is not None and record.state.measured("water_visibility")[0] < 2.5
+        if record.state.grounded(SEARCH) is not None and dict(record.state.measurements)["water_visibility"] < 2.5
     ]
     assert expected
     assert [cycle.t_s for cycle in trial.cycles if cycle.firings] == pytest.approx(expected, abs=1e-6)

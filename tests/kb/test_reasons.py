@@ -133,6 +133,11 @@ class TestDecisions:
         (decision,) = knowledge.explain(state, "why fd_recover_thrusters?").decisions
         assert "f_maintain_motion has no objective in this state" in decision.answer
 
+    def test_with_no_design_left_the_present_one_stays(self, knowledge):
+        state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1})
+        (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
+        assert decision.answer.startswith("no design is left, fd_spiral_low stays; fd_spiral_high is left out: ")
+
 
 @pytest.mark.parametrize(
     ("question", "said"),
@@ -149,6 +154,12 @@ def test_a_question_that_has_no_answer_is_told_so(knowledge, in_error, question,
     with pytest.raises(InputError) as error:
         knowledge.explain(in_error, question)
     assert said in str(error.value)
+
+
+def test_of_what_does_not_hold_that_is_told_which_no_state_can_make_hold(knowledge):
+    """No thruster is required by fd_spiral_high: whether one has failed does not matter."""
+    with pytest.raises(InputError, match=r"rule compError: requiredBy\(\?c, \?fd\) does not hold: found requiredBy"):
+        knowledge.explain(knowledge.state(), "fd_realisability(fd_spiral_high, false)")
 
 
 def test_a_fact_that_does_not_follow_names_the_rule_that_comes_nearest(knowledge, command):

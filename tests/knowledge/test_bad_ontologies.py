@@ -23,9 +23,15 @@ BAD_FILES: dict[str, tuple[str, str]] = {
         "line 3, column 1: not well-formed XML: Premature end of data in tag Ontology line 2",
     ),
     "web page": ("<!DOCTYPE html>\n<html><body/></html>", "the root element is <html>"),
-    "owl/xml": ('<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "the root element is <Ontology>"),
-    "turtle": ("# mine\n@prefix : <http://x.org/y#> .\n", "an OWL ontology in RDF/XML is expected"),
-    "json": ('{"@context": {}}', "an OWL ontology in RDF/XML is expected"),
+    "owl/xml": (
+        '<?xml version="1.0"?>\n<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>',
+        "bad.owl: this is OWL/XML (save it as RDF/XML",
+    ),
+    "turtle": ("# mine\n@prefix : <http://x.org/y#> .\n", "this is Turtle"),
+    "n-triples": ("<http://x.org/y> <http://x.org/z> <http://x.org/y> .\n", "this is N-Triples"),
+    "functional": ("Prefix(:=<http://x.org/y#>)\n", "this is OWL in Functional Syntax"),
+    "manchester": ("Prefix: : <http://x.org/y#>\n", "this is OWL in Manchester Syntax"),
+    "json": ('{"@context": {}}', "this is JSON-LD"),
     "bad rdf": (HEAD + '<owl:Ontology rdf:about="http://x.org/y" rdf:ID="z"/></rdf:RDF>', "not RDF/XML"),
     "spaces in an iri": (HEAD + '<owl:Ontology rdf:about="http://x.org/a b"/></rdf:RDF>', "is not an IRI"),
     "external entity": (

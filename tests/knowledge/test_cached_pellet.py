@@ -1,7 +1,6 @@
 """The cached reasoner's answers are Pellet's: on several ontologies, around every threshold, and from a file."""
 
 import random
-from collections import Counter
 from decimal import Decimal
 from functools import lru_cache
 from pathlib import Path
@@ -99,15 +98,16 @@ def states(draw: st.DrawFn, kb: Ontology) -> KnowledgeState:
 
 
 def moved(draw: random.Random, kb: Ontology, state: KnowledgeState) -> KnowledgeState:
-    """The state with each value that has a gap to itself moved about inside it."""
+    """The state with its values moved about inside their gaps, if each value in a gap has it to itself."""
     regions = regions_of(kb)
     bounds = [Decimal(-10), *regions.thresholds, Decimal(100)]
-    shared = Counter(regions.region(value) for _, value in state.measurements)
+    gaps = [region for _, value in state.measurements if (region := regions.region(value)) % 2 == 0]
+    are_apart = len(set(gaps)) == len(gaps)
     fresh: dict[Decimal, Decimal] = {}
     for _, value in state.measurements:
         region = regions.region(value)
         low, high = bounds[region // 2], bounds[min(region // 2 + 1, len(bounds) - 1)]
-        is_moved = region % 2 == 0 and shared[region] == 1
+        is_moved = region % 2 == 0 and are_apart
         fresh[value] = low + (high - low) * draw.randrange(1, 1000) / 1000 if is_moved else value
     return KnowledgeState.of(
         state.objectives,

@@ -37,6 +37,18 @@ def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy,
     assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
 
 
+def test_components_that_nothing_reports_and_expectations_that_nothing_measures_are_noted(tmp_path):
+    status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
+    extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
+    findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=[])
+    notes = [one.message for one in findings if one.level is Level.INFO and one.line]
+    assert notes[:2] == [
+        "missions do not measure water_visibility, so what designs expect of it is compared with nothing",
+        "nothing in the simulation reports the status of component c_camera, so it has none in missions",
+    ]
+    assert not any("missions" in one.message for one in found(tmp_path, extra=extra))
+
+
 def test_the_model(tmp_path):
     extra = (
         individual("f_new", "Function")
@@ -62,10 +74,14 @@ def test_a_number_of_another_datatype_is_an_error_each_but_a_whole_number_is_a_d
     assert told == ["hasValue '1.0' is not an xsd:decimal but an xsd:double"] * doubles
 
 
-def test_a_quality_attribute_that_is_not_declared(tmp_path):
+def test_a_quality_attribute_that_is_not_declared_or_twice(tmp_path):
     measured = individual("qa_current", "QAvalue", link("isQAtype", "water_current"))
     unknown = only(found(tmp_path, extra=measured), "isQAtype water_current is not defined")
-    assert (unknown.level, unknown.remedy) == (Level.ERROR, "declare it, or correct the name")
+    assert (unknown.level, unknown.remedy) == (Level.ERROR, "declare a QualityAttributeType of this name")
+    twice = '<owl:NamedIndividual rdf:about="http://ros/mros#performance">'
+    twice += f'<rdf:type rdf:resource="{TOMASYS}QualityAttributeType"/></owl:NamedIndividual>'
+    again = only(found(tmp_path, extra=twice), "declares the quality attribute type performance, and so does")
+    assert again.level is Level.WARN
 
 
 UNDEFINED = {
@@ -151,6 +167,11 @@ WRONG = {
     "fact that leads to another class": (
         individual("c_new", "Component", f'<mros:requiredBy rdf:resource="{SUAVE}qa_water_visibility_low"/>'),
         "qa_water_visibility_low: requiredBy: it is of another class than the one that the property leads to",
+    ),
+    "measured value that is not measured": (
+        individual("obs_current", "QAvalue", link("isQAtype", "current") + value("hasValue", "2.5"))
+        + individual("current", "QualityAttributeType", value("qa_comparison_operator", "&lt;", "string")),
+        "hasValue of obs_current is not used: current has the value that missions measure",
     ),
 }
 

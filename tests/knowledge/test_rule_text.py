@@ -143,7 +143,7 @@ def test_after_a_mistake_the_other_rules_are_read():
         ("hasValue(?f, 2) -> Role(?f)", 17, "write 2.0"),
         ("hasValue(?q, ?v) ^ Role(?v) -> Role(?q)", 28, "?v stands for an individual and for a value"),
         ("Role(?x) -> lessThan(1, 2)", 16, "occurs in the head"),
-        ("isQAtype(?q, turbidity) -> Role(?q)", 17, "declare it, or write"),
+        ("isQAtype(?q, turbidity) -> Role(?q)", 17, "declare it: an individual turbidity of QualityAttributeType"),
         ("c_status(?c, FALSE) -> Role(?c)", 17, 'FALSE is not defined (declare it, or write "FALSE" for a text'),
         ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (declare it"),
         (

@@ -193,14 +193,15 @@ def diff(
     --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
     scenario's. Decisions are compared in every state; missions with the same number use common random numbers.
     """
-    from suave_des.kb.difference import compare_axioms, compare_missions
+    from suave_des.kb.difference import compare_axioms, compare_missions, firing_states
+    from suave_des.knowledge.pellet import TimeLimit
 
     both = [options.with_file(file) for file in (one, other)]
     before, after = (each.knowledge() for each in both)
     removed, added = compare_axioms(before.base, after.base)
     with counted("states", errors()) as on_count:
         difference = before.diff(after, max_failed, on_count)
-    missions = None
+    missions, last = None, list[str]()
     if mission_options.missions is not None:
         replaced = [each.replacements | {"modes_file": mission_options.modes} for each in both]
         with progress("missions with A, then with B", quiet=mission_options.quiet) as on_progress:
@@ -212,6 +213,13 @@ def diff(
                 workers=mission_options.workers,
                 on_progress=on_progress,
             )
+        last = [*missions.lines()]
+        if not missions.changed:
+            limit, seed = TimeLimit(both[0].time_limit, "--time-limit"), mission_options.seed
+            firing, states = firing_states(
+                both[0].scenario, mission_options.missions, *replaced, seed=seed, limit=limit
+            )
+            last = [f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"]
     if removed or added:
         print(f"axioms and rules: {len(removed)} removed, {len(added)} added")
         print(*(f"  - {text}" for text in removed), *(f"  + {text}" for text in added), sep="\n")
@@ -219,7 +227,7 @@ def diff(
     if missions is not None:
         print()
         print(shown(missions.table(difference)))
-        print(*missions.lines(), sep="\n")
+        print(*last, sep="\n")
 
 
 class _Commands(CommandsUnderHeadings):

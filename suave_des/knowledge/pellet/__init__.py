@@ -110,7 +110,8 @@ class _ReasonerThread(threading.Thread):
             try:
                 future.set_result(work())
             except BaseException as error:  # raised again by the thread that waits
-                future.set_exception(error)
+                if not future.done():  # it is, where SystemExit comes just then
+                    future.set_exception(error)
             del job, future, work  # or the last result would be kept until the next piece of work
 
 

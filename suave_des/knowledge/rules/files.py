@@ -412,6 +412,8 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
 
     def named(number: int, word: str) -> Named:
         otherwise = f'declare it, or write "{word}" for a text, ?{word} for a variable'
+        if predicate == rdf.IS_QA_TYPE and number == 1:
+            otherwise = f"declare it: an individual {word} of QualityAttributeType"
         return Named(_iri(word, atom.place(number), vocabulary, file, ("individual",), otherwise))
 
     arguments = tuple(named(n, term.iri) if isinstance(term, Named) else term for n, term in enumerate(atom.arguments))
