@@ -2,9 +2,9 @@
 
 States are places of measured values, reports of components and groundings. Only the number of components with a status
 counts where ontologies and rules treat components alike. Quality attributes are independent of one another where every
-rule reads values of one of them only: then a measured value counts by its place among the numbers of its own attribute,
-and not at all for functions whose designs expect no value of it. Where the schema or a rule has more to say, every
-value counts, as it is.
+comparison in a rule is between values of one of them: then a measured value counts by its place among the numbers of
+its own attribute, and not at all for functions whose designs expect no value of it. Where the schema or a rule has more
+to say, every value counts, as it is.
 
 A rule that only compares numbers cannot tell two values apart that compare alike with every number in the knowledge
 base. So one value stands for each range between two numbers; equality with a number is a range of its own.
@@ -27,7 +27,6 @@ from suave_des.kb.states import LASTING, ManagingSettings
 from suave_des.knowledge.ontology import OPERATORS, Ontology
 from suave_des.knowledge.rdf import (
     C_STATUS,
-    EXACT,
     HAS_QA_VALUE,
     HAS_VALUE,
     IS_QA_TYPE,
@@ -40,7 +39,7 @@ from suave_des.knowledge.rdf import (
     reached,
 )
 from suave_des.knowledge.reasoner import Regions, regions_of
-from suave_des.knowledge.rules import SAME, Atom, Named, Rule, Variable, mirrored, texts_of
+from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, mirrored, texts_of
 from suave_des.knowledge.state import STAYS, Fact, KnowledgeState, Reasoning, exact
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 
@@ -454,30 +453,67 @@ def measured_attributes(base: Ontology, settings: ManagingSettings) -> list[str]
     return sorted(name for name in settings.measured if name in base.model.attributes)
 
 
+#: One side of a comparison: IRIs of quality attributes whose values it can be, and numbers; _ANY: of any attribute.
+_Side = frozenset[str | Decimal]
+_ANY: Final = ""
+
+
 def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] | None:
-    """The regions of each attribute's values, where every rule reads values of one attribute only, and says which."""
+    """The regions of each attribute's values, where rules compare them with numbers of that attribute only."""
     known = base.model.attributes
     if not known.keys() >= {*attributes} or not regions_of(base).is_sound or not _is_plain(base):
         return None
-    triples = base.content.triples
-    numbers: dict[str, set[Decimal]] = {}
-    types = [(subject, str(value)) for subject, predicate, value in triples if predicate == IS_QA_TYPE]
-    for subject, predicate, value in triples:
-        if predicate == HAS_VALUE and isinstance(value, Lit):
-            for iri in (name for each, name in types if each == subject):
-                numbers.setdefault(iri, set()).add(exact(value.text.strip()))
+    measured = {known[name] for name in attributes}
+    numbers = {iri: set(_values(base, iri)) for iri in measured}
     for rule in base.content.enabled_rules:
-        read = {atom.arguments[0] for atom in rule.body if atom.predicate == HAS_VALUE}
-        typed = {atom.arguments for atom in rule.body if atom.predicate == IS_QA_TYPE and atom.arguments[0] in read}
-        named = {term.iri for _, term in typed if isinstance(term, Named)}
-        is_typed = read <= {subject for subject, term in typed if isinstance(term, Named)}
-        others = any(predicate != HAS_VALUE for _, predicate in rule.read_values())
-        if not is_typed or len(named) > 1 or (read and others):
-            return None
-        terms = {term for atom in rule.body for term in atom.arguments if isinstance(term, Lit)}
-        for iri in named:
-            numbers.setdefault(iri, set()).update(exact(term.text.strip()) for term in terms if term.datatype in EXACT)
-    return {name: Regions(tuple(sorted(numbers.get(known[name], ()))), ()) for name in attributes}
+        for one, other in _compared(rule):
+            concerned = measured & (one | other)
+            if _ANY in one | other:
+                if not any(all(isinstance(each, Decimal) for each in side) for side in (one, other)):
+                    return None
+                concerned = measured
+            elif len(concerned) > 1:
+                return None
+            for attribute in concerned:
+                for each in one | other:
+                    numbers[attribute] |= {each} if isinstance(each, Decimal) else _values(base, each)
+    return {name: Regions(tuple(sorted(numbers[known[name]])), ()) for name in attributes}
+
+
+def _values(base: Ontology, attribute: str) -> set[Decimal]:
+    """The numbers that the ontologies give of a quality attribute."""
+    triples = base.content.triples
+    typed = {subject for subject, predicate, value in triples if predicate == IS_QA_TYPE and value == attribute}
+    values = (value for subject, predicate, value in triples if predicate == HAS_VALUE and subject in typed)
+    return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
+
+
+def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
+    """Both sides of each comparison of values in a rule; a variable that is read twice compares what it reads."""
+    types = {
+        atom.arguments[0]: atom.arguments[1].iri
+        for atom in rule.body
+        if atom.predicate == IS_QA_TYPE and isinstance(atom.arguments[1], Named)
+    }
+    read: dict[Term, list[_Side]] = {}
+    for atom in rule.body:
+        if atom.kind == "data":
+            here = types.get(atom.arguments[0], _ANY) if atom.predicate == HAS_VALUE else _ANY
+            read.setdefault(atom.arguments[1], []).append(frozenset({here}))
+    for term, sides in read.items():
+        yield from itertools.combinations([*sides, *_number(term)], 2)
+    for atom in rule.body:
+        if atom.predicate in COMPARISONS:
+            sides = [frozenset[str | Decimal]().union(*read.get(term, ()), *_number(term)) for term in atom.arguments]
+            yield from itertools.combinations(sides, 2)
+
+
+def _number(term: Term) -> list[_Side]:
+    """A literal as a side of a comparison; none where it is no number, as it never equals one."""
+    try:
+        return [frozenset({exact(term.text.strip())})] if isinstance(term, Lit) else []
+    except KnowledgeError:
+        return []
 
 
 def _is_plain(base: Ontology) -> bool:

@@ -225,7 +225,8 @@ def test_the_policy_of_one_attribute_is_that_of_deciding_each_state(small):
 
 
 def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_path: Path) -> None:
-    for rule, are_independent in (("", True), (RULES["two attributes are compared"], False)):
+    with_numbers = f"own: {OF_TWO} ^ lessThan(?v, 3.5) ^ lessThan(?w, 0.5) -> fd_realisability(fd_spiral_high, false)"
+    for rule, are_independent in (("", True), (with_numbers, True), (RULES["two attributes are compared"], False)):
         knowledge = extended(tmp_path, rule)
         states = States.of(knowledge.base, knowledge.settings, 0, knowledge.space)
         different = len(set(decision_keys(knowledge.base, knowledge.space, states)))
