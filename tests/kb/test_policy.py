@@ -230,7 +230,7 @@ def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_pa
         knowledge = extended(tmp_path, rule)
         states = States.of(knowledge.base, knowledge.settings, 0, knowledge.space)
         different = len(set(decision_keys(knowledge.base, knowledge.space, states)))
-        assert (different < len(states) / 15) is are_independent
+        assert (different < len(states) / 6) is are_independent
 
 
 @pytest.mark.slow
