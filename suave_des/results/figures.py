@@ -305,7 +305,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
                 axes.text(column, row, number, color=ink, ha="center", va="center", fontsize=6.5)
             axes.set_title(style.text(folded(manager)))
             axes.grid(visible=False)
-        figure.colorbar(image, ax=of_metric, label=f"mean {METRICS[metric].heading}")
+        figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
         of_metric[-1].set_xlabel(_folded(key_words(across)))
         for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
             axis.set_ticks(range(len(values)), [_folded(style.text(_value_text(each)), 14) for each in values])
