@@ -19,6 +19,7 @@ from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, write_files
+from suave_des.interrupts import Stopped, was_interrupted
 from suave_des.records.metrics import COLUMNS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 
@@ -167,8 +168,10 @@ class Store:
     def reading(self) -> Iterator[None]:
         """Turn whatever is unexpected while what is stored is used into one error about the store.
 
-        Whoever interprets its content does so in this, as there is no end to what a file from elsewhere can hold.
+        Whoever interprets its content does so in this, as there is no end to what a file from elsewhere can hold. An
+        error after a signal asked to stop is no damage: it may be that of a module whose import the signal broke off.
         """
+        stopped_before = was_interrupted()
         try:
             yield
         except (SuaveDesError, MemoryError):
@@ -182,6 +185,8 @@ class Store:
                 raise StoreError(f"{self.path or 'temporary files'}: results cannot be kept: {error}") from None
             raise _damaged(self.path, error) from None
         except Exception as error:
+            if was_interrupted() and not stopped_before:
+                raise Stopped from error
             raise _damaged(self.path, error) from error
 
     def begin(self, about: Mapping[str, Any]) -> None:

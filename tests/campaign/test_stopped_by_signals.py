@@ -17,6 +17,7 @@ import suave_des
 from benchmarks import chaos
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.workers import LocalWorkers
+from suave_des.interrupts import Stopped, signals_raised
 from suave_des.records.store import STORE_FILE, Store
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -175,3 +176,16 @@ class TestInterruptedAtAnAwkwardMoment:
                 run_campaign(scenario, ["none"], 2, 1, out=out)
         assert resume_campaign(out).done == 2
         assert sorted(path.name for path in out.iterdir()) == FILES
+
+
+def test_an_error_that_the_signal_led_to_is_no_damage(scenario, tmp_path, monkeypatch):
+    """A module whose import a signal broke off fails with an error of its own."""
+
+    def broken_import(*_: object) -> None:
+        with pytest.raises(Stopped):
+            signal.raise_signal(signal.SIGTERM)
+        raise RecursionError
+
+    monkeypatch.setattr("suave_des.campaign.campaign.gather", broken_import)
+    with signals_raised(), pytest.raises(KeyboardInterrupt, match="nothing is lost: .* --resume .* writes the files"):
+        run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
