@@ -187,5 +187,5 @@ def test_an_error_that_the_signal_led_to_is_no_damage(scenario, tmp_path, monkey
         raise RecursionError
 
     monkeypatch.setattr("suave_des.campaign.campaign.gather", broken_import)
-    with signals_raised(), pytest.raises(KeyboardInterrupt, match="nothing is lost: .* --resume .* writes the files"):
+    with signals_raised(), pytest.raises(KeyboardInterrupt, match=r"nothing is lost: .* --resume .* writes the files"):
         run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
