@@ -182,8 +182,11 @@ def _run(
     campaign = read()
     inputs = check_campaign(campaign)
     if spec.scheduler is not None:
-        from suave_des.campaign.cluster import connected
-
+        try:
+            from suave_des.campaign.cluster import connected
+        except ImportError as error:
+            problem = f"a scheduler needs Dask, which is not installed ({error})"
+            raise InputError(problem, remedy="pip install 'suave-des[dask]'") from None
         executor = stack.enter_context(connected(spec.scheduler))
     folder, is_new = spec.out, store is None
     decides = deciding(campaign, inputs)

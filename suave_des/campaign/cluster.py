@@ -6,18 +6,16 @@ worker is one process that runs one mission after the other (`dask worker --nwor
 
 from __future__ import annotations
 
-import errno
 import faulthandler
 import importlib
 import logging
 import os
 import pickle
-import shutil
 import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -26,21 +24,21 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from distributed import Client, KilledWorker, get_worker
+
 from suave_des.campaign.inputs import MAIN, code_versions, declared_files, user_modules
 from suave_des.campaign.missions import Campaign, Chunk, Executor, Finished, MissionRunner, WorkerError
-from suave_des.campaign.workers import packed, unpacked
+from suave_des.campaign.workers import finished, packed, unpacked
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.records.store import MissionKey
 from suave_des.registry import custom_functions
 
-ANSWER_TIMEOUT_S = 10.0
-"""Time for a scheduler to answer at all."""
+ANSWER_TIMEOUT_S, _LOOK_S = 10.0, 1.0
+"""Time for a scheduler to answer at all; and after which to look whether it is still there."""
 _AHEAD = 3
 """Chunks for each worker: one under way and some to go on with."""
-_LARGEST_CHUNK, _SHARES = 50, 4
-"""Missions in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets of what is left."""
-_LOOK_S = 1.0
-"""How often to look whether the scheduler is there."""
+_LARGEST_CHUNK, _SHARES = 50, 10
+"""Missions in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets at least."""
 _EXIT_AFTER_S = 30.0
 """Missions that are so much over their time, in code that cannot be interrupted, end their worker."""
 
@@ -52,19 +50,13 @@ def connected(scheduler: str) -> Iterator[Executor]:
     Raises:
         InputError: there is no such scheduler.
     """
-    try:
-        import distributed
-    except ImportError as error:
-        remedy = "pip install 'suave-des[dask]'"
-        raise InputError(f"a scheduler needs Dask, which is not installed ({error})", remedy=remedy) from None
-
     with ExitStack() as stack:
         for name in list(logging.root.manager.loggerDict):
             if name.startswith(("distributed", "tornado", "asyncio")) and not logging.getLogger(name).disabled:
                 logging.getLogger(name).disabled = True  # relevant problems are reported as errors of suave-des
                 stack.callback(setattr, logging.getLogger(name), "disabled", False)
         try:
-            client = stack.enter_context(distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False))
+            client = stack.enter_context(Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False))
         except Exception as error:
             problem = f"scheduler: {scheduler} does not answer as a Dask scheduler: {error}"
             raise InputError(problem, remedy="check that `dask scheduler` is running there") from None
@@ -79,24 +71,16 @@ def _outcomes(
     A worker that dies loses nothing: Dask gives its chunks to others. The missions of chunks with which workers die
     again and again are run alone, one after the other, and one with which they die even so has failed.
     """
-    from distributed import KilledWorker
-
-    token, remaining, left = uuid.uuid4().hex, iter(missions), total
+    token, remaining = uuid.uuid4().hex, iter(missions)
     under_way, suspects, ended = dict[Any, Chunk](), list[MissionKey](), SimpleQueue[Any]()
     # As the result of a task, it can be made again wherever a worker died that had it, and is sent to each once.
     parcel = client.submit(bytes, pack(campaign), key=f"suave_des_parcel-{token}")
-
-    def submit(chunk: Chunk) -> Any:
-        limit_s = len(chunk) * campaign.spec.time_out_s + _EXIT_AFTER_S
-        return client.submit(run, token, code_versions(), parcel, chunk, limit_s, pure=False)
-
+    submit = partial(client.submit, run, token, parcel, pure=False)
     try:
         while client.status == "running":
             workers = max(2, len(client.scheduler_info()["workers"]))  # one that grows with its work begins with none
-            while len(under_way) < _AHEAD * workers:
-                size = max(1, min(left // (_SHARES * workers), _LARGEST_CHUNK))
-                if not (chunk := tuple(islice(remaining, size))):
-                    break
+            size = max(1, min(total // (_SHARES * workers), _LARGEST_CHUNK))
+            while len(under_way) < _AHEAD * workers and (chunk := tuple(islice(remaining, size))):
                 under_way[future := submit(chunk)] = chunk
                 future.add_done_callback(ended.put)
             if not under_way:
@@ -106,7 +90,6 @@ def _outcomes(
             except Empty:  # of one that is lost, Dask need not tell
                 continue
             chunk = under_way.pop(future)
-            left -= len(chunk)
             try:
                 yield future.result()
             except KilledWorker:
@@ -133,19 +116,17 @@ def _outcomes(
 
 
 def pack(campaign: Campaign) -> bytes:
-    """Pack a campaign with the content of every file that it needs."""
+    """Pack a campaign with the versions and the content of every file that it needs."""
     from suave_des.knowledge.ontology_file import collect
 
-    loaded, managers = campaign.loaded, campaign.spec.managers
+    loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), campaign.spec.managers))
     with suppress(InputError):  # reported by the managers that reason with it, if there are any
         loaded = replace(loaded, ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies))))
-    loaded = replace(loaded, manager_files=declared_files(campaign.scenarios(), managers))
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]
-    modules = user_modules(managers, functions)
-    modules.pop(MAIN, None)  # whose classes are sent by value
+    modules = user_modules(campaign.spec.managers, functions).items()
+    sources = {place: path.read_bytes() for place, path in modules if place != MAIN}  # its classes are sent by value
     files = {path: path.read_bytes() for path in (*loaded.ontologies, *loaded.rules, *loaded.manager_files.values())}
-    sources = {place: path.read_bytes() for place, path in modules.items()}
-    return pickle.dumps((packed(replace(campaign, loaded=loaded)), files, sources))
+    return pickle.dumps((code_versions(), packed(replace(campaign, loaded=loaded)), files, sources))
 
 
 # What runs on a worker: missions of one campaign at a time, prepared anew for another one.
@@ -156,54 +137,45 @@ _lock = threading.Lock()
 """Missions run one at a time, however many threads a worker has: they need the process for themselves."""
 
 
-def run(token: str, here: Mapping[str, str], parcel: bytes, chunk: Chunk, limit_s: float) -> list[Finished]:
-    """Run missions in this process, which is a worker of a cluster, and return their outcomes.
+def run(token: str, parcel: bytes, chunk: Chunk) -> list[Finished]:
+    """Run missions of a campaign, for which its token stands, in this process, and return their outcomes.
 
-    Args:
-        token: the campaign's.
-        here: code_versions() of the machine that the campaign was started on.
-        parcel: what pack returned there.
-        chunk: keys of the missions.
-        limit_s: time after which this process is ended.
+    `parcel` is what pack returned on the machine that it was started on. Missions in code that cannot be interrupted
+    end the process, like those that have no memory.
 
     Raises:
         InputError: the campaign cannot be run here.
     """
-    from distributed import get_worker
-
-    worker, there = get_worker(), code_versions()
-    for name, value in here.items():
-        if there.get(name) != value:
-            problem = f"{name} is {there.get(name, 'missing')} on worker {worker.address}, and {value} here"
-            raise InputError(f"{problem}, which could change results", remedy="install the same version everywhere")
     with _lock, Path(os.devnull).open("w") as nowhere:
+        if token not in _current:
+            forget(*_current)
+            _current[token] = _prepared(parcel)
+        runner, _ = _current[token]
+        limit_s = len(chunk) * runner.campaign.spec.time_out_s + _EXIT_AFTER_S
         faulthandler.dump_traceback_later(limit_s, exit=True, file=nowhere)
         try:
-            if token not in _current:
-                for other in list(_current):
-                    forget(other)
-                folder = Path(tempfile.mkdtemp(prefix="suave-des-", dir=worker.local_directory))
-                _current[token] = _prepared(parcel, folder)
-            return list(_current[token][0].each(chunk))
-        except MemoryError:
-            os._exit(errno.ENOMEM)  # as if it had been killed for it: a new worker begins with little
+            return finished(runner, chunk)
         finally:
             faulthandler.cancel_dump_traceback_later()
 
 
-def _prepared(parcel: bytes, folder: Path) -> tuple[MissionRunner, ExitStack]:
-    """Write the files of a parcel into a folder; return what runs its missions, and what removes them again."""
-
-    def written(path: Path, content: bytes) -> Path:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        return path
-
-    content, files, sources = pickle.loads(parcel)
+def _prepared(parcel: bytes) -> tuple[MissionRunner, ExitStack]:
+    """Write what was packed into a folder; return what runs the missions, and what removes the folder again."""
+    versions, content, files, sources = pickle.loads(parcel)
+    worker = get_worker()
+    for name, value in sorted(versions.items() - code_versions().items()):
+        problem = f"{name} is {code_versions().get(name, 'missing')} on worker {worker.address}, and {value} here"
+        raise InputError(f"{problem}, which could change results", remedy="install the same version everywhere")
     with ExitStack() as stack:
-        stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="suave-des-", dir=worker.local_directory)))
+
+        def written(place: str, text: bytes) -> Path:
+            (path := folder / place).parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text)
+            return path
+
         for place, text in sources.items():
-            written(folder / "modules" / place, text)
+            written(f"modules/{place}", text)
             module = place.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
             sys.modules.pop(module, None)
             stack.callback(sys.modules.pop, module, None)
@@ -211,7 +183,7 @@ def _prepared(parcel: bytes, folder: Path) -> tuple[MissionRunner, ExitStack]:
         sys.path.insert(0, str(folder / "modules"))
         stack.callback(sys.path.remove, str(folder / "modules"))
         # Each file is in a folder of its own: it keeps its name, which counts, and is beside no other.
-        here = {path: written(folder / f"{n:06}" / path.name, text) for n, (path, text) in enumerate(files.items())}
+        here = {path: written(f"{n:06}/{path.name}", text) for n, (path, text) in enumerate(files.items())}
         campaign = unpacked(content)
         loaded = replace(
             campaign.loaded,
@@ -222,7 +194,7 @@ def _prepared(parcel: bytes, folder: Path) -> tuple[MissionRunner, ExitStack]:
         return MissionRunner(replace(campaign, loaded=loaded)), stack.pop_all()
 
 
-def forget(token: str) -> None:
-    """Remove what was prepared for a campaign."""
-    if token in _current:
+def forget(*tokens: str) -> None:
+    """Remove what was prepared for campaigns."""
+    for token in _current.keys() & tokens:
         _current.pop(token)[1].close()

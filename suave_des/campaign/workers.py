@@ -21,7 +21,7 @@ from multiprocessing.context import SpawnProcess
 from types import ModuleType
 from typing import Any, Self
 
-from suave_des.campaign.missions import Campaign, Chunk, Finished, WorkerError
+from suave_des.campaign.missions import Campaign, Chunk, Finished, MissionRunner, WorkerError
 from suave_des.errors import SuaveDesError
 from suave_des.interrupts import INTERRUPTS, signals_deferred
 from suave_des.records.store import MissionKey
@@ -47,10 +47,7 @@ _Task = tuple[Chunk, int]
 
 def in_process(campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
     """Run missions one after the other in this process; an Executor."""
-    from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, which takes a while
-
-    for finished in MissionRunner(campaign).each(missions):
-        yield [finished]
+    return ([each] for each in MissionRunner(campaign).each(missions))
 
 
 class LocalWorkers:
@@ -241,22 +238,28 @@ def unpacked(content: bytes) -> Campaign:
 # What runs in a worker process.
 
 
+def finished(runner: MissionRunner, chunk: Chunk) -> list[Finished]:
+    """Run missions; without memory for them this process ends as if killed for it: a new one begins with little."""
+    try:
+        return list(runner.each(chunk))
+    except MemoryError:
+        os._exit(errno.ENOMEM)
+
+
 def work(connection: Connection[Any, Any]) -> None:
     """Receive a campaign, then chunks of its missions, and send back their outcomes, until the other end is closed."""
-    from suave_des.campaign.missions import MissionRunner  # everything that missions need, before the campaign arrives
+    import suave_des.simulation.simulator  # noqa: F401 - all that missions need, before the campaign arrives
 
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the campaign is over, or its process has ended
-        each = None
+        runner = None
         while True:
             message = connection.recv()
             answer: object = None
             try:
-                if each is None:
-                    each = MissionRunner(unpacked(message)).each
+                if runner is None:
+                    runner = MissionRunner(unpacked(message))
                 else:
-                    answer = list(each(message))
-            except MemoryError:
-                os._exit(errno.ENOMEM)  # as if it had been killed for it: a new worker begins with little
+                    answer = finished(runner, message)
             except SuaveDesError as error:
                 answer = error
             except Exception:

@@ -329,6 +329,7 @@ class TestBadInput:
             run_campaign("seams2023", ["none"], 1, 1, scheduler=worker)
 
     def test_dask_is_not_installed(self, monkeypatch):
+        monkeypatch.delitem(sys.modules, dask_cluster.__name__)
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(InputError, match=r"\(pip install 'suave-des\[dask\]'\)"):
             run_campaign("seams2023", ["none"], 1, 1, scheduler="tcp://127.0.0.1:8786")

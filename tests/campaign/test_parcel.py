@@ -84,15 +84,15 @@ class TestOnAWorker:
         pytest.importorskip("distributed")
         (tmp_path / "scratch").mkdir()
         worker = SimpleNamespace(address="tcp://there:1", local_directory=str(tmp_path / "scratch"))
-        monkeypatch.setattr("distributed.get_worker", lambda: worker)
+        monkeypatch.setattr(cluster, "get_worker", lambda: worker)
         yield
         cluster.forget("token")
         assert list((tmp_path / "scratch").iterdir()) == []  # nothing is left behind
 
     @staticmethod
-    def run(parcel: bytes, runs: range, **needs: str) -> list[Finished]:
+    def run(parcel: bytes, runs: range) -> list[Finished]:
         chunk = tuple(MissionKey(0, 0, run) for run in runs)
-        return cluster.run("token", {**cluster.code_versions(), **needs}, parcel, chunk, 100.0)
+        return cluster.run("token", parcel, chunk)
 
     def test_files_that_managers_declare_travel_each_with_its_own_content(self, tmp_path, monkeypatch):
         """Also where two managers have a file of the same name, from different folders."""
