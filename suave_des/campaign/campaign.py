@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -63,13 +63,15 @@ def run_campaign(
     out: str | Path | None = None,
     *,
     on_progress: OnProgress | None = None,
+    settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]] = lambda managers: {},
     **options: Any,
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose arguments it has.
 
     The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
     mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
-    the others are kept. `on_progress` is called when missions are done.
+    the others are kept. `on_progress` is called when missions are done; `settings_of` returns settings of the
+    campaign's managers, which a campaign file may name.
 
     Raises:
         CampaignInterrupted: Ctrl-C; finished missions are kept.
@@ -88,6 +90,8 @@ def run_campaign(
             remedy = f"--resume {spec.out} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
             raise InputError("the output folder is not empty: it has a campaign in it", file=spec.out, remedy=remedy)
     file = read_campaign_file(spec.scenario) if loaded is None else None
+    if settings := settings_of(spec.with_file(file).managers):
+        spec = spec.model_copy(update={"replacements": {**spec.replacements, "manager_options": settings}})
     with ExitStack() as stack:
         return _run(stack, spec.with_file(file), lambda: read_campaign(spec, file, loaded), None, on_progress)
 

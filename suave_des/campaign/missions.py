@@ -141,8 +141,8 @@ class MissionRunner:
         self._number = Counter[int]()
         self._too_long, self._in_time = Counter[int](), set[int]()
 
-    def run(self, manager: str, run: int, point: int = 0) -> tuple[LoadedScenario, MissionResult]:
-        """Run a mission of the campaign again, with its record; return its scenario and result.
+    def run(self, manager: str, run: int, point: int = 0) -> tuple[MissionResult, LoadedScenario]:
+        """Run a mission of the campaign again, with its record; return its result and scenario.
 
         Raises:
             InputError: the campaign has no such run or point.
@@ -151,7 +151,7 @@ class MissionRunner:
         check_range("run", run, 1, self.campaign.spec.runs)
         check_range("point", point, 0, self._variation.sweep.points - 1)
         simulator = self._simulator(point, run)
-        return simulator.loaded, simulator.run(manager, run, self.campaign.spec.seed, record=True)
+        return simulator.run(manager, run, self.campaign.spec.seed, record=True), simulator.loaded
 
     def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
         """Yield the outcome of each mission, in order.

@@ -215,9 +215,3 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
         settings = settings.model_copy(update={"ensemble": str(ensemble)})
     scenario = find_named(layer, ("scenario",), settings.scenario, "scenarios")
     return CampaignFile(settings, scenario, files.inputs, layer)
-
-
-def managers_of(scenario: str | Path) -> tuple[str, ...]:
-    """Return the managers that a campaign has if none are given: those of a campaign file, or the default."""
-    file = read_campaign_file(scenario)
-    return CampaignKeys().managers if file is None else file.settings.managers

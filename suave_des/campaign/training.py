@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -67,10 +67,3 @@ def train(
     result = Learned(manager, loaded.scenario.name, seed, missions, read, learned)
     write_files(Path(out).parent, {Path(out).name: result.text()})
     return result
-
-
-def blocks(values: Sequence[float], count: int = 10) -> list[tuple[int, int, float]]:
-    """Return the means of at most `count` blocks of missions: first and last mission, and mean."""
-    size = max(1, -(-len(values) // count))
-    parts = [values[first : first + size] for first in range(0, len(values), size)]
-    return [(n * size + 1, n * size + len(part), sum(part) / len(part)) for n, part in enumerate(parts)]

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from functools import partial
 from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
+from statistics import fmean
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.console import TEXT_WIDTH, errors, number, output, print_table, print_timeline, progress
+from suave_des.campaign import progress
+from suave_des.cli.console import TEXT_WIDTH, errors, number, output, print_table, print_timeline
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -28,6 +31,7 @@ from suave_des.cli.options import (
     complete_managers,
     complete_scenarios,
     flags,
+    manager_options,
 )
 from suave_des.errors import InputError, number_of
 from suave_des.files import FAMILIES, write_files
@@ -42,6 +46,8 @@ if TYPE_CHECKING:
 _RUNS = 200
 """Of reproduce, for each manager."""
 _FAILURES_SHOWN = 20
+_BLOCKS = 10
+"""Into which training missions are divided, for their means."""
 _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
 _MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
@@ -98,18 +104,15 @@ def campaign(
     else:
         check_no_use({"--yes": yes}, "without --resume")
     from suave_des.campaign.campaign import resume_campaign, run_campaign
-    from suave_des.campaign.spec import managers_of
 
-    with progress(str(resume or scenario), quiet=quiet) as show:
-        settings: Given = {"workers": None, **options}
+    with progress.shown(str(resume or scenario), quiet=quiet) as show:
+        settings: Given = {"workers": None, "on_progress": show, **options}
         if resume is not None:
-            result = resume_campaign(resume, on_progress=show, confirmed=yes, **settings)
+            result = resume_campaign(resume, confirmed=yes, **settings)
         else:
             assert scenario is not None
-            managers = options.get("managers") or (managers_of(scenario) if manager_option else ())
-            settings["suave_format"] = form is ResultFormat.SUAVE
-            replaced = files.with_options(manager_option, managers)
-            result = run_campaign(scenario, on_progress=show, command=command_line(), **settings, **replaced)
+            settings |= {"suave_format": form is ResultFormat.SUAVE, "command": command_line(), **files.replacements}
+            result = run_campaign(scenario, settings_of=partial(manager_options, manager_option), **settings)
     console = output()
     print_table(console, _summary(result))
     if (sharing := result.variation.runs_sharing_draw) > 1:
@@ -210,7 +213,7 @@ def reproduce(
     from suave_des.results.paper import FILE, compare_with_paper
 
     settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}
-    with progress("reproduce", quiet=quiet) as show:
+    with progress.shown("reproduce", quiet=quiet) as show:
         result = run_campaign(DEFAULT_SCENARIO, list(PAPER_ORDER), on_progress=show, **settings, **files.replacements)
     comparison = compare_with_paper(result.frame())
     console = output()
@@ -277,20 +280,17 @@ def train(
 
     A campaign uses the resulting file with --manager-option learned=FILE, and does not change it.
     """
-    from suave_des.campaign.training import blocks
     from suave_des.campaign.training import train as trained
 
-    times_s: list[float] = []
-    distances_m: list[float] = []
-
-    def note(metrics: MissionMetrics) -> None:
-        times_s.append(metrics.search_time_s)
-        distances_m.append(metrics.distance_inspected_m)
-
+    found: list[MissionMetrics] = []
     options = files.with_options(manager_option, [manager])
-    trained(scenario, manager, missions, out, seed=seed, overwrite=overwrite, on_mission=note, **options)
-    means = zip(blocks(times_s), blocks(distances_m), strict=True)
-    rows = [(f"{first} to {last}", f"{time_s:.2f}", f"{m:.2f}") for (first, last, time_s), (_, _, m) in means]
+    trained(scenario, manager, missions, out, seed=seed, overwrite=overwrite, on_mission=found.append, **options)
+    size = -(-missions // _BLOCKS)
+    rows = []
+    for first in range(0, missions, size):
+        block = found[first : first + size]
+        means = fmean(each.search_time_s for each in block), fmean(each.distance_inspected_m for each in block)
+        rows.append((f"{first + 1} to {first + len(block)}", *(f"{mean:.2f}" for mean in means)))
     headings = ("missions", "search time, s", "distance, m")
     console = output()
     print_table(console, Table(headings, rows, f"{manager} on {scenario}, means"))

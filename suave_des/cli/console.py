@@ -5,7 +5,6 @@ No control characters from files of others reach a terminal.
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,11 +15,9 @@ from rich.progress import Progress
 from rich.segment import Segment
 from rich.text import Text
 
-from suave_des.errors import MISTAKES_LOGGER
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.campaign.progress import OnProgress
     from suave_des.metrics.result import MissionMetrics, MissionResult
 
 TEXT_WIDTH = 95
@@ -76,20 +73,6 @@ def output() -> Console:
 def errors() -> Console:
     """The console for errors and progress."""
     return PlainConsole(stderr=True)
-
-
-@contextmanager
-def progress(label: str, *, quiet: bool) -> Iterator[OnProgress | None]:
-    """Show the progress of a campaign on standard error, and warnings about its knowledge base, unless `quiet`."""
-    from suave_des.campaign.progress import shown
-
-    logger = logging.getLogger(MISTAKES_LOGGER)
-    logger.disabled = quiet
-    try:
-        with shown(label, quiet=quiet) as show:
-            yield show
-    finally:
-        logger.disabled = False
 
 
 @contextmanager

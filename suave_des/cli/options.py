@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from itertools import chain
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args, get_type_h
 import typer
 from typer.core import TyperGroup
 
-from suave_des.errors import InputError, shown
+from suave_des.errors import MISTAKES_LOGGER, InputError, shown
 from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
@@ -82,7 +83,17 @@ ManagersInData = Annotated[
         autocompletion=complete_managers,
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings.")]
+
+
+def _quiet(context: typer.Context, value: bool) -> bool:
+    """Log no mistakes in rules and ontologies until the command ends."""
+    logger = logging.getLogger(MISTAKES_LOGGER)
+    logger.disabled = value
+    context.call_on_close(lambda: setattr(logger, "disabled", False))
+    return value
+
+
+Quiet = Annotated[bool, typer.Option("--quiet", callback=_quiet, help="Show no progress, and no warnings.")]
 Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in the output folder.")]
 ManagerOptions = Annotated[
@@ -216,7 +227,7 @@ class Files(KnowledgeFiles):
 
     def with_options(self, words: Sequence[str] | None, managers: Sequence[str]) -> Replacements:
         """What is given, with settings of managers as `manager_options` reads them."""
-        options: Replacements = {"manager_options": manager_options(words, managers)} if words else {}
+        options: Replacements = {"manager_options": manager_options(words, managers)}
         return self.replacements | options
 
 

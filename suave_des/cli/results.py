@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from suave_des.campaign import progress
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.console import TEXT_WIDTH, output, print_table, progress
+from suave_des.cli.console import TEXT_WIDTH, output, print_table
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -231,7 +232,7 @@ def validate(
 
         runs = -(-_RUNS // len(conditions or "1"))
         settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
-        with progress(name, quiet=quiet) as show:
+        with progress.shown(name, quiet=quiet) as show:
             campaign = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
         simulated = campaign.frame()
         sources |= {"scenario": campaign.loaded.scenario.name, "runs": settings["runs"]}
@@ -381,7 +382,7 @@ def replay(
     else:
         missions = missions_in(folders, names, run, point or 0, confirmed=yes)
     write_page(page_file, replay_page(missions), show=show)
-    print(f"{' and '.join(each.record.name for each in missions)}: {page_file}")
+    print(f"{' and '.join(each.name for each in missions)}: {page_file}")
 
 
 def report(

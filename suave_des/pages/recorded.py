@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from suave_des.campaign.campaign import opened_campaign
 from suave_des.campaign.inputs import check_inputs
@@ -24,14 +21,13 @@ from suave_des.knowledge.rdf import local_name
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import write_rule
 from suave_des.knowledge.state import Reasoning
-from suave_des.metrics.result import KnowledgeRecord, MissionResult
+from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records.mission_folder import MISSION_FILE, MissionRecord, read_mission, record_of
 from suave_des.records.store import STORE_FILE
 from suave_des.resources import find
 from suave_des.results.mission import adaptations
 from suave_des.results.mission_figures import Rules
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import InputFiles
 from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.simulation.simulator import Simulator
@@ -41,42 +37,9 @@ MOST_MISSIONS = 2
 Plain = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """A mission with its whole record.
-
-    Attributes:
-        record: what its files have.
-        scenario: the scenario in full.
-        loaded: the scenario with its files, where it was read for this.
-    """
-
-    record: MissionRecord
-    scenario: Scenario
-    loaded: LoadedScenario | None = None
-
-
-def recorded_result(loaded: LoadedScenario, result: MissionResult) -> Recorded:
-    """Take a mission that was just run, with its record."""
-    return Recorded(record_of(result, loaded), loaded.scenario, loaded)
-
-
-def recorded(record: MissionRecord) -> Recorded:
-    """Take a mission that was read from its folder.
-
-    Raises:
-        InputError: its scenario is of another version.
-    """
-    try:
-        return Recorded(record, Scenario.model_validate(record.scenario))
-    except ValidationError:
-        problem = f"the scenario of {record.name} is one that this suave-des does not read"
-        raise InputError(problem, file=MISSION_FILE, remedy="run the mission again") from None
-
-
 def missions_in(
     folders: Sequence[Path], managers: Sequence[str] = (), run: int = 1, point: int = 0, *, confirmed: bool = False
-) -> list[Recorded]:
+) -> list[MissionRecord]:
     """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which are run again.
 
     Args:
@@ -90,30 +53,30 @@ def missions_in(
         InputError: there is neither a mission nor a campaign in a folder, or too many missions for one page.
         MissionError: a manager raised.
     """
-    missions: list[Recorded] = []
+    missions: list[MissionRecord] = []
     for folder in folders:
         if (folder / MISSION_FILE).is_file():
-            missions.append(recorded(read_mission(folder)))
+            missions.append(read_mission(folder))
         elif (folder / STORE_FILE).is_file():
             opened = opened_campaign(folder, tuple(managers), confirmed=confirmed)
             known = opened.campaign.spec.managers
             chosen = managers or tuple(dict.fromkeys((known[-1], known[0])))
             _check_number(len(chosen))
-            missions += [recorded_result(*opened.run(manager, run, point)) for manager in chosen]
+            missions += [record_of(*opened.run(manager, run, point)) for manager in chosen]
         else:
             problem = f"has neither a mission ({MISSION_FILE}) nor a campaign that can be run again ({STORE_FILE})"
             remedy = "give the folder that run or campaign wrote with --out"
             raise InputError(problem if folder.is_dir() else "no such folder", file=folder, remedy=remedy)
     _check_number(len(missions))
     for mission, folder in zip(missions, folders, strict=False):
-        if mission.scenario.pipeline.vertices_m != missions[0].scenario.pipeline.vertices_m:
+        if mission.settings.pipeline.vertices_m != missions[0].settings.pipeline.vertices_m:
             raise InputError("has another pipeline", file=folder, remedy="give missions over the same one")
     return missions
 
 
 def missions_run(
     loaded: LoadedScenario, managers: Sequence[str] = ("metacontrol",), run: int = 1, seed: int = 1
-) -> list[Recorded]:
+) -> list[MissionRecord]:
     """Run missions of a scenario.
 
     Raises:
@@ -124,7 +87,7 @@ def missions_run(
     check_range("run", run, 1, RUNS_LIMIT)
     check_inputs([loaded], managers, {})
     simulator = Simulator(loaded)
-    return [recorded_result(loaded, simulator.run(each, run, seed, record=True)) for each in managers]
+    return [record_of(simulator.run(each, run, seed, record=True), loaded) for each in managers]
 
 
 def _check_number(number: int) -> None:
@@ -136,7 +99,7 @@ def _check_number(number: int) -> None:
 # Cycles
 
 
-def explain_cycles(mission: Recorded) -> Plain:
+def explain_cycles(mission: MissionRecord) -> Plain:
     """Reason about a mission's recorded states again, and explain what follows and what is decided.
 
     Where the ontologies are not there any more, only the states are given, with a note.
@@ -149,19 +112,19 @@ def explain_cycles(mission: Recorded) -> Plain:
         inferences: what followed, each kind of situation once, with t_s and facts (fact, source, rule, bindings, and
         because of which facts). rules: text of each rule that took part. note: why some of it is missing, or empty.
     """
-    cycles: list[Plain] = []
+    scenario, cycles = mission.settings, list[Plain]()
     known: Plain = {"cycles": cycles, "inferences": [], "rules": {}, "note": ""}
-    if not mission.record.knowledge:
+    if not mission.knowledge:
         return known
     try:
         base, note = _base(mission)
-        settings, reasoner = ManagingSettings.of(mission.scenario), mission.scenario.knowledge.reasoner
-        knowledge = KnowledgeBase.of(base, settings, reasoner, TimeLimit(TIME_LIMIT_S, "the reasoner"))
+        limit = TimeLimit(TIME_LIMIT_S, "the reasoner")
+        knowledge = KnowledgeBase.of(base, ManagingSettings.of(scenario), scenario.knowledge.reasoner, limit)
     except InputError as error:
-        cycles += [_cycle(record, -1, []) for record in mission.record.knowledge]
+        cycles += [_cycle(record, -1, []) for record in mission.knowledge]
         return known | {"note": f"Decisions are not explained: {error}"}
     explainer = _Explainer(knowledge)
-    for record in mission.record.knowledge:
+    for record in mission.knowledge:
         try:
             reasoning = knowledge.infer(record.state)
             cycles.append(_cycle(record, explainer.inferred(record.t_s, reasoning), list(explainer.decided(reasoning))))
@@ -176,21 +139,21 @@ def explain_cycles(mission: Recorded) -> Plain:
     return known | {"inferences": explainer.inferences, "rules": rules, "note": note}
 
 
-def _base(mission: Recorded) -> tuple[Ontology, str]:
+def _base(mission: MissionRecord) -> tuple[Ontology, str]:
     """Open the mission's ontologies, with a note where one of them has changed since."""
     if mission.loaded is not None:
         return open_base(mission.loaded), ""
-    knowledge, files = mission.scenario.knowledge, InputFiles()
+    knowledge, files = mission.settings.knowledge, InputFiles()
     # A file beside the scenario has its name from there in the scenario, and its path among the inputs.
-    paths = {Path(name).name: Path(name) for name in mission.record.inputs if Path(name).is_file()}
+    paths = {Path(name).name: Path(name) for name in mission.inputs if Path(name).is_file()}
     ontologies, rules = (
         [paths.get(Path(name).name) or find(name, "ontology") for name in names]
         for names in (knowledge.ontologies, knowledge.rules)
     )
-    base = read_base(mission.scenario, ontologies, rules)
+    base = read_base(mission.settings, ontologies, rules)
     for path in (*ontologies, *rules):
         files.note(path)
-    before = {Path(name).name: digest for name, digest in mission.record.inputs.items()}
+    before = {Path(name).name: digest for name, digest in mission.inputs.items()}
     changed = [
         Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest
     ]
@@ -280,7 +243,7 @@ def adaptation_rules(record: MissionRecord) -> Rules:
     Raises:
         InputError: the mission's scenario is of another version.
     """
-    known = explain_cycles(recorded(record))
+    known = explain_cycles(record)
     found = {}
     for each in adaptations(record):
         cycle = _decided_in(known["cycles"], each.t_s, each.function, each.after)

@@ -12,7 +12,8 @@ from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGRO
 from suave_des.managed.follow import InspectionPath
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.page import page
-from suave_des.pages.recorded import Recorded, explain_cycles
+from suave_des.pages.recorded import explain_cycles
+from suave_des.records.mission_folder import MissionRecord
 from suave_des.results.mission import adaptations, details, mode_spans
 from suave_des.world.pipeline import sample_points
 
@@ -21,14 +22,14 @@ STYLES: Final = ("common.css", "replay.css")
 SCRIPTS: Final = ("common.js", "scene_geometry.js", "scene.js", "views.js", "panel.js", "replay.js")
 
 
-def replay_page(missions: Sequence[Recorded]) -> str:
+def replay_page(missions: Sequence[MissionRecord]) -> str:
     """Make the page that plays missions side by side, all at the same mission time.
 
     Args:
         missions: of scenarios with the same pipeline; two of the same seed and run had the same random numbers.
     """
-    first = missions[0]
-    scenario, battery = first.scenario, first.scenario.battery
+    scenario = missions[0].settings
+    battery = scenario.battery
     content = {
         "version": __version__,
         "scenario": {
@@ -45,11 +46,11 @@ def replay_page(missions: Sequence[Recorded]) -> str:
         },
         "missions": [mission_on_page(each) for each in missions],
     }
-    title = " and ".join(dict.fromkeys(each.record.name for each in missions))
+    title = " and ".join(dict.fromkeys(each.name for each in missions))
     return page("replay.html", f"Replay: {title}", content, STYLES, SCRIPTS)
 
 
-def mission_on_page(mission: Recorded) -> dict[str, Any]:
+def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
     """Return a mission as the page plays it; times in s, lengths in m.
 
     Returns:
@@ -60,24 +61,24 @@ def mission_on_page(mission: Recorded) -> dict[str, Any]:
         way: that way from the point seen first, x and y; seen: time, x and y of the first sight, or None; cycles: see
         explain_cycles.
     """
-    record, metrics = mission.record, mission.record.metrics
-    modes = {function: [(span.begin_s, span.what) for span in spans] for function, spans in mode_spans(record).items()}
+    metrics, track = mission.metrics, mission.trajectory.round(_DECIMALS)
+    modes = {function: [(span.begin_s, span.what) for span in spans] for function, spans in mode_spans(mission).items()}
     thrusters: list[tuple[float, int, bool]] = []
-    for t_s, detail in details(record, "component_status"):
+    for t_s, detail in details(mission, "component_status"):
         component, _, status = detail.partition(" ")
         number = component.rpartition("_")[2]
         if number.isdecimal():
             thrusters.append((t_s, int(number), status != FAILED))
-    events = record.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
+    events = mission.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
     x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))
     return {
-        "name": record.name,
+        "name": mission.name,
         "metrics": metrics,
-        "track": {str(name): _rounded(values.tolist()) for name, values in record.trajectory.items()},
+        "track": track.astype(object).where(track.notna(), None).to_dict("list"),
         "modes": modes,
         "thrusters": thrusters,
-        "adaptations": sorted({each.t_s for each in adaptations(record)}),
+        "adaptations": sorted({each.t_s for each in adaptations(mission)}),
         "events": [(round(t_s, 2), *words) for t_s, *words in events],
         "inspected": _inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
         "way": [] if way is None else way.points_m[:, :2].round(_DECIMALS).tolist(),
@@ -86,20 +87,12 @@ def mission_on_page(mission: Recorded) -> dict[str, Any]:
     }
 
 
-def _rounded(values: Sequence[Any]) -> list[Any]:
-    """Round numbers; none where a value is missing."""
-    return [
-        None if value is None or value != value else round(value, _DECIMALS) if isinstance(value, float) else value
-        for value in values
-    ]
-
-
-def _way(mission: Recorded) -> InspectionPath | None:
+def _way(mission: MissionRecord) -> InspectionPath | None:
     """The way along the pipeline from the point that was seen first."""
-    pipeline = mission.scenario.pipeline
-    altitude_m = mission.scenario.revision.follow.altitude_m
+    pipeline = mission.settings.pipeline
+    altitude_m = mission.settings.revision.follow.altitude_m
     points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
-    for _, detail in details(mission.record, "pipeline_detected"):
+    for _, detail in details(mission, "pipeline_detected"):
         number = detail.rpartition(" ")[2]
         if number.isdecimal() and int(number) < len(points):
             path = InspectionPath.there_and_back(points, altitude_m)
@@ -108,16 +101,16 @@ def _way(mission: Recorded) -> InspectionPath | None:
 
 
 def _inspected(
-    mission: Recorded, way: InspectionPath | None, modes: Sequence[tuple[float, str]]
+    mission: MissionRecord, way: InspectionPath | None, modes: Sequence[tuple[float, str]]
 ) -> list[tuple[float, int, float]]:
     """The points of the way that the vehicle reached while it followed the pipeline, each after the one before."""
     if way is None:
         return []
-    follow = mission.scenario.revision.follow
+    follow = mission.settings.revision.follow
     mode_times = [t_s for t_s, _ in modes]
     lengths_m = list(accumulate(way.lengths_m))
     points = way.points_m[:, :2].tolist()
-    track = mission.record.trajectory
+    track = mission.trajectory
     found: list[tuple[float, int, float]] = []
     next_point, was_following, start_m = 0, False, 0.0
     for t_s, x_m, y_m in zip(track["t_s"], track["x_m"], track["y_m"], strict=True):

@@ -221,7 +221,7 @@ def _paths(
     for number, manager in enumerate(groups):
         for run in _representative_runs(frame, groups, runs):
             if (manager, run) in known.index:
-                _, result = opened.run(manager, run)
+                result, _ = opened.run(manager, run)
                 off_s = result.metrics.search_time_s - float(known[manager, run])
                 if is_swept or abs(off_s) < _TOLERANCE_S:
                     yield {"group": number, "run": run, **_path(result)}

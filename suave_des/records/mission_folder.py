@@ -13,6 +13,7 @@ import json
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, field, fields
+from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -55,6 +56,7 @@ class MissionRecord:
         knowledge: the states that its manager reasoned about.
         inputs: SHA-256 of each input file, by its name.
         search_altitudes_m: of the search modes.
+        loaded: its scenario with its files, if it was just run.
     """
 
     metrics: Mapping[str, Any]
@@ -64,12 +66,26 @@ class MissionRecord:
     knowledge: tuple[KnowledgeRecord, ...] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
     search_altitudes_m: Mapping[str, float] = field(default_factory=dict)
+    loaded: LoadedScenario | None = None
 
     @property
     def name(self) -> str:
         """Scenario, manager, run and seed."""
         metrics = self.metrics
         return f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
+
+    @cached_property
+    def settings(self) -> Scenario:
+        """The scenario, validated.
+
+        Raises:
+            InputError: it is of another version.
+        """
+        try:
+            return Scenario.model_validate(self.scenario)
+        except ValidationError:
+            problem = f"the scenario of {self.name} is one that this suave-des does not read"
+            raise InputError(problem, file=MISSION_FILE, remedy="run the mission again") from None
 
     @property
     def end_s(self) -> float:
@@ -110,7 +126,7 @@ def record_of(result: MissionResult, loaded: LoadedScenario) -> MissionRecord:
     """Return the record of a mission that was just run, as its folder would have it."""
     frames = result.events_frame(), result.trajectory_frame()
     scenario, altitudes_m = loaded.scenario.model_dump(mode="json"), loaded.modes.search_altitudes_m
-    return MissionRecord(_metrics(result), scenario, *frames, result.knowledge, loaded.inputs, altitudes_m)
+    return MissionRecord(_metrics(result), scenario, *frames, result.knowledge, loaded.inputs, altitudes_m, loaded)
 
 
 def read_mission(folder: Path) -> MissionRecord:

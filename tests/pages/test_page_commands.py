@@ -9,7 +9,6 @@ import pytest
 from suave_des import run_mission
 from suave_des.campaign.campaign import run_campaign
 from suave_des.cli.main import main
-from suave_des.pages.recorded import recorded
 from suave_des.pages.replay import mission_on_page
 from suave_des.records.mission_folder import read_mission
 from suave_des.resources import shipped_folder
@@ -37,7 +36,7 @@ def campaign(tmp_path_factory):
 
 def test_decisions_of_metacontrol_are_explained_as_they_were_made(tmp_path):
     run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "mission")
-    page = mission_on_page(recorded(read_mission(tmp_path / "mission")))
+    page = mission_on_page(read_mission(tmp_path / "mission"))
     decided = [
         (each["function"], each["before"], each["chosen"])
         for cycle in page["cycles"]["cycles"]
@@ -62,7 +61,7 @@ def test_an_ontology_beside_the_scenario_is_found_from_elsewhere(tmp_path, monke
         "base: seams2023\nknowledge: {ontologies: [suave.owl]}\n", encoding="utf-8"
     )
     run_mission("own/own.yaml", "metacontrol", 1, 1, tmp_path / "mission")
-    assert mission_on_page(recorded(read_mission(tmp_path / "mission")))["cycles"]["note"] == ""
+    assert mission_on_page(read_mission(tmp_path / "mission"))["cycles"]["note"] == ""
 
 
 def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_path):
@@ -71,7 +70,7 @@ def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_pat
     record = json.loads((folder / "mission.json").read_text(encoding="utf-8"))
     record["scenario"]["knowledge"]["ontologies"] = ["gone.owl"]
     (folder / "mission.json").write_text(json.dumps(record), encoding="utf-8")
-    page = mission_on_page(recorded(read_mission(folder)))
+    page = mission_on_page(read_mission(folder))
     assert "gone.owl" in page["cycles"]["note"]
     assert page["cycles"]["cycles"][0]["measured"]
 

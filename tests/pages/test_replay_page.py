@@ -2,8 +2,8 @@
 
 import pytest
 
-from suave_des.pages.recorded import recorded_result
 from suave_des.pages.replay import replay_page
+from suave_des.records.mission_folder import record_of
 from suave_des.results.mission import adaptations
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
@@ -23,9 +23,7 @@ def browser():
 def missions():
     loaded = load_scenario("seams2023")
     simulator = Simulator(loaded)
-    return {
-        name: recorded_result(loaded, simulator.run(name, 1, SEED, record=True)) for name in ("metacontrol", "none")
-    }
+    return {name: record_of(simulator.run(name, 1, SEED, record=True), loaded) for name in ("metacontrol", "none")}
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +123,7 @@ def test_keys_move_through_time(key, expected_s, opened_one):
 
 def test_the_next_key_stops_at_adaptations_alone(opened_one, missions):
     scrub_to(opened_one, 0)
-    for adaptation in adaptations(missions["metacontrol"].record)[:3]:
+    for adaptation in adaptations(missions["metacontrol"])[:3]:
         opened_one.page.keyboard.press("n")
         opened_one.wait_until(f"Math.abs(Number(document.body.dataset.time) - {adaptation.t_s}) < 0.05")
 
@@ -178,7 +176,7 @@ def test_it_says_when_no_design_is_left(tmp_path, browser):
     rules.write_text("stay: typeFD(?fg, fd_spiral_medium) -> fd_realisability(fd_spiral_low, false)")
     loaded = load_scenario("seams2023", rules=[rules])
     result = Simulator(loaded).run("metacontrol", 1, SEED, record=True)
-    file.write_text(replay_page([recorded_result(loaded, result)]), encoding="utf-8")
+    file.write_text(replay_page([record_of(result, loaded)]), encoding="utf-8")
     with opened(browser, file, hash_="#t=30") as found:
         assert found.complaints == []
         assert "no design is left for f_generate_search_path" in found.page.text_content(".state")

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from suave_des.cli.console import counted, errors, progress
+from suave_des.campaign import progress
+from suave_des.cli.console import counted, errors
 from suave_des.cli.kb import ask, tests
 from suave_des.cli.kb.options import KnowledgeOptions, MaxFailed, ReasonerOptions, TimeLimitS, shown
 from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet, Seed, Workers
@@ -204,7 +205,7 @@ def diff(
     missions, last = None, list[str]()
     if mission_options.missions is not None:
         replaced = [each.replacements | {"modes_file": mission_options.modes} for each in both]
-        with progress("missions with A, then with B", quiet=mission_options.quiet) as on_progress:
+        with progress.shown("missions with A, then with B", quiet=mission_options.quiet) as on_progress:
             missions = compare_missions(
                 both[0].scenario,
                 mission_options.missions,
