@@ -106,7 +106,7 @@ def scrub_to(found, time_s):
 
 
 def test_scrubbing_shows_the_vehicle_where_it_was_then(opened_one, missions):
-    track = missions["metacontrol"].record.trajectory
+    track = missions["metacontrol"].trajectory
     index = track["t_s"].tolist().index(50.0)
     scrub_to(opened_one, 50)
     assert place(opened_one) == pytest.approx([track[name][index] for name in ("x_m", "y_m", "z_m")], abs=2e-3)
@@ -187,8 +187,7 @@ def test_names_are_text_never_markup(missions, tmp_path, browser):
     from dataclasses import replace
 
     name = "</script><img src=x onerror=alert(1)><b>mine</b>"
-    record = missions["none"].record
-    mission = replace(missions["none"], record=replace(record, metrics={**record.metrics, "manager": name}))
+    mission = replace(missions["none"], metrics={**missions["none"].metrics, "manager": name})
     file = tmp_path / "replay.html"
     file.write_text(replay_page([mission]), encoding="utf-8")
     with opened(browser, file) as found:
