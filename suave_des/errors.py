@@ -86,15 +86,9 @@ class MissionTimeOut(BaseException):
 KeyPath = tuple[str | int, ...]
 
 
-def place_text(line: int, key_path: KeyPath) -> str:
-    """Write a place for the user: "line 12, thruster_events[0].time_s"."""
-    keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(".")
-    return f"line {line}, {keys}" if keys else f"line {line}"
-
-
 def line_error(file: Path, line: int, problem: str, remedy: str | None = None) -> InputError:
     """Make the error for a line of a file."""
-    return InputError(problem, file=file, place=place_text(line, ()), remedy=remedy)
+    return InputError(problem, file=file, place=f"line {line}", remedy=remedy)
 
 
 _WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}

@@ -84,6 +84,11 @@ def read_bytes(path: Path, limit: int = LIMIT_BYTES) -> bytes:
     return content
 
 
+def sha256_of(path: Path, limit: int = LIMIT_BYTES) -> str:
+    """Return the SHA-256 of a file, in hex; raises as read_bytes does."""
+    return hashlib.sha256(read_bytes(path, limit)).hexdigest()
+
+
 def check_own(paths: Iterable[Path]) -> None:
     """Check that files that are to be changed in place are that: a link or a pipe may lead to anything.
 

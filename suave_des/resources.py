@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from suave_des.errors import InputError, did_you_mean
+from suave_des.files import sha256_of
 
 DEFAULT_SCENARIO = "seams2023"
 """The paper's, where none is named."""
@@ -24,6 +26,19 @@ def shipped_folder(kind: str) -> Path:
     """Folder of shipped files of one kind, such as "ontology", "scenarios" or "scenarios/revisions"."""
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
+
+
+def shown_name(path: Path) -> str:
+    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as given."""
+    for kind in ("ontology", "scenarios"):
+        if path.is_relative_to(folder := shipped_folder(kind)):
+            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
+    return path.as_posix()
+
+
+def hashes(paths: Iterable[Path], limit: int = 100_000_000) -> dict[str, str]:
+    """Return the SHA-256 of files, in hex, by their names for users; raises as read_bytes does."""
+    return {shown_name(path): sha256_of(path, limit) for path in paths}
 
 
 def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:

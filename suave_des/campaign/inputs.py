@@ -30,18 +30,17 @@ from suave_des.campaign.missions import Campaign
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
 from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_ensemble
 from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, shown
+from suave_des.files import LIMIT_BYTES, sha256_of
 from suave_des.learned import read_file
 from suave_des.registry import cause_of, custom_functions, is_built_in, manager_class, takes_argument
-from suave_des.resources import shipped_folder
+from suave_des.resources import hashes, shipped_folder, shown_name
 from suave_des.scenario.loader import LoadedScenario, load_scenario
-from suave_des.scenario.yamlfile import InputFiles, sha256_of, shown_name
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
 
 _TIME_OUTS_S = {"owlready2": 1800.0}
 """Time that a mission may take with a reasoner, if not the default: owlready2 takes some two minutes a mission."""
-_LIMIT_BYTES = 1_000_000_000
 _told: set[Hashable] = set()
 """What this process has checked for mistakes, and reported: a script may run thousands of missions with the same."""
 
@@ -56,18 +55,18 @@ def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: Load
     loaded = load_scenario(loaded or (spec.scenario if file is None else file.scenario), **spec.replacements)
     with _located(file):
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw)
-    files = InputFiles()
+    inputs: dict[str, str] = {}
     if spec.ensemble is not None:
         ensemble, path, digest = read_ensemble(spec.ensemble)
         variation = with_ensemble(loaded, variation, ensemble, path)
-        files.note(path, digest)
+        inputs = {shown_name(path): digest}
     if "time_out_s" not in spec.model_fields_set:
         time_out_s = _TIME_OUTS_S.get(loaded.scenario.knowledge.reasoner, spec.time_out_s)
         spec = spec.model_copy(update={"time_out_s": time_out_s})
     if spec.suave_format and variation.sweep.points > 1:
         remedy = "omit --format suave, or run a campaign for each point"
         raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
-    return Campaign(request, spec, loaded, variation, file, files.inputs)
+    return Campaign(request, spec, loaded, variation, file, inputs)
 
 
 @contextmanager
@@ -160,7 +159,7 @@ def check_inputs(
             of it cannot be read.
     """
     functions = [kind for each in scenarios for kind in custom_functions(each).values()]
-    files = InputFiles()
+    inputs: dict[str, str] = {}
     given = any(replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
@@ -170,8 +169,7 @@ def check_inputs(
         knowledge.analyze_and_plan(KnowledgeState())
         for assumption in knowledge.base.assumptions.values():
             logging.getLogger("suave_des").warning("note: %s", assumption)
-        for path in knowledge.base.files:
-            files.note(path)
+        inputs = hashes(knowledge.base.files)
         report_mistakes(scenarios[0], knowledge.base)
     code = user_modules(managers, functions)
     for module in _defining(managers, functions):  # of a class that a package has installed, its module
@@ -186,10 +184,9 @@ def check_inputs(
                 raise
             except Exception as error:  # whatever a manager's own code raises
                 raise InputError(f"manager {manager}: check raised {cause_of(error)}") from error
-    for path in declared_files(scenarios, managers).values():
-        files.note(path, sha256_of(path, _LIMIT_BYTES))
-    names = {place: place if place not in files.inputs else f"module {place}" for place in code}
-    return {**files.inputs, **{names[place]: sha256_of(path, _LIMIT_BYTES) for place, path in code.items()}}
+    inputs |= hashes(declared_files(scenarios, managers).values(), LIMIT_BYTES)
+    code = {place if place not in inputs else f"module {place}": path for place, path in code.items()}
+    return inputs | {place: sha256_of(path) for place, path in code.items()}
 
 
 def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[tuple[str, str], Path]:

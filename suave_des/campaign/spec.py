@@ -14,11 +14,9 @@ from pydantic import Field, ValidationError
 from suave_des.campaign.variation import plain
 from suave_des.errors import InputError, shown
 from suave_des.registry import is_built_in, manager_class
-from suave_des.resources import find
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.models import Real, Strict
-from suave_des.scenario.schema import problem_and_remedy, validated
-from suave_des.scenario.yamlfile import InputFiles, Layer, find_named
+from suave_des.scenario.yamlfile import InputFiles, Layer, find_named, problem_and_remedy, validated
 
 RUNS_LIMIT = 1_000_000
 SEED_LIMIT = 2**63 - 1
@@ -206,12 +204,12 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
         InputError: it cannot be read, is of another version, or has an impossible value.
     """
     files = InputFiles()
-    layer = files.yaml(find(name, "scenarios"))
+    layer = files.yaml(name, "scenarios")
     if "campaign" not in layer.data:
         return None
     settings = validated(layer, CampaignSettings)
     if settings.ensemble is not None:
-        ensemble = find_named(layer, ("ensemble",), settings.ensemble, "scenarios/ensembles")
+        ensemble = find_named(settings.ensemble, "scenarios/ensembles", layer, ("ensemble",))
         settings = settings.model_copy(update={"ensemble": str(ensemble)})
-    scenario = find_named(layer, ("scenario",), settings.scenario, "scenarios")
+    scenario = find_named(settings.scenario, "scenarios", layer, ("scenario",))
     return CampaignFile(settings, scenario, files.inputs, layer)

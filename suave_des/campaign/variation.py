@@ -29,7 +29,7 @@ from suave_des.records.store import MissionKey
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, full_path, value_at, with_values
 from suave_des.scenario.models import MissionSettings, Strict, wrong
-from suave_des.scenario.schema import problem_and_remedy
+from suave_des.scenario.yamlfile import problem_and_remedy
 
 ENSEMBLE_COLUMN = "ensemble_member"
 """Column of runs.csv: number of the member, from 1."""

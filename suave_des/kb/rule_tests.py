@@ -45,8 +45,7 @@ from suave_des.knowledge.rdf import Triple
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
-from suave_des.scenario.schema import validated
-from suave_des.scenario.yamlfile import YamlDocument, read_yaml
+from suave_des.scenario.yamlfile import Layer, read_yaml, validated
 
 #: What XML 1.0 has no place for.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
@@ -114,7 +113,7 @@ class TestFile:
     """A file of tests, read as far as that is possible without its knowledge base."""
 
     __test__ = False  # pytest takes it for a test otherwise
-    document: YamlDocument
+    document: Layer
     content: _File
 
     @classmethod

@@ -29,8 +29,7 @@ from suave_des.records.mission_folder import (
     read_missions,
 )
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.schema import validated
-from suave_des.scenario.yamlfile import read_yaml
+from suave_des.scenario.yamlfile import read_yaml, validated
 from suave_des.scenario_knowledge import measured_attributes
 
 #: Begins the IRIs of individuals that exist in a test or a question only.

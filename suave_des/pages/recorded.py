@@ -24,11 +24,10 @@ from suave_des.knowledge.state import Reasoning
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records.mission_folder import MISSION_FILE, MissionRecord, read_mission, record_of
 from suave_des.records.store import STORE_FILE
-from suave_des.resources import find
+from suave_des.resources import find, hashes
 from suave_des.results.mission import adaptations
 from suave_des.results.mission_figures import Rules
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.yamlfile import InputFiles
 from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.simulation.simulator import Simulator
 
@@ -143,7 +142,7 @@ def _base(mission: MissionRecord) -> tuple[Ontology, str]:
     """Open the mission's ontologies, with a note where one of them has changed since."""
     if mission.loaded is not None:
         return open_base(mission.loaded), ""
-    knowledge, files = mission.settings.knowledge, InputFiles()
+    knowledge = mission.settings.knowledge
     # A file beside the scenario has its name from there in the scenario, and its path among the inputs.
     paths = {Path(name).name: Path(name) for name in mission.inputs if Path(name).is_file()}
     ontologies, rules = (
@@ -151,12 +150,9 @@ def _base(mission: MissionRecord) -> tuple[Ontology, str]:
         for names in (knowledge.ontologies, knowledge.rules)
     )
     base = read_base(mission.settings, ontologies, rules)
-    for path in (*ontologies, *rules):
-        files.note(path)
     before = {Path(name).name: digest for name, digest in mission.inputs.items()}
-    changed = [
-        Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest
-    ]
+    now = hashes((*ontologies, *rules))
+    changed = [Path(name).name for name, digest in now.items() if before.get(Path(name).name, digest) != digest]
     note = f"{', '.join(changed)} changed since the mission: decisions are explained with today's." if changed else ""
     return base, note
 

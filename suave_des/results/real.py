@@ -26,8 +26,7 @@ from suave_des.records.runs import Runs, read_runs
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario.models import Number, Strict, ordered, wrong
-from suave_des.scenario.schema import validated
-from suave_des.scenario.yamlfile import read_yaml
+from suave_des.scenario.yamlfile import read_yaml, validated
 
 PAPERS_RUNS = "seams2023_runs.csv"
 """The 60 missions published with the SUAVE paper, for scenarios that have none of their own."""

@@ -26,8 +26,7 @@ from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
 from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at, with_values
 from suave_des.scenario.models import LONGEST_S, Real, Scenario, mean, ordered
 from suave_des.scenario.modes import modes_of
-from suave_des.scenario.schema import validated
-from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, parse_yaml, read_yaml
+from suave_des.scenario.yamlfile import Layer, Location, parse_yaml, read_yaml, validated
 
 RUNNER, REASONER, LAUNCH, EXPERIMENT = "suave_runner_node", "reasoner", "experiment_launch", "experiments[]"
 """A campaign's node; any node with a reasoning_period; arguments NAME:=VALUE of a launch; keys of an experiment."""
@@ -184,7 +183,7 @@ class Imported:
 
 
 def import_config(
-    files: Sequence[Path | YamlDocument],
+    files: Sequence[Path | Layer],
     out: Path,
     *,
     managers: Collection[str],
@@ -207,7 +206,7 @@ def import_config(
             or a value cannot be right.
     """
     notes: list[str] = []
-    documents = [each if isinstance(each, YamlDocument) else read_yaml(each) for each in files]
+    documents = [each if isinstance(each, Layer) else read_yaml(each) for each in files]
     parameters, modes = _parameters(documents, notes)
     runner = _runner(parameters)
     if campaign is None and runner_seed is not None:
@@ -226,7 +225,7 @@ def import_config(
     values = _values(parameters, revision, plain, notes) | _battery_constraint(experiments, notes)
     if plain.scenario.revision.name != revision:
         values["revision"] = Value(revision, why)
-    if any(other.sha256 != modes[0].sha256 for other in modes):
+    if any(other.data != modes[0].data for other in modes):
         raise InputError("there are two System Modes files", file=modes[-1].path, remedy="give one of them")
     if modes:
         values["modes_file"] = Value(str(modes[0].path.resolve()), "as it is")
@@ -266,7 +265,7 @@ class Parameter:
         node: as in the table of keys; empty if it is none of them.
     """
 
-    document: YamlDocument
+    document: Layer
     entry: str
     name: str
     value: Any
@@ -292,9 +291,9 @@ class Parameter:
         return f"{self.document.path.name}, line {self.line()}"
 
 
-def _parameters(documents: Sequence[YamlDocument], notes: list[str]) -> tuple[list[Parameter], list[YamlDocument]]:
+def _parameters(documents: Sequence[Layer], notes: list[str]) -> tuple[list[Parameter], list[Layer]]:
     """The parameters of known nodes, file by file, and the System Modes files; notes about the rest."""
-    parameters, modes = list[Parameter](), list[YamlDocument]()
+    parameters, modes = list[Parameter](), list[Layer]()
     for document in documents:
         contents = [each.get(PARAMETERS) for each in document.data.values() if isinstance(each, dict)]
         if any(isinstance(each, dict) and each.get("type") in ("system", "node") for each in contents):
@@ -626,7 +625,7 @@ def _perturbations(
 _COMMENT_COLUMN = 43
 
 
-def _text(documents: Sequence[YamlDocument], entries: Entries, notes: Sequence[str]) -> str:
+def _text(documents: Sequence[Layer], entries: Entries, notes: Sequence[str]) -> str:
     """A YAML file of these entries."""
     names = ", ".join(each.path.name for each in documents)
     lines, above = [f"# Imported by `suave-des import-config` from {names}."], tuple[str, ...]()

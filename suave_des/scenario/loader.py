@@ -10,11 +10,10 @@ from typing import Any, Protocol, TypedDict, Unpack
 from suave_des.arguments import plain_arguments
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.resources import find
+from suave_des.resources import hashes, shown_name
 from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
-from suave_des.scenario.schema import validated
-from suave_des.scenario.yamlfile import InputFiles, Layer, Location, find_named, scenario_layer
+from suave_des.scenario.yamlfile import InputFiles, Layer, Location, find_named, scenario_layer, validated
 
 
 class _DeclaresFiles(Protocol):
@@ -167,36 +166,32 @@ def load_scenario(
         remedy = did_you_mean(reasoner, REASONERS)
         raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
     files = InputFiles()
-    path = find(name, "scenarios")
-    layer = scenario_layer(files, path, over)
+    layer = scenario_layer(files, name, over)
     scenario = validated(layer, Scenario)
     knowledge = scenario.knowledge
-
-    named = find_named(layer, ("modes_file",), scenario.modes_file, "scenarios") if modes_file is None else None
-    modes_path = named or find(modes_file or "", "scenarios")
-    modes = modes_of(files.yaml(modes_path))
+    named, by = (scenario.modes_file, layer) if modes_file is None else (modes_file, None)
+    modes_layer = files.yaml(named, "scenarios", by, ("modes_file",))
+    modes = modes_of(modes_layer)
     modes.check(scenario, layer)
-    ontologies = tuple(find(each, "ontology") for each in replacements.get("ontologies", ())) or tuple(
-        find_named(layer, ("knowledge", "ontologies", index), each, "ontology")
+    ontologies = tuple(find_named(each, "ontology") for each in replacements.get("ontologies", ())) or tuple(
+        find_named(each, "ontology", layer, ("knowledge", "ontologies", index))
         for index, each in enumerate(knowledge.ontologies)
     )
     remedy = "a file of rules as text, named relative to this"
     rules = (
         *(
-            find_named(layer, ("knowledge", "rules", index), each, "ontology", remedy)
+            find_named(each, "ontology", layer, ("knowledge", "rules", index), remedy)
             for index, each in enumerate(knowledge.rules)
         ),
         *map(Path, replacements.get("rules", ())),
     )
-    for each in (*ontologies, *rules):
-        files.note(each)
+    inputs = files.inputs | hashes((*ontologies, *rules))
     tables = {}
+    remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):
-            remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
-            table_path = find_named(layer, ("signals", signal_name, "file"), signal.file, "scenarios", remedy)
-            tables[signal_name], digest = read_table(table_path)
-            files.note(table_path, digest)
+            path = find_named(signal.file, "scenarios", layer, ("signals", signal_name, "file"), remedy)
+            tables[signal_name], inputs[shown_name(path)] = read_table(path)
 
     changed = {
         "ontologies": tuple(map(str, replacements.get("ontologies", ()))) or knowledge.ontologies,
@@ -206,7 +201,7 @@ def load_scenario(
     }
     update = {"knowledge": knowledge.model_copy(update=changed), "modes_file": str(modes_file or scenario.modes_file)}
     scenario = scenario.model_copy(update=update)
-    loaded = LoadedScenario(scenario, path, ontologies, modes, modes_path, tables, files.inputs, layer, rules)
+    loaded = LoadedScenario(scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, rules)
     loaded = _set(loaded, replacements.get("values") or {}, "--set")
     if options := replacements.get("manager_options"):
         managers = loaded.scenario.managers.model_dump(mode="json")

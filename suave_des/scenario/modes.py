@@ -7,22 +7,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PlainValidator,
-    TypeAdapter,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MODE
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown, similar
 from suave_des.scenario.models import Real, Scenario, Strict, wrong
-from suave_des.scenario.schema import input_error
-from suave_des.scenario.yamlfile import Layer, YamlDocument
+from suave_des.scenario.yamlfile import Layer, validated
 
 ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"
@@ -190,10 +180,7 @@ class _Entry(Strict):
     ros__parameters: Annotated[_System | _Node, Field(discriminator="type")]
 
 
-_FILE = TypeAdapter(dict[str, _Entry])
-
-
-def modes_of(document: YamlDocument) -> ModeTable:
+def modes_of(document: Layer) -> ModeTable:
     """Make the table of a System Modes YAML file.
 
     A function is an entry `type: system` whose parts are nodes; a system of systems only groups functions and
@@ -209,10 +196,7 @@ def modes_of(document: YamlDocument) -> ModeTable:
         if name in keys:
             raise document.error(f"{name} appears twice, once with a leading slash", (key,), "keep one entry")
         keys[name] = key
-    try:
-        content = _FILE.validate_python(document.data)
-    except ValidationError as error:
-        raise input_error(error, document, dict[str, _Entry]) from None
+    content = validated(document, dict[str, _Entry])
     entries = {name: content[key].ros__parameters for name, key in keys.items()}
     nodes = {name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)}
     functions: dict[str, Mapping[str, Mode]] = {}
@@ -236,7 +220,7 @@ def modes_of(document: YamlDocument) -> ModeTable:
 
 
 def _mode(
-    document: YamlDocument,
+    document: Layer,
     path: KeyPath,
     states: Mapping[str, Any],
     nodes: Mapping[str, Mapping[str, dict[str, ParameterValue]]],

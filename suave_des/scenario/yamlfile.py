@@ -1,4 +1,4 @@
-"""YAML files as plain data with the line of every key, merged over the files that they build on.
+"""YAML files as plain data with the line of every key, merged over the files that they build on, and validated.
 
 Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and
 `2023-02-04` are text. No constructor of PyYAML is involved, so no tag can build an object.
@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import hashlib
 import re
+import typing
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import yaml
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 from yaml.reader import ReaderError
 
-from suave_des.errors import InputError, KeyPath, line_error, place_text, shown
+from suave_des.errors import InputError, KeyPath, did_you_mean, line_error, shown
 from suave_des.files import decode, read_bytes
-from suave_des.resources import find, shipped_folder
+from suave_des.resources import find, shown_name
 
 SIZE_LIMIT_BYTES = 1_000_000
 _VALUES_LIMIT = 100_000
@@ -42,14 +45,19 @@ class Layer:
     """Plain data of one or several merged files, with the location of each key path.
 
     Attributes:
-        data: the content.
+        data: a mapping of str, int, float, bool, None, list and dict with str keys.
         places: file and line of each key path that is in a file, and not a default.
         above: key path of the data within the file, for messages.
     """
 
     data: dict[str, Any]
     places: Places
-    above: KeyPath = field(default=(), kw_only=True)
+    above: KeyPath = ()
+
+    @property
+    def path(self) -> Path:
+        """The file that the user named."""
+        return self.places[()].file
 
     def place(self, key_path: KeyPath) -> Location:
         """Location of a key path, or of the nearest part that holds it."""
@@ -78,40 +86,29 @@ class Layer:
     def below(self, key: str) -> Layer:
         """The mapping under a key."""
         places = {path[1:]: place for path, place in self.places.items() if path[:1] == (key,)}
-        return Layer(self.data[key], {(): self.place((key,)), **places}, above=(*self.above, key))
+        return Layer(self.data[key], {(): self.place((key,)), **places}, (*self.above, key))
 
 
-@dataclass(frozen=True)
-class YamlDocument(Layer):
-    """One YAML file: its top-level mapping, of str, int, float, bool, None, list and dict with str keys.
-
-    Attributes:
-        path: the file.
-        sha256: of the file's bytes, in hex.
-    """
-
-    path: Path
-    sha256: str
+def place_text(line: int, key_path: KeyPath) -> str:
+    """Write a place for the user: "line 12, thruster_events[0].time_s"."""
+    keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(".")
+    return f"line {line}, {keys}" if keys else f"line {line}"
 
 
-def read_yaml(path: Path | str, depth: int = 0) -> YamlDocument:
+# The text of one file.
+
+
+def read_yaml(path: Path | str) -> Layer:
     """Read a YAML file whose top level is a mapping.
-
-    Args:
-        path: of the file.
-        depth: of its places: 0 for a file that the user named, 1 for its base, and so on.
 
     Raises:
         InputError: with the line: the file cannot be read, is not YAML, has a tag, a duplicate key or several
             documents, or has another top level.
     """
-    path = Path(path)
-    content = read_bytes(path, SIZE_LIMIT_BYTES)
-    text = decode(path, content)
-    return parse_yaml(text, path, depth, hashlib.sha256(content).hexdigest())
+    return InputFiles().yaml(path)
 
 
-def parse_yaml(text: str, path: Path, depth: int = 0, sha256: str = "") -> YamlDocument:
+def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
     """Parse the text of a YAML file, as read_yaml does.
 
     Raises:
@@ -123,7 +120,7 @@ def parse_yaml(text: str, path: Path, depth: int = 0, sha256: str = "") -> YamlD
             problem, line = ("is empty", 1) if root is None else ("is not a mapping at its top level", _line(root))
             raise line_error(path, line, problem, "write `key: value` lines")
         reading = _Reading(path, depth)
-        data = reading.plain(root, ())
+        return Layer(reading.plain(root, ()), reading.places)
     except ReaderError as error:
         problem = f"holds {chr(error.character)!r}, which YAML does not allow"
         raise line_error(path, text.count("\n", 0, error.position) + 1, problem, "remove it") from None
@@ -135,7 +132,6 @@ def parse_yaml(text: str, path: Path, depth: int = 0, sha256: str = "") -> YamlD
     except RecursionError:
         problem = "is nested too deep, or an alias stands for something that holds it"
         raise InputError(problem, file=path, remedy="write it out") from None
-    return YamlDocument(data, reading.places, path, sha256)
 
 
 def read_value(text: str, option: str) -> Any:
@@ -234,66 +230,69 @@ _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 """Mappings of freely named entries, in which a null removes the base's entry."""
 _PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
 """Parts of a scenario that may be the name of a file, or differ from one that they name as their base."""
-_ONTOLOGY_LIMIT_BYTES = 100_000_000
 _DEFAULT_VEHICLE = "bluerov2"
 
 
 class InputFiles:
-    """Reads files and keeps the hash of each, for a manifest.
+    """Finds files that the user or a file names, reads them, and keeps the hash of each, for a manifest.
 
     Attributes:
-        inputs: SHA-256 of each file read, as "shipped/KIND/NAME" if it is shipped, else its path as given.
+        inputs: SHA-256 of each file, in hex, by its name as shown to the user.
     """
 
     def __init__(self) -> None:
         self.inputs: dict[str, str] = {}
 
-    def yaml(self, path: Path, depth: int = 0) -> YamlDocument:
-        """Read a YAML file."""
-        document = read_yaml(path, depth)
-        self.note(path, document.sha256)
-        return document
+    def yaml(
+        self, name: object, kind: str = "", by: Layer | None = None, key_path: KeyPath = (), depth: int = 0
+    ) -> Layer:
+        """Find a YAML file as find_named does, unless no kind is given, and read it as read_yaml does.
 
-    def note(self, path: Path, sha256: str | None = None) -> None:
-        """Store the hash of a file that was read, or is an ontology or a file of rules, which are parsed elsewhere."""
-        self.inputs[shown_name(path)] = sha256 or sha256_of(path, _ONTOLOGY_LIMIT_BYTES)
-
-
-def sha256_of(path: Path, limit: int) -> str:
-    """SHA-256 of a file; raises as read_bytes does."""
-    return hashlib.sha256(read_bytes(path, limit)).hexdigest()
-
-
-def shown_name(path: Path) -> str:
-    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as given."""
-    for kind in ("ontology", "scenarios"):
-        if path.is_relative_to(folder := shipped_folder(kind)):
-            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
-    return path.as_posix()
+        Args:
+            name, kind, by, key_path: as of find_named.
+            depth: of its places: 0 for a file that the user named, 1 for its base, and so on.
+        """
+        path = find_named(name, kind, by, key_path) if kind else Path(str(name))
+        shown_as = shown_name(path)
+        content = read_bytes(path, SIZE_LIMIT_BYTES)
+        self.inputs[shown_as] = hashlib.sha256(content).hexdigest()
+        text = decode(path, content)
+        return parse_yaml(text, path, depth)
 
 
-def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
-    """Find a file that a layer names: beside the file in which its name is given, or shipped.
+def find_named(
+    name: object, kind: str, by: Layer | None = None, key_path: KeyPath = (), remedy: str | None = None
+) -> Path:
+    """Find a file that the user names, or that a layer names: beside the file in which its name is given, or shipped.
+
+    Args:
+        name: a path, or the name of a shipped file.
+        kind: of the file, as of shipped_folder.
+        by: the layer; None: the user.
+        key_path: where the layer gives the name.
+        remedy: if there is no such file.
 
     Raises:
         InputError: there is none, with the line that names it.
     """
+    if by is None:
+        return find(str(name), kind)
     if isinstance(name, int | float) and not isinstance(name, bool):
         name = f"{name:g}"  # revisions 2023 and 1.5 need no quotes
     if not isinstance(name, str) or not name:
-        raise layer.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
+        raise by.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
     try:
-        return find(name, kind, beside=layer.place(key_path).file.parent)
+        return find(name, kind, beside=by.place(key_path).file.parent)
     except InputError as error:
-        raise layer.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
+        raise by.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
 
 
-def scenario_layer(files: InputFiles, path: Path, over: Layer | None = None) -> Layer:
-    """Merge a scenario file over its bases, with its revision and its vehicle written out in full.
+def scenario_layer(files: InputFiles, name: str | Path, over: Layer | None = None) -> Layer:
+    """Read a scenario file and merge it over its bases, with its revision and its vehicle written out in full.
 
     Args:
-        files: reader.
-        path: of the scenario.
+        files: reads them.
+        name: path of the scenario, or name of a shipped one.
         over: what differs from it; None: nothing.
 
     Returns:
@@ -302,21 +301,21 @@ def scenario_layer(files: InputFiles, path: Path, over: Layer | None = None) -> 
     Raises:
         InputError: a file that cannot be read, or is its own base; a revision that is not known.
     """
-    own: Layer = files.yaml(path)
+    own = files.yaml(name, "scenarios")
     if "campaign" in own.data and "scenario" in own.data:
-        remedy = f"suave-des campaign {path} --out DIR runs it; its scenario is {own.data['scenario']}"
+        remedy = f"suave-des campaign {own.path} --out DIR runs it; its scenario is {own.data['scenario']}"
         raise own.error("this is a campaign file, not a scenario", ("campaign",), remedy)
-    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
-    name = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
-    layer = _over_its_base(files, _with_named_parts(own), "scenarios", (path,))
+    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", own.path.stem)[:90]
+    title = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
+    layer = _over_its_base(files, _with_named_parts(own), "scenarios", (own.path,))
     layer = layer if over is None else merge(layer, _with_named_parts(over))
     layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
-    for part, folder in _PARTS.items():
+    for part, kind in _PARTS.items():
         if "base" in (layer.data.get(part) or ()):
-            whole = _over_its_base(files, layer.below(part), folder, (layer.place((part,)).file,))
-            data = {**layer.data, part: whole.data}
-            layer = Layer(data, {**layer.places, **{(part, *path): place for path, place in whole.places.items()}})
-    return Layer({**layer.data, "name": name}, layer.places)
+            whole = _over_its_base(files, layer.below(part), kind, (layer.place((part,)).file,))
+            places = {(part, *path): place for path, place in whole.places.items()}
+            layer = Layer({**layer.data, part: whole.data}, {**layer.places, **places})
+    return Layer({**layer.data, "name": title}, layer.places)
 
 
 def _with_named_parts(layer: Layer) -> Layer:
@@ -333,15 +332,14 @@ def _over_its_base(files: InputFiles, layer: Layer, kind: str, chain: tuple[Path
     """Merge a layer over the file that it names as its base, if any; `chain` is how that was reached."""
     if "base" not in layer.data:
         return layer
-    path = find_named(layer, ("base",), layer.data["base"], kind)
-    chain = (*chain, path)
+    below = files.yaml(layer.data["base"], kind, layer, ("base",), len(chain))
+    chain = (*chain, below.path)
     if len({each.resolve() for each in chain}) < len(chain):
         names = " -> ".join(each.name for each in chain)
         raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
-    below: Layer = files.yaml(path, len(chain) - 1)
     below = _over_its_base(files, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
     own = {key: value for key, value in layer.data.items() if key != "base"}
-    return merge(below, Layer(own, layer.places, above=layer.above))
+    return merge(below, Layer(own, layer.places))
 
 
 def merge(base: Layer, over: Layer) -> Layer:
@@ -373,3 +371,126 @@ def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: 
 
 def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
     return all(over[key] == base.get(key, over[key]) for key in _KIND_KEYS if key in over)
+
+
+# Errors of validation, with file and line.
+
+_TAGGED = ("kind", "distribution", "type")
+"""Keys whose word tells the members of a union apart."""
+_ANY = "*"
+"""Stands for any name or number of an entry in the key path of a model."""
+_T = TypeVar("_T")
+
+
+def validated(layer: Layer, model: type[_T]) -> _T:
+    """Return the data of a layer as a model, or another type that pydantic validates.
+
+    Raises:
+        InputError: they are not valid: the first problem, of the user's own file before its base, with file and line,
+            as one error that counts the others.
+    """
+    try:
+        return TypeAdapter(model).validate_python(layer.data)
+    except ValidationError as error:
+        path, first = _first_problem(error, layer)
+        problem, remedy = _texts(first, path, model)
+        more = f"and {error.error_count() - 1} more" if error.error_count() > 1 else None
+        raise layer.error(problem, path, "; ".join(filter(None, (remedy, more))) or None) from None
+
+
+def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any) -> tuple[KeyPath, str, str | None]:
+    """Return the first problem of data that are in no file: its key path, what is wrong, and what would be right.
+
+    Args:
+        error: what pydantic raised for the data.
+        data: what was validated.
+        model: the model, or other type, that they were to be.
+    """
+    path, first = _first_problem(error, Layer(data, {(): Location(0, 1, Path())}))
+    path = (*path, *first.get("ctx", {}).get("keys", "").split()[:1])
+    return path, *_texts(first, path, model)
+
+
+def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, ErrorDetails]:
+    """Return the problem to be told of, with its key path."""
+
+    def order(found: tuple[KeyPath, ErrorDetails]) -> tuple[int, int, int]:
+        # A misspelt key is also a missing one, and a list with a wrong entry too short: report these last.
+        place = layer.place(found[0])
+        return {"missing": 1, "too_short": 2}.get(found[1]["type"], 0), place.depth, place.line
+
+    return min(((_key_path(each, layer), each) for each in error.errors(include_url=False)), key=order)
+
+
+def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
+    """Yield every model that a type holds, with its key path; members of a union have the same."""
+    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
+        yield path, wanted
+        for name, field in wanted.model_fields.items():
+            yield from models_within(field.annotation, (*path, name))
+        return
+    entry = (_ANY,) if typing.get_origin(wanted) in (dict, tuple) else ()
+    for argument in typing.get_args(wanted):
+        yield from models_within(argument, (*path, *entry))
+
+
+def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
+    """The key path in the file: pydantic's location without what is no key, such as the tags of union members.
+
+    Of keys that do not fit together, and have a place each, it is the one in the user's own file.
+    """
+    path: list[str | int] = []
+    here: Any = layer.data
+    for key in detail["loc"]:
+        if isinstance(here, dict) and key in here:
+            here = here[key]
+        elif isinstance(here, list) and isinstance(key, int):
+            here = here[key] if key < len(here) else None
+        else:
+            is_inside_text = isinstance(here, str) and key != "number"  # of a thruster event, and not a tag
+            if not is_inside_text and not (detail["type"] == "missing" and key == detail["loc"][-1]):
+                continue
+        path.append(key)
+    context = detail.get("ctx", {})
+    given = context.get("keys", context.get("discriminator", "").strip("'")).split()
+    candidates: list[KeyPath] = [(*path, key) for key in given if (*path, key) in layer.places]
+    return min(candidates, key=lambda candidate: layer.place(candidate).depth, default=tuple(path))
+
+
+def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:
+    """Return the problem and the remedy."""
+    value, context = detail["input"], detail.get("ctx", {})
+    match detail["type"]:
+        case "wrong":
+            return context["problem"], context["remedy"]
+        case "missing":
+            return "is missing", "add it"
+        case "extra_forbidden":
+            known = dict.fromkeys(_known_keys(model, path[:-1], detail["loc"]))
+            return f"unknown key {shown(path[-1])}", did_you_mean(path[-1], known)
+        case "literal_error" | "union_tag_invalid":
+            allowed = re.findall(r"'([^']*)'", str(context.get("expected", context.get("expected_tags"))))
+            word = context.get("tag", value)
+            return f"{shown(word)} is not allowed", did_you_mean(word, allowed, "allowed")
+        case "union_tag_not_found":
+            return f"{context['discriminator'].strip(chr(39))} is missing", "add it"
+        case "json_invalid" | "json_type":
+            return f"{shown(value)} is not JSON", "write an object in JSON, as text"
+        case "string_pattern_mismatch":
+            return f"{shown(value)} is not a valid name", "use letters, digits, _ . and -, beginning with a letter"
+    # Pydantic's own sentence, such as "Input should be a valid number", in the words of YAML.
+    sentence = re.sub(
+        r" or (instance of|object to) .*|, unable to .*| after validation|(?<=\ba) valid", "", detail["msg"]
+    )
+    for word, plain in (("a integer", "a whole number"), ("dictionary", "mapping"), ("tuple", "list")):
+        sentence = sentence.replace(word, plain)
+    return f"{shown(value)} {sentence.partition(' ')[2]}", None
+
+
+def _known_keys(model: Any, path: KeyPath, loc: KeyPath) -> Iterator[str]:
+    """The keys that a model has at a key path; of the members of a union, those of the one in pydantic's location."""
+    for place, each in models_within(model):
+        if len(place) == len(path) and all(part in (one, _ANY) for part, one in zip(place, path, strict=True)):
+            tags = (each.model_fields[name].annotation for name in _TAGGED if name in each.model_fields)
+            if all(typing.get_args(tag)[0] in loc for tag in tags):
+                yield from each.model_fields

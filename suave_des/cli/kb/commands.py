@@ -57,8 +57,8 @@ def check(
     """
     from suave_des.errors import Finding, Level, has_level, ordered, summary
     from suave_des.kb.check import check as run_checks
+    from suave_des.resources import shown_name
     from suave_des.scenario.loader import load_scenario
-    from suave_des.scenario.yamlfile import shown_name
     from suave_des.scenario_knowledge import subject_of
 
     loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
