@@ -9,13 +9,9 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Collection, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Collection
 from functools import cache
 from importlib.metadata import entry_points
-from itertools import chain
-from math import inf, isnan
-from numbers import Real
 from pathlib import Path
 from sysconfig import get_path
 from traceback import FrameSummary, extract_tb
@@ -23,21 +19,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
-from suave_des.domain import (
-    BATTERY_LEVEL,
-    GENERATE_RECHARGE_PATH,
-    MANAGER_GROUP,
-    MISSION_FUNCTIONS,
-    SURFACE,
-    WATER_VISIBILITY,
-)
+from suave_des.domain import GENERATE_RECHARGE_PATH, MANAGER_GROUP, MISSION_FUNCTIONS, SURFACE
 from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
-from suave_des.managing.base import Dependencies, ManagingSubsystem, System
+from suave_des.managing.base import ManagingSubsystem
 from suave_des.monitor.diagnostics import Kind
 from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
-    from suave_des.managed.mode_manager import ModeManager
     from suave_des.managed.node import CustomFunction
 
 _Base = TypeVar("_Base")
@@ -55,10 +43,10 @@ _BUILT_IN = {
     "oracle": "suave_des.managing.simple:Oracle",
 }
 _FAMILIES = {
-    "fixed": ("suave_des.managing.simple:fixed_mode", "MODE"),
-    "exec": ("suave_des.interfaces.exec:exec_manager", "COMMAND"),
+    "fixed": ("suave_des.managing.simple", "fixed_mode", "MODE"),
+    "exec": ("suave_des.interfaces.exec", "exec_manager", "COMMAND"),
 }
-"""Managers that are named with an argument after a colon: what makes the class of one, and what the argument is."""
+"""Managers with an argument after a colon: module and function that make the class, and what the argument is."""
 _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
 _HOOKS = {
@@ -121,9 +109,9 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     """
     family, _, argument = name.partition(":")
     if family in _FAMILIES:
+        module, function, wanted = _FAMILIES[family]
         if not argument.strip():
-            raise InputError(f"there is no manager {family!r}", remedy=f"write {family}:{_FAMILIES[family][1]}")
-        module, _, function = _FAMILIES[family][0].partition(":")
+            raise InputError(f"there is no manager {family!r}", remedy=f"write {family}:{wanted}")
         make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
         return make(argument)
     target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
@@ -149,21 +137,20 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
     for name in scenario.needed_functions():
         if name not in built_in and name not in types:
             remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
-            if name == GENERATE_RECHARGE_PATH:
-                remedy = "add battery: {}"
+            remedy = "add battery: {}" if name == GENERATE_RECHARGE_PATH else remedy
             raise loaded.layer.error(f"function {name} has no node", ("mission", "functions"), remedy)
     if not types:
         return {}
     from suave_des.managed.node import CustomFunction  # loads the vehicle
 
+    found = {}
     for name, node in types.items():
-        if ":" not in node and node not in registered:
+        target = node if ":" in node else registered.get(node)
+        if target is None:
             remedy = f"{did_you_mean(node, sorted(registered), 'registered')}; or give module:Class"
             raise InputError(f"function {name}: no package registers {node!r}", remedy=remedy)
-    return {
-        name: _load(f"function {name}, {node!r}", registered.get(node, node), CustomFunction)
-        for name, node in types.items()
-    }
+        found[name] = _load(f"function {name}, {node!r}", target, CustomFunction)
+    return found
 
 
 @cache
@@ -236,7 +223,7 @@ def _check_hooks(what: str, kind: type, root: type) -> None:
         for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
             near = similar(each, forms, cutoff=0.8)
             inherits = any(hasattr(parent, each) for parent in base.__bases__)
-            if near is not None and near not in vars(base) and not inherits and each not in _names_in(base):
+            if near is not None and near not in vars(base) and not inherits and each not in names_in(base):
                 remedy = f"did you mean {forms[near]}? give a method of your own a name that differs more"
                 raise InputError(f"{what}: {each} is not a hook, and nothing calls it", remedy=remedy)
 
@@ -249,74 +236,9 @@ def _form(root: type, hook: str) -> str:
     return f"{'@classmethod ' if is_of_class else ''}def {hook}({arguments})"
 
 
-def _names_in(kind: type) -> set[str]:
+def names_in(kind: type) -> set[str]:
     """Return the attributes and functions that the methods of a class name."""
     return {name for each in vars(kind).values() if inspect.isfunction(each) for name in each.__code__.co_names}
-
-
-# What a manager says of itself, once it was made.
-
-
-def checked_times(manager: ManagingSubsystem) -> tuple[float, float] | None:
-    """Return a manager's period and first time; None if it is not called periodically.
-
-    Raises:
-        ValueError: they are no such times.
-    """
-    period_s, starts_s = manager.period_s, manager.starts_s
-    if period_s is None:
-        return None
-    are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
-    if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
-        problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
-        raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
-    return period_s, starts_s
-
-
-def checked_dependencies(manager: ManagingSubsystem) -> Dependencies | None:
-    """Return what a manager's class itself declares to depend on: one derived from it may depend on more.
-
-    Raises:
-        ValueError: it is no mapping from measured quality attributes to numbers.
-    """
-    declared = manager.depends_on if "depends_on" in vars(type(manager)) else None
-    if declared is None:
-        return None
-    known = _measured_somewhere(manager.system)
-    with suppress(AttributeError, TypeError, ValueError):
-        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
-        if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
-            return found
-    form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}"
-    raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None")
-
-
-def remarks(manager: ManagingSubsystem) -> Iterator[str]:
-    """Yield probable mistakes of a manager's author that are no errors, as a mission has shown them."""
-    author = next(base for base in type(manager).__mro__ if "adapt" in vars(base))
-    is_own = not author.__module__.startswith("suave_des.")
-    if is_own and manager.period_s is None and "adapt" not in _names_in(author):
-        yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
-    known = _measured_somewhere(manager.system)
-    for name in sorted(manager.system.unmeasured.difference(known), key=str):
-        yield f"measured({shown(name)}) is always None: nothing measures it ({did_you_mean(name, known)})"
-
-
-def refusals(modes: ModeManager) -> Iterator[str]:
-    """Yield what was wrong with requests for modes that were refused, and what would be right."""
-    for function, mode in modes.refused:
-        if function not in modes.table and mode in modes.table:
-            yield f"change_mode({shown(function)}, {shown(mode)}) has its arguments swapped (function, then mode)"
-        elif known := modes.available_modes(function):
-            yield f"{function} has no mode {shown(mode)} ({did_you_mean(mode, known)})"
-        else:
-            near = did_you_mean(function, modes.nodes, "functions")
-            yield f"there is no function {shown(function)} ({near}; name its class under functions: in the scenario)"
-
-
-def _measured_somewhere(system: System) -> list[str]:
-    """List what is measured, here or in some shipped scenario: a manager may be written for all of them."""
-    return sorted({*system.measurements, WATER_VISIBILITY, BATTERY_LEVEL})
 
 
 def cause_of(error: BaseException, function: str = "") -> str:

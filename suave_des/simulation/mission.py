@@ -36,7 +36,7 @@ from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measurements, Timing, message_loss
 from suave_des.monitor.monitors import leak_monitor, measure_battery, measure_signals, start_monitors
 from suave_des.monitor.thrusters import Thrusters, draw_schedule, thruster_monitor
-from suave_des.registry import ManagerLike, cause_of, is_built_in, manager_class, name_of, refusals, remarks
+from suave_des.registry import ManagerLike, cause_of, is_built_in, manager_class, name_of
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.host import RAISED, ManagerHost
@@ -451,7 +451,7 @@ class Mission:
             tuple(recorder.knowledge),
             self._draws.drawn,
             further,
-            (*refusals(self.mode_manager), *(() if is_built_in(self._manager_name) else remarks(self.manager))),
+            (*self.mode_manager.refusals(), *(() if is_built_in(self._manager_name) else self._host.remarks())),
         )
 
     def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
