@@ -195,7 +195,7 @@ def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str])
         (manager, name): path
         for loaded in scenarios
         for manager in managers
-        for name, path in loaded.declared_files(manager, manager_class(manager))
+        for name, path in loaded.declared_files(manager, manager_class(manager).input_files)
     }
 
 

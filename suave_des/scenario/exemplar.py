@@ -82,6 +82,8 @@ _TABLE, _REVISIONS_TABLE = (
 )
 KEYS = tuple(Key(**{**row, "default": json.loads(row["default"] or "null")}) for row in _TABLE)
 """The table; the runner gives its parameters to each mission, and draws from its intervals in this order."""
+PATHS = {(key.node, key.name): key.path for key in reversed(KEYS)}
+"""Key path here of each parameter of a node; empty: nothing here corresponds to it."""
 PERTURBED = f"{CAMPAIGN}perturbations."
 DRAWN = tuple(key for key in KEYS if key.path.startswith(PERTURBED))
 """The runner's intervals."""
@@ -126,20 +128,6 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
 def read_by(revision: str) -> tuple[Key, ...]:
     """Return the keys that the code of a revision reads, and that a scenario has."""
     return tuple(key for key in KEYS if key.path and not key.path.startswith(CAMPAIGN) and key.is_read_by(revision))
-
-
-def path_of(node: str, name: str, unknown: str = "") -> str:
-    """Return the key path of a parameter here; empty if it has none."""
-    return next((key.path for key in KEYS if (key.node, key.name) == (node, name)), unknown)
-
-
-def read_instead(node: str, name: str, revision: str) -> tuple[str | None, str | None]:
-    """Return a parameter's key path, None if it is unknown, and what a revision reads that does not read it."""
-    own = [key for key in KEYS if (key.node, key.name) == (node, name)]
-    if not own or not own[0].path or any(key.is_read_by(revision) for key in own):
-        return (own[0].path if own else None), None
-    others = [f"{key.node}.{key.name}" for key in read_by(revision) if key.path == own[0].path]
-    return own[0].path, (*others, "nothing of the kind")[0]
 
 
 def node_of(entry: str, given: Collection[str], name: str) -> str:
@@ -240,7 +228,7 @@ def import_config(
         content |= _campaign(runner, experiments, loaded, managers, runner_seed, notes)
         text = _text(documents, content, ())
     elif runner is not None:
-        listed = ", ".join(name for name in runner.parameters if path_of(RUNNER, name).startswith(CAMPAIGN))
+        listed = ", ".join(name for name in runner.parameters if PATHS.get((RUNNER, name), "").startswith(CAMPAIGN))
         notes.append(f"no counterpart in a scenario; --campaign FILE writes a campaign file: {RUNNER}: {listed}")
     order = list(Scenario.model_fields)
     content = {("base",): (base, why)}
@@ -357,16 +345,17 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
     has_runner = any(each.node == RUNNER for each in parameters)
     # The runner passes what has a default to each mission, with or without a value in its file.
     passed = {key.path for key in read_by(revision) if has_runner and key.node == RUNNER and key.default is not None}
+    read = {(key.node, key.name) for key in KEYS if key.is_read_by(revision)}
     for parameter in sorted(parameters, key=lambda each: each.node != RUNNER):
-        path, read = read_instead(parameter.node, parameter.name, revision)
-        why = None
+        path, why = PATHS.get((parameter.node, parameter.name)), None
         if path is None:
             remedy = did_you_mean(parameter.name, [key.name for key in KEYS if key.node == parameter.node])
             why = f"unknown key ({remedy})"
         elif not path:
             unneeded.append(f"{parameter.keys} ({parameter.source})")
-        elif read is not None:
-            why = f"revision {revision} reads {read}"
+        elif (parameter.node, parameter.name) not in read:
+            instead = (f"{key.node}.{key.name}" for key in read_by(revision) if key.path == path)
+            why = f"revision {revision} reads {next(instead, 'nothing of the kind')}"
         elif path in passed and parameter.node != RUNNER:
             why = f"{RUNNER} gives each mission its own; without one, 0"
         elif not path.startswith(CAMPAIGN) and (other := found.setdefault(path, parameter)).value != parameter.value:
@@ -502,7 +491,7 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
         place = f"{file}: line {parameter.line(index)}, {parameter.keys}[{index}]"
         arguments = dict(re.findall(r"(\w+):=(\S*)", launch))
         for node, names in ((EXPERIMENT, json.loads(parameter.value[index])), (LAUNCH, arguments)):
-            unknown = [" ".join(name.split()) for name in names if path_of(node, name, "?") == "?"]
+            unknown = [" ".join(name.split()) for name in names if (node, name) not in PATHS]
             notes += [f"{place}: not simulated: {name}: {shown(names.get(name))}" for name in unknown]
         manager = arguments.get("adaptation_manager", each.adaptation_manager)
         if manager != each.adaptation_manager:
@@ -606,18 +595,22 @@ def _perturbations(
                 notes.append(f"{runner.parameters[key.name].place}: nothing is drawn from [0, 0]")
             continue
         path = key.path.removeprefix(PERTURBED)
-        paths = [path]
-        if path == "thruster_events":
-            events = loaded.scenario.thruster_events if path in runner.parameters else ()
-            paths = [f"{path}.{index}.time_s" for index in range(len(events))]
-            if not paths:
-                notes.append(f"{runner.parameters[key.name].place}: shifts nothing: {RUNNER} has no {path}")
+        paths = _drawn_paths(path, loaded)
+        if path == "thruster_events" and (not paths or path not in runner.parameters):
+            notes.append(f"{runner.parameters[key.name].place}: shifts nothing: {RUNNER} has no {path}")
+            continue
         for each in paths:
             if (around := at(loaded, each)) is None:
                 notes.append(f"{runner.parameters[key.name].place}: {_NO_COSINE}")
                 continue
             source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {around:g}"
             yield each, number, around, low, high, source
+
+
+def _drawn_paths(path: str, loaded: LoadedScenario) -> list[str]:
+    """Return the key paths of what is drawn from one of the runner's intervals: a value, or all thruster events."""
+    events = loaded.scenario.thruster_events
+    return [f"{path}.{index}.time_s" for index in range(len(events))] if path == "thruster_events" else [path]
 
 
 # YAML with comments that name the source of each value.
@@ -740,11 +733,15 @@ def _runner_of(loaded: LoadedScenario, campaign: Mapping[str, Any], revision: st
     drawn, found = campaign.get("perturbations") or {}, dict[str, Any]()
     for key in DRAWN:
         path = key.path.removeprefix(PERTURBED)
-        events = range(len(loaded.scenario.thruster_events))
-        paths = [f"{path}.{index}.time_s" for index in events] if path == "thruster_events" else [path]
-        intervals = [_interval(drawn.get(each), at(loaded, each)) for each in paths]
-        if intervals and intervals[0] is not None and intervals.count(intervals[0]) == len(intervals):
-            found[key.name] = intervals[0]
+        added = set[tuple[float, ...]]()  # to each value; to all thruster events the same
+        for each in _drawn_paths(path, loaded):
+            value, given = at(loaded, each), drawn.get(each)
+            if isinstance(value, float) and isinstance(given, dict) and given["distribution"] == "uniform":
+                added.add(tuple(round(given[bound] - value, 9) for bound in ("minimum", "maximum")))
+            else:
+                added.add(())  # nothing that the runner can draw
+        if len(added) == 1 and () not in added:
+            found[key.name] = list(*added)
     found["random_interval"] = campaign.get("runs_per_draw", 1)
     if is_since(revision, FIRST_WITH_BRINGUP):
         found["random_seed"] = campaign["seed"]
@@ -755,13 +752,6 @@ def _runner_of(loaded: LoadedScenario, campaign: Mapping[str, Any], revision: st
     files = {"mission_config_pkg": "suave_missions", "mission_config_file": f"config/{MISSION_FILE}"}
     experiments = [_experiment(each, campaign["runs"], loaded, revision) for each in managers]
     return {**found, **files, "experiments": [json.dumps(each) for each in experiments]}
-
-
-def _interval(distribution: Any, at: Any) -> list[float] | None:
-    """What a uniform distribution adds to a value; None if it is no such distribution, or the value is none."""
-    if not isinstance(at, float) or not isinstance(distribution, dict) or distribution["distribution"] != "uniform":
-        return None
-    return [round(distribution[bound] - at, 9) for bound in ("minimum", "maximum")]
 
 
 def _experiment(manager: str, runs: int, loaded: LoadedScenario, revision: str) -> dict[str, Any]:

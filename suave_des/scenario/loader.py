@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 from suave_des.arguments import plain_arguments
 from suave_des.domain import WATER_VISIBILITY
@@ -14,13 +14,6 @@ from suave_des.resources import hashes, shown_name
 from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
 from suave_des.scenario.yamlfile import InputFiles, Layer, Location, find_named, scenario_layer, validated
-
-
-class _DeclaresFiles(Protocol):
-    """A manager's class."""
-
-    def input_files(self, settings: Mapping[str, Any], /) -> Collection[str]:
-        """Name the files that the manager reads, with its settings."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +48,8 @@ class LoadedScenario:
 
     def manager_settings(self, manager: str) -> Mapping[str, Any]:
         """Settings of a manager that is not built in."""
-        settings = (self.scenario.managers.model_extra or {}).get(manager)
-        return settings if isinstance(settings, dict) else {}
+        settings: dict[str, Any] = (self.scenario.managers.model_extra or {}).get(manager, {})
+        return settings
 
     def manager_file(self, manager: str, name: str) -> Path:
         """Where a file is that a manager reads, by its name as given.
@@ -71,20 +64,21 @@ class LoadedScenario:
         places = [Path(name), self.path.parent / name]
         if ("managers", manager) in self.layer.places:
             places.reverse()
-        for place in places:
-            if place.is_file():
-                return place
+        if found := next((place for place in places if place.is_file()), None):
+            return found
         problem = f"manager {manager} reads this file, and it is not there"
         raise InputError(problem, file=name, remedy="give its path from here, or from the scenario that names it")
 
-    def declared_files(self, manager: str, kind: _DeclaresFiles) -> Iterator[tuple[str, Path]]:
-        """Yield name and place of each file that a manager's class declares.
+    def declared_files(
+        self, manager: str, input_files: Callable[[Mapping[str, Any]], Collection[str]]
+    ) -> Iterator[tuple[str, Path]]:
+        """Yield name and place of each file that a manager's class declares by its hook `input_files`.
 
         Raises:
             InputError: a file does not exist, or the class does not declare a list of names.
         """
         try:
-            names = kind.input_files(self.manager_settings(manager))
+            names = input_files(self.manager_settings(manager))
             names = names if isinstance(names, str) else tuple(names)
         except InputError:
             raise
@@ -178,13 +172,11 @@ def load_scenario(
         for index, each in enumerate(knowledge.ontologies)
     )
     remedy = "a file of rules as text, named relative to this"
-    rules = (
-        *(
-            find_named(each, "ontology", layer, ("knowledge", "rules", index), remedy)
-            for index, each in enumerate(knowledge.rules)
-        ),
-        *map(Path, replacements.get("rules", ())),
-    )
+    rules = [
+        find_named(each, "ontology", layer, ("knowledge", "rules", index), remedy)
+        for index, each in enumerate(knowledge.rules)
+    ]
+    rules += map(Path, replacements.get("rules", ()))
     inputs = files.inputs | hashes((*ontologies, *rules))
     tables = {}
     remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
@@ -201,7 +193,7 @@ def load_scenario(
     }
     update = {"knowledge": knowledge.model_copy(update=changed), "modes_file": str(modes_file or scenario.modes_file)}
     scenario = scenario.model_copy(update=update)
-    loaded = LoadedScenario(scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, rules)
+    loaded = LoadedScenario(scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, (*rules,))
     loaded = _set(loaded, replacements.get("values") or {}, "--set")
     if options := replacements.get("manager_options"):
         managers = loaded.scenario.managers.model_dump(mode="json")

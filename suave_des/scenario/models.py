@@ -97,8 +97,7 @@ class Within:
         low, high = self.ge, self.le
         for key, part in _stated(value):
             # A normal distribution that is cut at the floor may have its mean below.
-            reaches_below = self.draws_are_cut and bool(key)
-            least = -high if reaches_below or (self.is_floor and key == "mean") else low
+            least = -high if key and (self.draws_are_cut or (self.is_floor and key == "mean")) else low
             if not least <= part <= high:
                 raise wrong(f"{part:.12g} is out of range", f"must be at least {low:.12g} and at most {high:.12g}", key)
         if isinstance(value, Normal) and value.std > high - low:
@@ -266,31 +265,26 @@ def draw(distribution: AnyDistribution, stream: random.Random) -> float:
 
 def mean(distribution: AnyDistribution) -> float:
     """Mean of a distribution; of a normal one before it is cut."""
-    match distribution:
-        case Normal():
-            return distribution.mean
-        case Uniform():
-            return (distribution.minimum + distribution.maximum) / 2
-        case Exponential():
-            return distribution.minimum + distribution.mean
-        case Choice():
-            return sum(distribution.values) / len(distribution.values)
-        case number:
-            return float(number)
+    if isinstance(distribution, Normal):
+        return distribution.mean
+    if isinstance(distribution, Exponential):
+        return distribution.minimum + distribution.mean
+    stated = [value for _, value in _stated(distribution)]
+    return sum(stated) / len(stated)
 
 
 def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
     """The values that a scenario states for a distribution, with their keys: itself, its mean, bounds, choices."""
     match distribution:
-        case Normal():
-            stated = {"mean": distribution.mean, "minimum": distribution.minimum, "maximum": distribution.maximum}
-            return [(key, value) for key, value in stated.items() if value is not None]
-        case Uniform():
-            return [("minimum", distribution.minimum), ("maximum", distribution.maximum)]
-        case Exponential():
-            return [("minimum", distribution.minimum), ("mean", distribution.minimum + distribution.mean)]
-        case Choice():
-            return [("values", value) for value in distribution.values]
+        case Normal(mean=middle, minimum=low, maximum=high):
+            stated = (("mean", middle), ("minimum", low), ("maximum", high))
+            return [(key, value) for key, value in stated if value is not None]
+        case Uniform(minimum=low, maximum=high):
+            return [("minimum", low), ("maximum", high)]
+        case Exponential(minimum=low, mean=distance):
+            return [("minimum", low), ("mean", low + distance)]
+        case Choice(values=values):
+            return [("values", value) for value in values]
         case number:
             return [("", float(number))]
 

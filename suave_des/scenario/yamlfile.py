@@ -386,8 +386,7 @@ def validated(layer: Layer, model: type[_T]) -> _T:
     """Return the data of a layer as a model, or another type that pydantic validates.
 
     Raises:
-        InputError: they are not valid: the first problem, of the user's own file before its base, with file and line,
-            as one error that counts the others.
+        InputError: they are not valid: the first problem, with file and line, and how many more there are.
     """
     try:
         return TypeAdapter(model).validate_python(layer.data)
@@ -412,14 +411,10 @@ def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any)
 
 
 def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, ErrorDetails]:
-    """Return the problem to be told of, with its key path."""
-
-    def order(found: tuple[KeyPath, ErrorDetails]) -> tuple[int, int, int]:
-        # A misspelt key is also a missing one, and a list with a wrong entry too short: report these last.
-        place = layer.place(found[0])
-        return {"missing": 1, "too_short": 2}.get(found[1]["type"], 0), place.depth, place.line
-
-    return min(((_key_path(each, layer), each) for each in error.errors(include_url=False)), key=order)
+    """Return the problem to be told of, with its key path: the first in the user's own file, or else in its base."""
+    found = ((_key_path(each, layer), each) for each in error.errors(include_url=False))
+    late = {"missing": 1, "too_short": 2}  # a misspelt key is also a missing one, a list with a wrong entry too short
+    return min(found, key=lambda each: (late.get(each[1]["type"], 0), *layer.place(each[0])[:2]))
 
 
 def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:

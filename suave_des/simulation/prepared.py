@@ -78,7 +78,7 @@ class PreparedScenario:
             InputError: a file is not there; or the training result cannot be read, or has something else in it.
         """
         if manager not in self._manager_inputs:
-            declared = dict(self.loaded.declared_files(manager, manager_class(manager)))
+            declared = dict(self.loaded.declared_files(manager, manager_class(manager).input_files))
             name = None if self.training is not None else self.loaded.manager_settings(manager).get("learned")
             path = None if name is None else self.loaded.manager_file(manager, str(name))
             self._manager_inputs[manager] = declared, {} if path is None else read_learned(path)
