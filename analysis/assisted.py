@@ -22,7 +22,9 @@ import studies
 from numpy.typing import NDArray
 
 from suave_des import load_scenario, run_campaign
+from suave_des.records.missions import missions_in
 from suave_des.results.assisted import assisted_mean, compare_assisted
+from suave_des.results.groups import grouped
 from suave_des.results.statistics import mean_interval
 
 SCENARIO = "planta_exp1"
@@ -135,12 +137,14 @@ def gains(same: pandas.DataFrame, population: pandas.DataFrame) -> pandas.DataFr
         and half-widths, and equal_runs.
     """
     real = pandas.read_csv(REAL).drop(columns="run")
+    simulated = missions_in(same), missions_in(population)
     real["place"] = real.groupby(["manager", "condition"]).cumcount()
     rows = []
     for runs_each in (1, 2, 5):
         for first in range(0, 6 - runs_each, runs_each):
             part = real[real["place"].between(first, first + runs_each - 1)].drop(columns="place")
-            found = compare_assisted(part, same, population, metrics=METRICS).estimates
+            groups = grouped(missions_in(part), metrics=METRICS, simulated=simulated)
+            found = compare_assisted(groups).estimates
             found["alone_half"] = (found["alone_ci95_high"] - found["alone_ci95_low"]) / 2.0
             found["assisted_half"] = (found["assisted_ci95_high"] - found["assisted_ci95_low"]) / 2.0
             rows.append(found[found["other"] == ""])

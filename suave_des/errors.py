@@ -135,6 +135,11 @@ def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str
     return f"did you mean {near!r}? {listing}" if near else listing
 
 
+def unknown(problem: str, word: object, known: Iterable[str], what: str = "known", place: str = "") -> InputError:
+    """Make the error for a misspelt word; its remedy is that of did_you_mean."""
+    return InputError(problem, place=place or None, remedy=did_you_mean(word, known, what))
+
+
 # What checks of rules, ontologies and scenarios find.
 
 

@@ -209,7 +209,7 @@ def reproduce(
     """
     from suave_des.campaign.campaign import run_campaign
     from suave_des.records.metrics import PAPER_METRICS
-    from suave_des.results.missions import PAPER_ORDER
+    from suave_des.records.missions import PAPER_ORDER
     from suave_des.results.paper import FILE, compare_with_paper
 
     settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}

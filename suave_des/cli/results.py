@@ -9,7 +9,7 @@ import typer
 
 from suave_des.campaign import progress
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.console import TEXT_WIDTH, output, print_table
+from suave_des.cli.console import check_written, emit, output, print_table
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -95,49 +95,28 @@ def compare(
     Runs that share their random numbers are compared in pairs, which takes fewer missions. A few real missions can be
     assisted by simulated ones.
     """
-    from suave_des.results.compare import compare_folders
-    from suave_des.results.comparison import ENDINGS
+    from suave_des.records.missions import read_missions
+    from suave_des.results.assisted import compare_assisted
+    from suave_des.results.compare import compare_groups
+    from suave_des.results.groups import grouped
 
-    if out is not None:
-        if out.suffix.lower() not in ENDINGS:
-            problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
-            raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
-        check_output_file(out, overwrite=True)
-    names, columns = comma_separated(managers), comma_separated(metrics)
+    check_written(out)
+    names, columns, points = map(comma_separated, (managers, metrics, by))
     if (assisted_by is None) != (population is None):
         remedy = "give both: suave-des campaign makes them"
         raise InputError("--assisted-by and --population are needed together", remedy=remedy)
-    comparison: Written
-    if assisted_by is not None and population is not None:
-        from suave_des.results.assisted import compare_assisted
-
+    if assisted_by is not None:
         unused = {"--by": by, "--against": against, "--half-width": half_width, "--unpaired": unpaired}
         check_no_use(unused, "with --assisted-by")
-        comparison = compare_assisted(results, assisted_by, population, managers=names, metrics=columns)
+    missions = read_missions(results)
+    simulated = [read_missions([folder]) for folder in (assisted_by, population) if folder is not None]
+    groups = grouped(missions, names, columns, points, simulated=simulated)
+    comparison: Written
+    if simulated:
+        comparison = compare_assisted(groups)
     else:
-        comparison = compare_folders(
-            results,
-            managers=names,
-            metrics=columns,
-            by=comma_separated(by),
-            against=against,
-            half_widths=half_width or (),
-            unpaired=unpaired,
-        )
+        comparison = compare_groups(groups, against=against, half_widths=half_width or (), unpaired=unpaired)
     emit(comparison, as_format, out)
-
-
-def emit(result: Written, as_format: CompareFormat, out: Path | None) -> None:
-    """Print a result, or write it into a file, whose ending says how."""
-    from suave_des.results.comparison import ENDINGS
-
-    if out is not None:
-        write_files(out.parent, {out.name: getattr(result, ENDINGS[out.suffix.lower()])()})
-        print(f"compared in {out}")
-    elif as_format == "table":
-        print(result.text(min(output().width, TEXT_WIDTH)), end="")
-    else:
-        print(getattr(result, as_format)(), end="")
 
 
 # Validation

@@ -24,10 +24,11 @@ from suave_des.errors import InputError, SuaveDesError
 from suave_des.metrics.result import MissionResult
 from suave_des.pages.page import compressed, page
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
+from suave_des.records.missions import Missions, read_missions
 from suave_des.records.store import read_manifest
 from suave_des.results.compare import compare
 from suave_des.results.comparison import capital
-from suave_des.results.missions import Missions, grouped, read_missions
+from suave_des.results.groups import grouped
 from suave_des.results.style import looks
 
 LIMIT_BYTES: Final = 5_000_000
@@ -131,7 +132,7 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
         value; swept: names of parameters; every: 1, or n if only each nth run is there; missions: how many there are;
         is_paired: whether runs of the same seed and number share their random numbers.
     """
-    groups, _ = grouped(missions)
+    groups = grouped(missions).groups
     frame = missions.frame
     numbers = frame.groupby(["manager", "source"], sort=False).ngroup()  # as grouped() orders them
     every = max(1, math.ceil(len(frame) / MOST_DRAWN))

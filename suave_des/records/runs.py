@@ -37,6 +37,11 @@ SIZE_LIMIT_BYTES = 500_000_000
 _GREATEST = 1e12
 """Of numbers, as in scenarios."""
 
+REMEDY = "one line for each mission, cells separated by commas"
+"""For a file of results that is no CSV."""
+
+Content = tuple[list[str], Iterator[tuple[int, list[str]]], str]
+"""Of a CSV file: its header, its rows, each with its line, and its SHA-256."""
 _Mission = Mapping[str, Any]
 """A row of runs.csv by column, and with it time_limit_s, stamp, month, position, and the exemplar's name."""
 
@@ -148,9 +153,12 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
         InputError: with file and line: the file cannot be read, has other columns, no mission, or an impossible value.
     """
     path = Path(path)
-    remedy = "one line for each mission, cells separated by commas"
-    cells, numbered, digest = read_csv(path, SIZE_LIMIT_BYTES, remedy)
-    header = [name.strip() for name in cells]
+    return runs_in(path, read_csv(path, SIZE_LIMIT_BYTES, REMEDY), needed)
+
+
+def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
+    """Take the missions from the content of a file; see read_runs."""
+    header, numbered, digest = content
     for column in filter(None, header):
         if header.count(column) > 1:
             raise line_error(path, 1, f"has column {shown(column)} twice", "name each column once")
@@ -170,19 +178,14 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
             rows.append(row)
             lines.append(line)
     if not rows:
-        raise line_error(path, 1, "has no missions under its header", remedy)
+        raise line_error(path, 1, "has no missions under its header", REMEDY)
     text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str).apply(lambda column: column.str.strip())
     return Runs(path, _Cells(path, text, layout).missions(), digest, tuple(averages))
 
 
-def is_foreign(path: Path) -> bool:
-    """Return whether a file has none of the columns that name a manager.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    header, _, _ = read_csv(path, SIZE_LIMIT_BYTES, "separate cells by commas")
-    return not {layout["manager"] for layout in _LAYOUTS} & set(header)
+def is_foreign(content: Content) -> bool:
+    """Return whether a file has none of the columns that name a manager."""
+    return not {layout["manager"] for layout in _LAYOUTS} & set(content[0])
 
 
 def _first_word(cells: Sequence[str]) -> str:

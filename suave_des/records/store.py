@@ -438,10 +438,11 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read, or is of another campaign than the missions that are kept beside it.
     """
+    kept = stored_identity(folder)
     path = folder / MANIFEST_FILE
     found = read_json(path) if path.exists() else None
     manifest = found if isinstance(found, dict) else {}
-    written, kept = manifest.get("campaign_sha256"), stored_identity(folder)
+    written = manifest.get("campaign_sha256")
     if written is not None and kept is not None and written != kept:
         remedy = f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
         raise InputError(f"{RUNS_FILE} and {STORE_FILE} are of different campaigns", file=folder, remedy=remedy)

@@ -8,27 +8,25 @@ with conditions as clusters. It holds for a wrong simulation, too, whose error i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas
 
-from suave_des.errors import InputError, did_you_mean, number_of
+from suave_des.errors import InputError, number_of
 from suave_des.estimates import STUDENT, Estimate, t_quantile
-from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
-from suave_des.results import missions, statistics
+from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
+from suave_des.records.missions import Missions
+from suave_des.results import statistics
 from suave_des.results.comparison import Row, Section, Written, capital, difference_claim, estimate_in, rows_of
-from suave_des.results.missions import Missions
+from suave_des.results.groups import Groups, first_alike, runs_sharing_draw
 from suave_des.results.real import CONDITION, matched
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
 
-Source = pandas.DataFrame | str | Path | Sequence[Path]
-"""Missions: a data frame with the columns of runs.csv, or folders and files as of compare_folders."""
 LEAST_CONDITIONS = 3
 LEAST_TO_WEIGH = 10
 """Conditions from which on the weight is estimated: with fewer, its own error costs more than it gains."""
@@ -140,83 +138,35 @@ def _name(row: Row) -> str:
 # What is compared
 
 
-def _read(source: Source) -> Missions:
-    if isinstance(source, pandas.DataFrame):
-        return missions.missions_of(source)
-    return missions.read_missions([Path(source)] if isinstance(source, str | Path) else list(source))
-
-
-def compare_assisted(
-    real: Source,
-    same: Source,
-    population: Source,
-    *,
-    managers: Sequence[str] = (),
-    metrics: Sequence[str] = (),
-) -> AssistedComparison:
+def compare_assisted(real: Groups) -> AssistedComparison:
     """Estimate each manager's means, and the differences between managers, from real missions and simulated ones.
 
     A mission that never found the pipeline counts with the time limit as its search time.
 
     Args:
-        real: real missions in a few conditions, which are those of `same`: by columns named like what it sweeps, by a
-            column `condition` with numbers from 1, or by order.
-        same: a campaign that sweeps the conditions of the real missions.
-        population: a campaign under many conditions, drawn as those of the real missions were.
-        managers: names; empty: all that have real missions.
-        metrics: columns of runs.csv; empty: search time and distance inspected.
+        real: real missions in a few conditions, with the simulated ones that assist them. The first of these, of a
+            campaign that sweeps conditions, are under the same: by columns named like what it sweeps, by a column
+            `condition` with numbers from 1, or by order. The others are under many, drawn as the real ones were.
 
     Raises:
-        InputError: results cannot be read, do not belong together, or are too few.
+        InputError: the missions are not of the same conditions, or too few.
     """
-    ours, theirs, many = _read(real), _read(same), _read(population)
-    groups, notes = missions.grouped(replace(ours, frame=ours.frame.assign(source="")), managers, averages=False)
-    chosen = missions.chosen_metrics(metrics or PAPER_METRICS, groups)
-    names = [group.name for group in groups]
-    frames = [pandas.concat([group.frame for group in groups]), theirs.frame, many.frame]
-    horizon_s = _check(dict(zip(("real missions", "assisted by", "population"), frames, strict=True)), names, chosen)
+    same, population = real.simulated
+    names = [group.name for group in real.groups]
+    ours = pandas.concat([group.frame for group in real.groups], ignore_index=True)
     in_real, in_same, drawn = (
-        each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=horizon_s)})
-        for each in (*matched(frames[0], theirs.frame, theirs.swept), _with_draws(many))
+        each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=real.time_limit_s)})
+        for each in (*matched(ours, same.frame, same.swept), _with_draws(population))
     )
     rows = []
-    for metric in chosen:
+    for metric in real.metrics:
         sides = [_means(frame, CONDITION, metric.name, name) for frame, name in ((in_real, "real"), (in_same, "same"))]
         conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
         draws, shared = _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
             rows.append(_estimate(both, metric, conditions, draws, shared))
-    notes = [*ours.notes, *theirs.notes, *many.notes, *notes]
-    notes += missions.caveats(groups, chosen)
-    return AssistedComparison(pandas.DataFrame(rows), tuple(notes), chosen)
-
-
-def _check(frames: Mapping[str, pandas.DataFrame], names: Sequence[str], metrics: Sequence[Metric]) -> float:
-    """Check that missions belong together, and return the time limit of all; infinite if none is known.
-
-    Raises:
-        InputError: they lack a manager or a metric, have a number that is none, or differ in their time limits.
-    """
-    limits_s: list[float] = []
-    for place, frame in frames.items():
-        for name in names:
-            if name not in set(frame["manager"]):
-                remedy = did_you_mean(name, dict.fromkeys(frame["manager"]), "there are")
-                raise InputError(f"there is no mission of {name}", place=place, remedy=remedy)
-        for metric in metrics:
-            values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
-            may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
-            if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
-                problem = f"{metric.name} has a value that is no number, or no value at all"
-                raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
-        # Real missions may not say how long they lasted, and simulated ones may all have found the pipeline.
-        ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
-        limit_s = float(ends_s.max())
-        if abs(limit_s - min(limits_s, default=limit_s)) > missions.SAME_LIMIT_S:
-            problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
-            raise InputError(problem, place=place, remedy="give missions with one time limit")
-        limits_s += [] if math.isnan(limit_s) else [limit_s]
-    return math.floor(min(limits_s)) if limits_s else math.inf
+    notes = (*real.missions.notes, *same.notes, *population.notes, *real.notes)
+    return AssistedComparison(pandas.DataFrame(rows), notes, real.metrics)
 
 
 def _with_draws(population: Missions) -> pandas.DataFrame:
@@ -229,7 +179,7 @@ def _with_draws(population: Missions) -> pandas.DataFrame:
         problem = f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
         raise InputError(problem, place="population", remedy="draw the conditions, as perturbations")
     frame = population.frame
-    drawn = frame.assign(draw=missions.first_alike(frame, missions.runs_sharing_draw(frame)))
+    drawn = frame.assign(draw=first_alike(frame, runs_sharing_draw(frame)))
     return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 

@@ -1,4 +1,4 @@
-"""Compare managers: group missions, estimate each metric of each group and their differences, and conclude.
+"""Compare managers: estimate each metric of each group of missions and their differences, and conclude.
 
 Groups are compared run by run where runs share their random numbers, and else as independent samples.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
@@ -16,54 +16,21 @@ import numpy as np
 import pandas
 
 from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.estimates import Estimate, interval_names, share_of
+from suave_des.errors import InputError, shown, unknown
+from suave_des.estimates import share_of
+from suave_des.files import as_number
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
+from suave_des.records.missions import SHARING, Missions, Source, missions_in
 from suave_des.results import statistics
-from suave_des.results.comparison import Comparison, Row, conclusion, overall_conclusion
-from suave_des.results.missions import (
-    SHARING,
-    Group,
-    Missions,
-    caveats,
-    chosen_metrics,
-    counted,
-    grouped,
-    least_and_greatest,
-    listed,
-    missions_of,
-    mostly_lost,
-    read_half_widths,
-    read_missions,
-    time_limit_s,
-)
+from suave_des.results.comparison import Comparison, concluded
+from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from suave_des.results.assisted import AssistedComparison, Source
-
-
-_WORSE = 0.9
-"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
-
-
-def _ends(name: str) -> tuple[str, ...]:
-    return name, *interval_names(name)
-
-
-_SUMMARY = (
-    *("group", "metric", "n", "missing", *_ends("mean"), "mean_interval", "std", "median", "q1", "q3", "horizon_s"),
-    *(*_ends("restricted_mean_s"), "restricted_mean_s_interval", *_ends("censored_median_s")),
-)
-_DIFFERENCE = (
-    *("group", "other", "metric", "paired", "why", "n", "n_other", *_ends("difference"), "difference_interval"),
-    *("test", "p", "p_holm", "p_less", "p_greater", "effect_name", *_ends("effect"), "variance_ratio", "half_width"),
-    *("runs_needed_paired", "runs_needed_unpaired", "conclusion"),
-)
-"""Columns of the frames, in order."""
+    from suave_des.results.assisted import AssistedComparison
 
 
 class Choices(TypedDict, total=False):
@@ -98,12 +65,12 @@ def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> 
     Raises:
         InputError: results cannot be read, a name is not in them, or an extra is not installed.
     """
-    return compare(read_missions([Path(each) for each in paths]), **choices)
+    return compare(missions_in(paths), **choices)
 
 
 def compare_frame(frame: pandas.DataFrame, **choices: Unpack[Choices]) -> Comparison:
     """Compare the missions of a data frame with the columns of runs.csv; see compare_folders."""
-    return compare(missions_of(frame), **choices)
+    return compare(missions_in(frame), **choices)
 
 
 class CampaignFrame(pandas.DataFrame):
@@ -149,7 +116,7 @@ class CampaignFrame(pandas.DataFrame):
         """Estimate what real missions show, assisted by these, which are of the same conditions.
 
         Args:
-            real: real missions, as compare_assisted takes them; likewise population.
+            real: real missions in a few conditions, as a data frame or as folders and files; likewise population.
             population: a campaign under many conditions.
             managers: names; empty: all that have real missions.
             metrics: columns of runs.csv; empty: the usual ones.
@@ -159,7 +126,8 @@ class CampaignFrame(pandas.DataFrame):
         """
         from suave_des.results.assisted import compare_assisted
 
-        return compare_assisted(real, self, population, managers=managers, metrics=metrics)
+        simulated = missions_in(self), missions_in(population)
+        return compare_assisted(grouped(missions_in(real), managers, metrics, simulated=simulated))
 
     @plain_arguments
     def figure(self, kind: str = "auto") -> Figure:
@@ -176,92 +144,49 @@ class CampaignFrame(pandas.DataFrame):
         return draw_frame(self, kind)
 
 
-def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
-    """Compare missions; see compare_folders."""
+def compare(
+    missions: Missions,
+    managers: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+    by: Sequence[str] = (),
+    **how: Any,
+) -> Comparison:
+    """Group missions, and compare the groups; see compare_folders."""
+    return compare_groups(grouped(missions, managers, metrics, by), **how)
+
+
+def compare_groups(
+    groups: Groups, *, against: str | None = None, half_widths: Sequence[str] = (), unpaired: bool = False
+) -> Comparison:
+    """Compare groups of missions; see compare_folders."""
     for module in ("statsmodels", "lifelines"):
         statistics.library(module)
-    groups, notes = grouped(missions, choices.get("managers", ()), choices.get("by", ()))
-    metrics = chosen_metrics(choices.get("metrics", ()), groups)
-    half_widths = read_half_widths(choices.get("half_widths", ()), metrics)
-    pairs = _pairs(groups, choices.get("against"))
-    unpaired, horizon_s = choices.get("unpaired", False), time_limit_s(groups)
-    summaries = [_summary(group, metric, horizon_s) for metric in metrics for group in groups]
+    widths, pairs = _half_widths(half_widths, groups.metrics), _pairs(groups.groups, against)
     found = [
-        _difference(*pair, metric, half_widths.get(metric.name), unpaired=unpaired)
-        for metric in metrics
+        _difference(*pair, metric, widths.get(metric.name), unpaired=unpaired)
+        for metric in groups.metrics
         for pair in pairs
     ]
     tested = [row for row in found if row["test"]]
     for row, p in zip(tested, statistics.holm([row["p"] for row in tested]), strict=True):
         row["p_holm"] = p
-    by_name = {metric.name: metric for metric in metrics}
-    for row in found:
-        row["conclusion"] = conclusion(row, by_name[row["metric"]])
-    means = {row["group"]: row["mean"] for row in summaries if row["metric"] == metrics[0].name and row["n"]}
-    differences = pandas.DataFrame(found, columns=_DIFFERENCE)
-    counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
-    return Comparison(
-        " ".join(_conclusions(groups, metrics[0], found, means)),
-        pandas.DataFrame(summaries, columns=_SUMMARY).astype({"horizon_s": "Int64"}),
-        differences.astype(counts),
-        (*missions.notes, *notes, *caveats(groups, metrics), *_worse_paired(found)),
-        metrics,
-        counted(groups),
-        *_largest(() if unpaired else pairs, metrics[0], missions.folders),
-    )
+    largest = _largest(() if unpaired else pairs, groups.metrics[0], groups.missions.folders)
+    summaries = [_summary(group, metric, groups.time_limit_s) for metric in groups.metrics for group in groups.groups]
+    return concluded(groups, summaries, found, *largest)
 
 
-def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]) -> tuple[Table, str]:
-    """Return the least and the greatest difference of each pair, and the command that replays the largest of all."""
-    rows, found = [], []
-    for first, second in pairs:
-        x, y = first.by_run(metric.name), second.by_run(metric.name)
-        if x is None or y is None or not (first.is_of_missions and second.is_of_missions):
-            continue
-        apart = (x - y).dropna()
-        if apart.any():
-            ends = least_and_greatest(apart)
-            cells = (text for value, run in ends for text in (metric.number(value), str(run)))
-            rows.append((f"{first.name} - {second.name}", *cells))
-            firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
-            managers, sources = (firsts[name].astype(str).unique() for name in ("manager", "source"))
-            if not first.point and 1 in (len(managers), len(sources)) and folders.keys() >= set(sources):
-                size, run = max((abs(value), run) for value, run in ends)
-                places = (str(folders[source]) for source in sources)
-                chosen = "--run", str(run), "--managers", ",".join(managers)
-                found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
-    title = f"runs that differ most: {metric.heading}"
-    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(found, default=(0.0, ""))[1]
-
-
-def _conclusions(
-    groups: Sequence[Group], metric: Metric, differences: Sequence[Row], means: Mapping[str, float]
-) -> Iterator[str]:
-    """Yield the conclusion; of points of a sweep at which managers are compared, one for those that have the same."""
-    points = dict.fromkeys(group.point for group in groups)
-    if len(points) == 1 or len(points) == len(groups):
-        points = {"": None}
-    points_of: dict[str, list[str]] = {}
-    for point in points:
-        own = [group for group in groups if not point or group.point == point]
-        names = [group.name for group in own]
-        text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
-        if metric.name == SEARCH_TIME:
-            text = mostly_lost(own) + text
-        points_of.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
-    for text, where in points_of.items():
-        yield f"{'; '.join(where)}: {text}" if where[0] else text
-
-
-def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
-    """Yield a note on pairs whose differences vary more than those of independent runs would."""
-    worse = [
-        f"{each['group']} - {each['other']} in {each['metric']}, {1.0 / each['variance_ratio']:.1f} times"
-        for each in differences
-        if each["variance_ratio"] is not None and each["variance_ratio"] < _WORSE
-    ]
-    if worse:
-        yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
+def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, float]:
+    """Read METRIC:HALF_WIDTH, for instance search_time_s:2, by the metric."""
+    names = [metric.name for metric in metrics]
+    found = {}
+    for text in texts:
+        name, _, number = (part.strip() for part in text.partition(":"))
+        if name not in names or not 0.0 < as_number(number) < math.inf:
+            remedy = f"give METRIC:HALF_WIDTH, such as {names[0]}:2; metrics are {', '.join(names)}"
+            problem = f"{shown(text)} is no half-width above 0 of what is compared"
+            raise InputError(problem, place="half-width", remedy=remedy)
+        found[name] = as_number(number)
+    return found
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:
@@ -279,34 +204,28 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
     at_points = [(group, by_name.get(f"{against}{group.point}")) for group in groups]
     if not any(chosen for _, chosen in at_points):
         known = {group.name.removesuffix(group.point): group for group in groups}
-        raise InputError(
-            f"nothing is called {shown(against)}", place="against", remedy=did_you_mean(against, known, "there are")
-        )
+        raise unknown(f"nothing is called {shown(against)}", against, known, "there are", "against")
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
-
-
-def _with_method(name: str, found: Estimate) -> dict[str, Any]:
-    return found.columns(name) | {f"{name}_interval": found.method if found.has_interval else None}
 
 
 def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
     """Estimate one metric of one group; the restricted mean of search times reaches to horizon_s."""
-    sample = group.known_values(metric.name)
-    row = dict.fromkeys(_SUMMARY) | {"group": group.name, "metric": metric.name}
+    known = group.frame[group.frame[metric.name].notna()]
+    sample = known[metric.name].to_numpy(float)
+    row: dict[str, Any] = {"group": group.name, "metric": metric.name}
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample):
         return row
     is_share = metric.name == FOUND and group.is_of_missions
     mean = share_of(int(sample.sum()), len(sample)) if is_share else statistics.mean_interval(sample)
-    row |= _with_method("mean", mean.cut(0.0, 1.0) if metric.name == FOUND else mean)
+    row["mean"] = mean.cut(0.0, 1.0) if metric.name == FOUND else mean
     row |= zip(("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True)
     row["std"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
     if metric.name == SEARCH_TIME and group.is_of_missions:
-        was_found = group.values(FOUND)[~np.isnan(group.values(metric.name))]
+        was_found = known[FOUND].to_numpy(float)
         if not np.isnan(was_found).any():
             restricted, half = statistics.search_times(sample, was_found > 0.0, horizon_s)
-            row |= {"horizon_s": horizon_s, **half.columns("censored_median_s")}
-            row |= _with_method("restricted_mean_s", restricted)
+            row |= {"horizon_s": horizon_s, "restricted_mean_s": restricted, "censored_median_s": half}
     return row
 
 
@@ -323,8 +242,8 @@ def _difference(
         unpaired: whether runs are taken as independent though they share their random numbers.
     """
     is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
-    row = dict.fromkeys(_DIFFERENCE) | {"group": first.name, "other": second.name, "metric": metric.name}
-    row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y)}
+    row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
+    row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row
     is_share = metric.name == FOUND and first.is_of_missions and second.is_of_missions
@@ -338,8 +257,7 @@ def _difference(
         difference, test = statistics.share_difference(*counts), statistics.shares_test(*counts)
     else:
         difference, test = statistics.difference_interval(x, y), statistics.rank_sum_test(x, y)
-    row |= _with_method("difference", difference.cut(-1.0, 1.0) if metric.name == FOUND else difference)
-    row |= test
+    row |= test | {"difference": difference.cut(-1.0, 1.0) if metric.name == FOUND else difference}
     half_width = half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
     return row | _runs_needed(x, y, half_width, is_paired=is_paired)
 
@@ -357,11 +275,11 @@ def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) ->
 
 def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tuple[bool, str, Sample, Sample]:
     """Return whether two groups are paired, why, and their values, those of the same runs in the same order if so."""
-    x, y = first.by_run(metric), second.by_run(metric)
-    apart = first.known_values(metric), second.known_values(metric)
+    x, y = first.frame[metric], second.frame[metric]
+    apart = x.dropna().to_numpy(float), y.dropna().to_numpy(float)
     if unpaired:
         return False, "not paired: as asked", *apart
-    if x is None or y is None:
+    if not (first.has_runs and second.has_runs):
         return False, "not paired: real missions, or missions without seed, share no random numbers", *apart
     common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
     both = common.dropna()
@@ -372,3 +290,25 @@ def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tup
     rest = f"; {left} of one without a counterpart are left out" if left and len(both) else ""
     why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
     return True, why, both["x"].to_numpy(), both["y"].to_numpy()
+
+
+def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]) -> tuple[Table, str]:
+    """Return the least and the greatest difference of each pair, and the command that replays the largest of all."""
+    rows, found = [], []
+    for first, second in pairs:
+        if not all(each.has_runs and each.is_of_missions for each in (first, second)):
+            continue
+        apart = (first.frame[metric.name] - second.frame[metric.name]).dropna()
+        if apart.any():
+            ends = least_and_greatest(apart)
+            cells = (text for value, run in ends for text in (metric.number(value), str(run)))
+            rows.append((f"{first.name} - {second.name}", *cells))
+            firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
+            managers, sources = (firsts[name].astype(str).unique() for name in ("manager", "source"))
+            if not first.point and 1 in (len(managers), len(sources)) and folders.keys() >= set(sources):
+                size, run = max((abs(value), run) for value, run in ends)
+                places = (str(folders[source]) for source in sources)
+                chosen = "--run", str(run), "--managers", ",".join(managers)
+                found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
+    title = f"runs that differ most: {metric.heading}"
+    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(found, default=(0.0, ""))[1]

@@ -14,8 +14,8 @@ import pandas
 
 from suave_des.errors import number_of
 from suave_des.estimates import Estimate, interval_names
-from suave_des.records.metrics import FOUND, PAPER_METRICS, Metric
-from suave_des.results.missions import listed
+from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
+from suave_des.results.groups import Groups, listed
 from suave_des.results.statistics import A12, FISHER, MANN_WHITNEY, MCNEMAR, RANK_BISERIAL, SIGNIFICANCE, WILCOXON
 from suave_des.tables import Table, markdown_text
 
@@ -31,9 +31,25 @@ _EFFECTS = {
 _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
 _MOST_SENTENCES = 3
 """Of a metric of which neither more nor less is better, in the conclusion from all differences."""
+_WORSE = 0.9
+"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
 _OPEN = "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
-ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
-"""Methods that write a comparison, by the ending of a file's name."""
+
+
+def _ends(name: str) -> tuple[str, ...]:
+    return name, *interval_names(name)
+
+
+_SUMMARY = (
+    *("group", "metric", "n", "missing", *_ends("mean"), "mean_interval", "std", "median", "q1", "q3", "horizon_s"),
+    *(*_ends("restricted_mean_s"), "restricted_mean_s_interval", *_ends("censored_median_s")),
+)
+_DIFFERENCE = (
+    *("group", "other", "metric", "paired", "why", "n", "n_other", *_ends("difference"), "difference_interval"),
+    *("test", "p", "p_holm", "p_less", "p_greater", "effect_name", *_ends("effect"), "variance_ratio", "half_width"),
+    *("runs_needed_paired", "runs_needed_unpaired", "conclusion"),
+)
+"""Columns of the frames, in order."""
 
 
 def rows_of(frame: pandas.DataFrame) -> list[dict[str, Any]]:
@@ -74,6 +90,13 @@ class Written(ABC):
     @abstractmethod
     def frames(self) -> dict[str, pandas.DataFrame]:
         """Return the statistics by what JSON calls them."""
+
+    def written(self, form: str, width: int = 95) -> str:
+        """Write the result as "table", which is text of that width, "csv", "json", "markdown" or "latex"."""
+        if form == "table":
+            return self.text(width)
+        writers = {"csv": self.csv, "json": self.json, "markdown": self.markdown, "latex": self.latex}
+        return writers[form]()
 
     def text(self, width: int = 95) -> str:
         """Write the conclusions, the tables, and the remarks, for a terminal of that width."""
@@ -328,6 +351,77 @@ def _p(p: float) -> str:
 # Conclusions
 
 
+def concluded(
+    groups: Groups, summaries: Sequence[Row], differences: Sequence[dict[str, Any]], largest: Table, replay: str
+) -> Comparison:
+    """Write what follows from the estimates of groups and their differences.
+
+    Args:
+        groups: that are compared.
+        summaries: a row for each metric and group, by the columns of Comparison.summaries, but with whole estimates.
+        differences: a row for each metric and pair, likewise.
+        largest: of each pair, the runs that differ most.
+        replay: the command that replays both missions of the largest difference.
+    """
+    by_name = {metric.name: metric for metric in groups.metrics}
+    for row in differences:
+        row["conclusion"] = conclusion(row, by_name[row["metric"]])
+    counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
+    return Comparison(
+        " ".join(_conclusions(groups, summaries, differences)),
+        _frame(summaries, _SUMMARY).astype({"horizon_s": "Int64"}),
+        _frame(differences, _DIFFERENCE).astype(counts),
+        (*groups.missions.notes, *groups.notes, *_worse_paired(differences)),
+        groups.metrics,
+        groups.counted,
+        largest,
+        replay,
+    )
+
+
+def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
+    """Make a frame of rows, of each estimate its value, the ends of its interval, and how that is found."""
+    plain = []
+    for row in rows:
+        cells = dict.fromkeys(columns) | dict(row)
+        for name, found in row.items():
+            if isinstance(found, Estimate):
+                cells |= found.columns(name) | {f"{name}_interval": found.method if found.has_interval else None}
+        plain.append(cells)
+    return pandas.DataFrame(plain, columns=columns)
+
+
+def _conclusions(groups: Groups, summaries: Sequence[Row], differences: Sequence[Row]) -> Iterator[str]:
+    """Yield the conclusion; of points of a sweep at which managers are compared, one for those that have the same."""
+    metric = groups.metrics[0]
+    means = {each["group"]: each["mean"].value for each in summaries if each["metric"] == metric.name and each["n"]}
+    points = dict.fromkeys(group.point for group in groups.groups)
+    if len(points) == 1 or len(points) == len(groups.groups):
+        points = {"": None}
+    points_of: dict[str, list[str]] = {}
+    for point in points:
+        names = [group.name for group in groups.groups if not point or group.point == point]
+        text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
+        lost = [f"{name} in {groups.lost[name]}" for name in names if name in groups.lost]
+        if lost and metric.name == SEARCH_TIME:
+            what = "their search time is when they ended"
+            text = f"The pipeline was not found by {listed(lost)}; {what}. {text}"
+        points_of.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
+    for text, where in points_of.items():
+        yield f"{'; '.join(where)}: {text}" if where[0] else text
+
+
+def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
+    """Yield a note on pairs whose differences vary more than those of independent runs would."""
+    worse = [
+        f"{each['group']} - {each['other']} in {each['metric']}, {1.0 / each['variance_ratio']:.1f} times"
+        for each in differences
+        if each.get("variance_ratio", 1.0) < _WORSE
+    ]
+    if worse:
+        yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
+
+
 def conclusion(found: Row, metric: Metric) -> str:
     """Write the conclusion from one difference.
 
@@ -336,7 +430,7 @@ def conclusion(found: Row, metric: Metric) -> str:
     group, other = found["group"], found["other"]
     if not found["test"]:
         return f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
-    apart, ranks = estimate_in(found, "difference"), _direction_of_ranks(found)
+    apart, ranks = found["difference"], _direction_of_ranks(found)
     if _is_equal(found):
         return f"{group} and {other} have the same {metric.title} in all {number_of(found['n'], 'pair')}."
     test, interval = f"{_basis(found)}, {p_text(found['p_holm'])}", _interval(found, metric)
@@ -368,19 +462,19 @@ def _rank_claim(found: Row, metric: Metric, ranks: float) -> str:
 
 def _is_equal(found: Row) -> bool:
     """Whether the two have the same value in each pair."""
-    apart = estimate_in(found, "difference")
+    apart = found["difference"]
     return bool(found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval)
 
 
 def _is_open(found: Row) -> bool:
     """Whether the interval of the mean shows a difference, and the corrected test does not."""
-    apart = estimate_in(found, "difference")
+    apart = found["difference"]
     return bool(found["p_holm"] >= SIGNIFICANCE and apart.has_interval and not apart.contains(0.0))
 
 
 def _is_claimed(found: Row) -> bool:
     """Whether a difference of the means may be claimed."""
-    is_open = estimate_in(found, "difference").contains(0.0) and _direction_of_ranks(found)
+    is_open = found["difference"].contains(0.0) and _direction_of_ranks(found)
     return bool(found["p_holm"] < SIGNIFICANCE and not is_open)
 
 
@@ -431,7 +525,7 @@ def overall_conclusion(
 
 def _favours(found: Row, name: str, metric: Metric) -> bool:
     """Whether a group is the better one in the runs that are compared, which need not be all that have a mean."""
-    return bool((1.0 if found["group"] == name else -1.0) * metric.better * found["difference"] > 0.0)
+    return bool((1.0 if found["group"] == name else -1.0) * metric.better * found["difference"].value > 0.0)
 
 
 def _not_shown(found: Row, best: str) -> str:
@@ -445,7 +539,7 @@ def _claims(best: str, metric: Metric, claimed: Sequence[Row], alike: Sequence[s
     """Write by how much the best is better than those from which it differs, and from which it does not."""
     _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
     parts = [
-        f"{metric.amount(abs(each['difference']))}{words} {_other(each, best)}"
+        f"{metric.amount(abs(each['difference'].value))}{words} {_other(each, best)}"
         f" ({_interval(each, metric)}; {_basis(each)})"
         for each in claimed
     ]
@@ -467,7 +561,7 @@ def _and(parts: Sequence[str]) -> str:
 
 def _interval(found: Row, metric: Metric) -> str:
     """Write the interval of a difference's size, in the direction in which the sentence speaks."""
-    apart = estimate_in(found, "difference")
+    apart = found["difference"]
     shown = -apart if apart.value < 0.0 and _is_claimed(found) else apart
     text = shown.text(f".{metric.decimals}f", metric.scale)
     return f"95% interval {text}" if text else "no interval"

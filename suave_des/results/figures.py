@@ -24,24 +24,23 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, shown, unknown
 from suave_des.estimates import mean_of
 from suave_des.files import write_files
 from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
+from suave_des.records.missions import Missions, missions_of, read_missions
 from suave_des.results import style
-from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
-from suave_des.results.missions import (
+from suave_des.results.groups import (
     Group,
-    Missions,
+    Groups,
+    check_swept,
     first_alike,
     grouped,
     least_and_greatest,
-    missions_of,
-    read_missions,
     runs_sharing_draw,
-    time_limit_s,
 )
+from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
 from suave_des.results.statistics import Sample
 from suave_des.results.style import folded, key_words, value_words
 
@@ -68,23 +67,24 @@ _MEAN: dict[str, Any] = {
 }
 
 
-def draw_distributions(groups: Sequence[Group]) -> style.Picture:
+def draw_distributions(drawn: Groups) -> style.Picture:
     """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
+    groups = drawn.groups
     labels = [*map(_label, groups), "marks at 0%: means"]
     rows = math.ceil(len(labels) / _legend_columns(labels))
     legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
     for axes, metric, title in _metric_panels(figure):
-        end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
+        end = max(1.0, max(float(group.frame[metric].max()) for group in groups) * 1.06)
         for number, group in _looks(groups):
-            values = np.sort(group.known_values(metric))
+            values = np.sort(group.frame[metric].dropna())
             shares = np.arange(1, len(values) + 1) / len(values)
             look = style.line(number)
             axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look)
             mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
             axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
-    _mark_limit(figure.axes[0], groups)
+    _mark_limit(figure.axes[0], drawn)
     figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
     curves = [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
@@ -93,13 +93,12 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     return figure
 
 
-def _mark_limit(axes: Axes, groups: Sequence[Group]) -> None:
+def _mark_limit(axes: Axes, drawn: Groups) -> None:
     """Mark the end of missions that never found the pipeline on an axis of search times, if there are any."""
-    if any((group.values(FOUND) < 1.0).any() for group in groups):
-        limit_s = time_limit_s(groups)
-        axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+    if any((group.frame[FOUND] < 1.0).any() for group in drawn.groups):
+        axes.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
         look: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
-        axes.text(limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
+        axes.text(drawn.time_limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
 
 
 def _jitter(number: int, height: float) -> NDArray[np.floating]:
@@ -108,7 +107,7 @@ def _jitter(number: int, height: float) -> NDArray[np.floating]:
     return places
 
 
-def draw_differences(groups: Sequence[Group]) -> style.Picture:
+def draw_differences(drawn: Groups) -> style.Picture:
     """Draw the differences between groups run by run: each run, and the mean with its 95% interval.
 
     With more than four groups each is compared with the first one only.
@@ -116,15 +115,16 @@ def draw_differences(groups: Sequence[Group]) -> style.Picture:
     Raises:
         InputError: no two groups have runs that share their random numbers.
     """
+    groups = drawn.groups
     pairs = [(one, groups[0]) for one in groups[1:]]
     if len(groups) <= _EACH_WITH_EACH:
         pairs = list(combinations(groups, 2))
     colours = {group.name: style.line(number)["color"] for number, group in _looks(groups)}
     rows = []
     for one, other in pairs:
-        parts = [(one.by_run(metric), other.by_run(metric)) for metric in PAPER_METRICS]
-        apart = [(x - y).dropna() for x, y in parts if x is not None and y is not None]
-        if len(apart) == len(parts) and all(map(len, apart)):
+        is_paired = one.has_runs and other.has_runs
+        apart = [(one.frame[metric] - other.frame[metric]).dropna() for metric in PAPER_METRICS if is_paired]
+        if apart and all(map(len, apart)):
             rows.append((one, other, apart))
     if not rows:
         problem = "no two of these have runs that share their random numbers"
@@ -230,7 +230,7 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
         InputError: one of them is not swept, or there are too many for one figure.
     """
     parameters = list(parameters or missions.swept)
-    missions.check_swept(parameters, "parameters")
+    check_swept(missions, parameters, "parameters")
     for source, part in missions.frame.groupby("source", sort=False):
         if fixed := [name for name in parameters if part[name].isna().all()]:
             problem = f"{source} does not vary {', '.join(fixed)}"
@@ -275,7 +275,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         InputError: one of them is not swept, there are not two, or their values are too many for numbers.
     """
     parameters = list(parameters or missions.swept)
-    missions.check_swept(parameters, "parameters")
+    check_swept(missions, parameters, "parameters")
     if len(parameters) != 2:
         problem = f"a heat map is of two swept parameters, and there are {len(parameters)}: {', '.join(parameters)}"
         raise InputError(problem, place="parameters", remedy="choose two with --parameters")
@@ -490,8 +490,7 @@ def draw_mission(record: MissionRecord, kind: str = MAP, rules: Rules = MappingP
         InputError: there is no such figure of a mission.
     """
     if kind not in (MAP, TIMELINE):
-        remedy = did_you_mean(kind, (MAP, TIMELINE))
-        raise InputError(f"there is no figure {shown(kind)} of a mission", place="kind", remedy=remedy)
+        raise unknown(f"there is no figure {shown(kind)} of a mission", kind, (MAP, TIMELINE), place="kind")
     with style.publication():
         return draw_timeline(record, rules) if kind == TIMELINE else draw_map(record)
 
@@ -514,10 +513,10 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     if parameters:
         raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
     if kind not in (AUTO, DISTRIBUTIONS, DIFFERENCES):
-        remedy = did_you_mean(kind, (DISTRIBUTIONS, DIFFERENCES, SWEEP, HEAT_MAP))
-        raise InputError(f"there is no figure {shown(kind)} of a campaign", place="kind", remedy=remedy)
+        known = (DISTRIBUTIONS, DIFFERENCES, SWEEP, HEAT_MAP)
+        raise unknown(f"there is no figure {shown(kind)} of a campaign", kind, known, place="kind")
     is_of_means = kind == DIFFERENCES
-    groups = grouped(missions, averages=is_of_means)[0]
+    groups = grouped(missions, averages=is_of_means)
     figure = draw_differences(groups) if is_of_means else draw_distributions(groups)
     if missions.swept:
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)

@@ -12,10 +12,10 @@ from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import mean_of, std_of
 from suave_des.records.metrics import DISTANCE, METRICS, PAPER_METRICS, SEARCH_TIME
+from suave_des.records.missions import in_papers_order
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.results.comparison import estimate_in, rows_of
-from suave_des.results.missions import in_papers_order
 from suave_des.results.statistics import difference_interval
 from suave_des.results.validation import sample
 from suave_des.tables import Table, markdown_text

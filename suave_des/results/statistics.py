@@ -248,7 +248,7 @@ def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> T
     """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the two differ."""
     both = [[int(np.sum((first == row) & (second == column))) for column in (True, False)] for row in (True, False)]
     found = library("statsmodels.stats.contingency_tables").mcnemar(both, exact=True)
-    return {"test": MCNEMAR, "p": min(1.0, float(found.pvalue)), "effect_name": ""}
+    return {"test": MCNEMAR, "p": min(1.0, float(found.pvalue)), "effect_name": "", "effect": None}
 
 
 def holm(ps: Sequence[float]) -> list[float]:

@@ -21,7 +21,7 @@ from suave_des.domain import (
     MAINTAIN_MOTION,
     UNGROUND_MODE,
 )
-from suave_des.results.missions import printable
+from suave_des.results.groups import printable
 from suave_des.tables import broken_name
 
 WIDTH_IN = 7.0

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.records.missions import read_missions
 from suave_des.records.runs import exemplar_names
-from suave_des.results.missions import read_missions
 from tests.helpers import rows_of
 
 

@@ -9,7 +9,9 @@ import pytest
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
+from suave_des.records.missions import missions_in
 from suave_des.results.assisted import AssistedComparison, assisted_mean, compare_assisted
+from suave_des.results.groups import grouped
 from tests.helpers.command import command_here
 
 REAL = Path(__file__).parents[2] / "scenarios" / "published" / "planta_exp1_runs.csv"
@@ -54,7 +56,8 @@ def real_missions(runs: int, shift_s: float = 0.0, points: np.ndarray = POINTS) 
 
 def compared(**changed: pandas.DataFrame) -> AssistedComparison:
     given = {"real": real_missions(2, 25.0), "same": missions(2, POINTS, 5), "population": population()} | changed
-    return compare_assisted(given["real"], given["same"], given["population"])
+    real, *simulated = map(missions_in, given.values())
+    return compare_assisted(grouped(real, simulated=simulated))
 
 
 # The estimator

@@ -12,6 +12,7 @@ from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.estimates import mean_of
 from suave_des.records.mission_folder import MissionRecord, read_mission
+from suave_des.records.missions import missions_of, read_missions
 from suave_des.results import style
 from suave_des.results.figures import (
     draw_distributions,
@@ -22,9 +23,9 @@ from suave_des.results.figures import (
     draw_sweep,
     write_picture,
 )
+from suave_des.results.groups import grouped
 from suave_des.results.mission import adaptations, failure_spans, mode_spans
 from suave_des.results.mission_figures import draw_map, draw_timeline
-from suave_des.results.missions import grouped, missions_of, read_missions
 from suave_des.results.paper import published_runs
 
 
@@ -61,7 +62,7 @@ def test_the_map_shows_every_mode_and_what_happened(mission):
 
 
 def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign):
-    figure = draw_distributions(grouped(read_missions([campaign]))[0])
+    figure = draw_distributions(grouped(read_missions([campaign])))
     for axes in figure.axes:
         curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
         assert [line.get_label() for line in curves] == ["none (n = 3)", "random (n = 3)"]
@@ -148,7 +149,7 @@ def test_a_manager_looks_the_same_in_every_figure():
     assert len({str(style.line(number)) for number in both}) == 5
     frame = sweep_frame(3, 4)
     both = missions_of(pandas.concat([frame.assign(manager=name) for name in ("metacontrol", "bt")]))
-    curves = draw_distributions(grouped(both)[0]).axes[0].get_lines()
+    curves = draw_distributions(grouped(both)).axes[0].get_lines()
     means = draw_sweep(both, ["start.x_m"]).axes[0].containers
     expected = [style.line(2)["color"], style.line(3)["color"]]
     assert list(dict.fromkeys(curve.get_color() for curve in curves if len(curve.get_xdata()) > 2)) == expected

@@ -1,0 +1,202 @@
+"""Missions of several sources: read from folders, files or a data frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas
+
+from suave_des.errors import InputError
+from suave_des.files import read_csv
+from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
+from suave_des.records.runs import COLUMNS, REMEDY, SIZE_LIMIT_BYTES, is_foreign, runs_in
+from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
+
+Source = pandas.DataFrame | str | Path | Sequence[str | Path]
+"""Missions: a data frame with the columns of runs.csv, or folders and files."""
+SHARING = "runs_sharing_draw"
+"""Column of missions, and attribute of a frame: how many runs in a row share their draws."""
+PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
+
+
+@dataclass(frozen=True)
+class Missions:
+    """Missions to compare, a row for each.
+
+    Attributes:
+        frame: with `source`, the columns of records.runs.COLUMNS, further metrics, and what a sweep varies; with
+            `runs_sharing_draw` where that is known.
+        swept: columns that a sweep varies.
+        notes: what readers of the comparison should know about the files.
+        folders: of the campaigns that can be run again, by source.
+    """
+
+    frame: pandas.DataFrame
+    swept: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    folders: Mapping[str, Path] = field(default_factory=dict)
+
+
+def missions_in(source: Source) -> Missions:
+    """Take the missions of a data frame, or read those in folders and files; see missions_of and read_missions."""
+    if isinstance(source, pandas.DataFrame):
+        return missions_of(source)
+    return read_missions([Path(source)] if isinstance(source, str | Path) else list(map(Path, source)))
+
+
+def read_missions(paths: Sequence[Path]) -> Missions:
+    """Read the missions in folders or files of results.
+
+    Args:
+        paths: folders of `suave-des campaign` or `reproduce`, of the exemplar's own CSV files, or single CSV files.
+
+    Raises:
+        InputError: one of them has no missions, is given twice, or has missions of several scenarios.
+    """
+    if not paths:
+        raise InputError("no results are given", remedy="give the --out folders of suave-des campaign, or CSV files")
+    resolved = [path.resolve() for path in paths]
+    for place, path in enumerate(paths):
+        if resolved[place] in resolved[:place]:
+            raise InputError("is given twice", file=path, remedy="name each folder of results once")
+    sources = [_read_source(path) for path in paths]
+    names = _short_names(paths)
+    frames = [each.frame.assign(source=name) for each, name in zip(sources, names, strict=True)]
+    swept = tuple(dict.fromkeys(name for source in sources for name in source.swept))
+    notes = tuple(note for source in sources for note in source.notes)
+    folders = {name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()}
+    return Missions(pandas.concat(frames, ignore_index=True), swept, notes, folders)
+
+
+def _read_source(path: Path) -> Missions:
+    """Read the folder of a campaign, a folder of the exemplar's files, or a single file.
+
+    Of the exemplar's folder, files that are no results, such as its statistics, are left out.
+    """
+    is_campaign, is_file = (path / RUNS_FILE).exists(), not path.is_dir()
+    is_exemplars = not (is_campaign or is_file)
+    manifest = read_manifest(path.parent if is_file else path)
+    if is_exemplars and (path / STORE_FILE).is_file():
+        remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
+        raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
+    files = [path]
+    if not is_file:
+        files = sorted(path.glob("*.csv")) if is_exemplars else [path / RUNS_FILE]
+    contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
+    own = [file for file in files if not is_foreign(contents[file])] or files[:1]
+    if not own:
+        remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+        raise InputError("has no result files", file=path, remedy=remedy)
+    notes = [f"{file} is left out: it has no columns of missions" for file in files if file not in own]
+    frames = []
+    for file in own:
+        runs = runs_in(file, contents[file])
+        runs.check_simulated()
+        frame = runs.frame.reset_index(drop=True)
+        is_ours = bool(frame["scenario"].iloc[0])
+        swept = _swept({} if is_exemplars else manifest, frame) if is_ours else ()
+        _check_once(frame, swept, file)
+        frames.append(frame)
+        notes += runs.notes
+    frame = pandas.concat(frames, ignore_index=True)
+    if is_exemplars or not is_ours:
+        frame, swept = in_papers_order(frame), ()
+    if is_campaign:
+        frame = frame.assign(**{SHARING: _sharing(manifest)})
+        notes += _unfinished(path, manifest)
+    return Missions(frame, swept, tuple(notes))
+
+
+def _check_once(frame: pandas.DataFrame, swept: Sequence[str], file: Path | None = None) -> None:
+    """Check that no mission is there twice."""
+    known = frame[frame["run"].notna() & (frame["seed"] != "")]
+    twice = known.duplicated(["manager", "seed", "run", *swept])
+    if twice.any():
+        row = known[twice].iloc[0]
+        problem = f"run {row['run']:.0f} of {row['manager']} with seed {row['seed']} is there twice"
+        raise InputError(problem, file=file, remedy="give each mission once")
+
+
+def missions_of(frame: pandas.DataFrame) -> Missions:
+    """Take the missions of a data frame with the columns of runs.csv, as run_campaign returns it or pandas reads it.
+
+    Raises:
+        InputError: it has no missions, lacks a column, or has a mission twice.
+    """
+    for column in ("manager", SEARCH_TIME, DISTANCE):
+        if column not in frame.columns:
+            raise InputError(f"the data frame has no column {column!r}", remedy="it needs the columns of runs.csv")
+    if frame.empty:
+        raise InputError("the data frame has no missions", remedy="one row for each mission is needed")
+    plain = pandas.DataFrame(frame).reset_index(drop=True)
+    texts = ("scenario", "manager", "seed")
+    missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in plain}
+    plain = plain.assign(**missing, source="", **{SHARING: int(frame.attrs.get(SHARING, 1))})
+    plain = plain.assign(**{name: plain[name].astype(str) for name in texts})
+    numbers = [str(name) for name in plain if name == "run" or (name not in texts and metric_of(str(name)))]
+    try:
+        plain = plain.astype(dict.fromkeys(numbers, "Float64")).astype(dict.fromkeys(numbers, float))
+    except (ValueError, TypeError) as error:
+        problem = f"the data frame's columns of metrics have something that is no number: {error}"
+        raise InputError(problem, remedy="it needs the columns of runs.csv") from None
+    swept = _swept({}, plain)
+    _check_once(plain, swept)
+    return Missions(plain, swept)
+
+
+def in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
+    """Sort real missions by manager as in the paper's table, others after these in their own order."""
+    ranks = frame["manager"].map(PAPER_ORDER).fillna(len(PAPER_ORDER))
+    return frame.iloc[ranks.argsort(kind="stable")].reset_index(drop=True)
+
+
+def _sharing(manifest: Mapping[str, Any]) -> int:
+    """Return how many runs in a row share the draws of perturbations; 1 if none do."""
+    try:
+        return max(1, int(manifest["runs_per_draw"])) if manifest["perturbations"] else 1
+    except (ValueError, KeyError, TypeError):
+        return 1
+
+
+def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
+    """Say how many missions a campaign lacks."""
+    with suppress(ValueError, KeyError, TypeError):
+        left_out, failed, planned = (int(manifest["missions"][key]) for key in ("left_out", "failed", "planned"))
+        if left_out or failed:
+            yield (
+                f"{folder}: of {planned} missions {left_out} are missing and {failed} failed;"
+                f" suave-des campaign --resume {folder} runs those that are missing"
+            )
+
+
+def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, ...]:
+    """Return the columns that a sweep varies: those that the manifest names, or else those that seem to vary.
+
+    These differ between missions of one manager, seed and run, and are no metrics.
+    """
+    columns = [str(name) for name in frame if name not in COLUMNS and metric_of(str(name)) is None]
+    if "missions" in manifest:
+        with suppress(AttributeError, TypeError):
+            forms = manifest.get("sweep", {})
+            ranges = (forms.get("sample") or {}).get("ranges", {})
+            named = [name for form in (forms.get("grid", {}), forms.get("zip", {}), ranges) for name in form]
+            return tuple(name for name in named if name in columns)
+    if not columns or frame["run"].isna().any():
+        return ()
+    counts = frame.groupby(["manager", "seed", "run"], sort=False, observed=True)[columns].nunique(dropna=False)
+    return tuple(name for name in columns if (counts[name] > 1).any())
+
+
+def _short_names(paths: Sequence[Path]) -> list[str]:
+    """Name sources by the last parts of their paths that tell them apart."""
+    parts = [path.resolve().with_suffix("").parts for path in paths]
+    for depth in range(1, max(map(len, parts))):
+        names = ["/".join(each[-depth:]) for each in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]

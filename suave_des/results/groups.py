@@ -1,0 +1,379 @@
+"""Missions in the groups that are compared or drawn, with what a reader should know about them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas
+
+from suave_des.errors import InputError, shown, unknown
+from suave_des.records.metrics import (
+    DISTANCE,
+    FOUND,
+    METRICS,
+    PAPER_METRICS,
+    REACTION_TIME,
+    SEARCH_TIME,
+    Metric,
+    metric_of,
+)
+from suave_des.records.missions import SHARING, Missions
+
+_USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
+_MOST_GROUPS = 60
+"""More make tables that nobody reads, and thousands of tests."""
+_MEMBER = "ensemble_member"
+"""Column of runs.csv: the parameter set of a run."""
+_FEW = 20
+_PLACES = ("real missions", "assisted by", "population")
+"""Of errors in real missions and those that assist them."""
+_SAME_LIMIT_S = 1.5
+"""Programs write limits that differ by a second for the same one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Missions that are compared with those of other groups.
+
+    Attributes:
+        name: the manager's, with its source or its value of a sweep where several have the same.
+        frame: a row for each independent value: for each mission, or, where points of a sweep are averaged, for each
+            run, whose random numbers all points share; or for each draw that several runs share. Where seed and run are
+            known, they are its index.
+        is_of_missions: whether each row is one mission.
+        point: the end of the name that tells the value of a sweep; empty if all values are in the group.
+    """
+
+    name: str
+    frame: pandas.DataFrame
+    is_of_missions: bool = True
+    point: str = ""
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether seed and run of each row are known, so that it can be paired with those of others."""
+        return self.frame.index.nlevels > 1
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Missions in groups, and what is asked about them.
+
+    Attributes:
+        missions: of all sources.
+        groups: in the order of their first missions.
+        metrics: to compare.
+        notes: what a reader should know about the groups.
+        counted: what the rows of groups are: "mission", "run", "draw", or "value" where they differ.
+        time_limit_s: whole seconds that missions of every group had; where all found the pipeline, the longest search.
+            Of real missions that simulated ones assist, the limit of all; infinite if it is not known.
+        lost: by name of a group that did not find the pipeline in most of its missions, in how many.
+        simulated: missions that assist them, under the same conditions and under many; empty: none do.
+    """
+
+    missions: Missions
+    groups: Sequence[Group]
+    metrics: tuple[Metric, ...]
+    notes: tuple[str, ...]
+    counted: str
+    time_limit_s: float
+    lost: Mapping[str, str]
+    simulated: tuple[Missions, ...] = ()
+
+
+def grouped(
+    missions: Missions,
+    managers: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+    by: Sequence[str] = (),
+    *,
+    averages: bool = True,
+    simulated: Sequence[Missions] = (),
+) -> Groups:
+    """Group missions by manager, source and the chosen parameters of a sweep.
+
+    Args:
+        missions: of all sources.
+        managers: names of the managers to include; empty: all.
+        metrics: columns of runs.csv; empty: those of the usual ones that at least one mission has; with simulated
+            missions, those of the paper.
+        by: swept parameters each of whose values is a separate group.
+        averages: whether a run's values are averaged over the other swept parameters.
+        simulated: a campaign under the conditions of the missions, which are real ones, and one under many; empty: the
+            missions are not assisted by others.
+
+    Raises:
+        InputError: a name is not there, no mission has a metric, or there are too many groups; or simulated missions
+            lack a manager or a metric, have a number that is none, or another time limit than the others.
+    """
+    frame = missions.frame.assign(source="") if simulated else missions.frame
+    known = list(dict.fromkeys(frame["manager"]))
+    check_swept(missions, by, "by")
+    for name in managers:
+        if name not in known:
+            raise unknown(f"there is no mission of {shown(name)}", name, known, "there are")
+    for place, others in zip(_PLACES[1:], simulated, strict=False):
+        theirs = dict.fromkeys(others.frame["manager"])
+        for name in managers or known:
+            if name not in theirs:
+                raise unknown(f"there is no mission of {name}", name, theirs, "there are", place)
+    if managers:
+        frame = frame[frame["manager"].isin(managers)]
+    found = list(frame.groupby(["manager", "source", *by], sort=False, dropna=False, observed=True))
+    if managers:
+        found.sort(key=lambda item: list(managers).index(str(item[0][0])))
+    if len(found) > _MOST_GROUPS:
+        problem = f"{len(found)} groups are too many to compare with each other"
+        raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
+    averages = averages and not simulated
+    averaged = [name for name in missions.swept if averages and name not in by]
+    names = _names([key for key, _ in found], by)
+    alike = _alike_by_source(frame) if averages else {}
+    points = {
+        key: len(part[averaged].drop_duplicates()) if averaged else 1
+        for key, part in frame.groupby(["source", *by], dropna=False, observed=True)
+    }
+    groups, lacking = [], []
+    for (name, end), (key, part) in zip(names, found, strict=True):
+        source, number = str(key[1]), points[key[1:]]
+        rows = _means(part, number) if number > 1 else part
+        if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
+            lacking.append(f"{name} {left} of {left + len(rows)}")
+        if (sharing := alike.get(source, 1)) > 1:
+            whole = frame[frame["source"] == source]  # how many runs of a draw there are under any manager
+            draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)["run"].nunique()
+            rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
+        if rows["run"].notna().all() and (rows["seed"] != "").all():
+            rows = rows.set_axis(pandas.MultiIndex.from_frame(rows[["seed", "run"]]))
+        groups.append(Group(name, rows, number == sharing == 1, end))
+    if lacking and not any(len(group.frame) for group in groups):
+        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
+        raise InputError("no manager has a run with missions at all points of the sweep", remedy=remedy)
+    chosen = _chosen_metrics(metrics or (PAPER_METRICS if simulated else ()), groups)
+    notes = list(_notes(groups, averaged, frame, alike))
+    if lacking:
+        notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
+    for metric in chosen:
+        notes += _never_found(groups) if metric.name == SEARCH_TIME else _left_out(groups, metric)
+    limit_s: float = _time_limit_s(groups)
+    if simulated:
+        ours = pandas.concat([group.frame for group in groups])
+        limit_s = _common_limit_s([ours, *(each.frame for each in simulated)], chosen)
+    counted, lost = _counted(groups), dict(_mostly_lost(groups))
+    return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, tuple(simulated))
+
+
+def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
+    """Return the least and the greatest of values by (seed, run), each with its run."""
+    runs = values.index.get_level_values("run")
+    return [(float(values.iloc[at]), int(runs[at])) for at in (int(values.argmin()), int(values.argmax()))]
+
+
+def check_swept(missions: Missions, names: Sequence[str], place: str) -> None:
+    """Check that a sweep varies these columns.
+
+    Raises:
+        InputError: it does not vary one of them; `place` says where that was asked for.
+    """
+    for name in names:
+        if name not in missions.swept:
+            raise unknown(f"{shown(name)} is not what a sweep varies here", name, missions.swept, "swept are", place)
+
+
+def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[str, str]]:
+    """Return of each group the name, and the end of it that tells the values of a sweep."""
+    sources: dict[object, set[object]] = {}
+    for manager, source, *_ in keys:
+        sources.setdefault(manager, set()).add(source)
+    ends = [name.rpartition(".")[2] for name in by]
+    labels = ends if len(set(ends)) == len(ends) else by
+    names = []
+    for manager, source, *values in keys:
+        texts = (f"{value:g}" if isinstance(value, float) else printable(str(value)) for value in values)
+        point = "".join(f", {label} {text}" for label, text in zip(labels, texts, strict=True))
+        of_source = f" ({printable(str(source))})" if len(sources[manager]) > 1 else ""
+        names.append((f"{printable(str(manager))}{of_source}{point}", point))
+    return names
+
+
+def _chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
+    """Return the metrics named, or those of the usual ones that at least one mission has."""
+    found = []
+    for name in dict.fromkeys(wanted or _USUAL):
+        metric = metric_of(name)
+        if metric is None:
+            raise unknown(f"there is no metric {shown(name)}", name, METRICS, "there are", "metrics")
+        if any(name in group.frame and group.frame[name].notna().any() for group in groups):
+            found.append(metric)
+        elif wanted:
+            raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
+    return tuple(found)
+
+
+def _counted(groups: Sequence[Group]) -> str:
+    kinds = {group.is_of_missions for group in groups}
+    if kinds == {False}:
+        return "draw" if any(runs_sharing_draw(group.frame) > 1 for group in groups) else "run"
+    return "mission" if kinds == {True} else "value"
+
+
+def _time_limit_s(groups: Sequence[Group]) -> int:
+    lost = [group.frame.loc[group.frame[FOUND] == 0.0, SEARCH_TIME] for group in groups]
+    limits_s = [float(times.max()) for times in lost if times.notna().any()]
+    ends_s = [float(times_s.max()) for group in groups if (times_s := group.frame[SEARCH_TIME]).notna().any()]
+    limit_s = min(limits_s) if limits_s else max(ends_s, default=0.0)
+    return math.floor(limit_s) or math.ceil(limit_s)
+
+
+def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric]) -> float:
+    """Check the numbers in real missions and those that assist them, and return the time limit of all."""
+    limits_s: list[float] = []
+    for place, frame in zip(_PLACES, frames, strict=True):
+        for metric in metrics:
+            values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
+            may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
+            if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
+                problem = f"{metric.name} has a value that is no number, or no value at all"
+                raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
+        # Real missions may not say how long they lasted, and simulated ones may all have found the pipeline.
+        ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
+        limit_s = float(ends_s.max())
+        if abs(limit_s - min(limits_s, default=limit_s)) > _SAME_LIMIT_S:
+            problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
+            raise InputError(problem, place=place, remedy="give missions with one time limit")
+        limits_s += [] if math.isnan(limit_s) else [limit_s]
+    return math.floor(min(limits_s)) if limits_s else math.inf
+
+
+# Runs that share their draws
+
+
+def runs_sharing_draw(frame: pandas.DataFrame) -> int:
+    """Return how many runs in a row share their draws; of several campaigns, as many as have whole draws of each."""
+    return math.lcm(*frame[SHARING].dropna().astype(int).unique()) if SHARING in frame else 1
+
+
+def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
+    """Return of each mission the first run that shares its draws."""
+    return (frame["run"] - 1) // alike * alike + 1
+
+
+def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
+    """Return by source how many runs are averaged, because some share a draw.
+
+    Campaigns are compared run by run, and so by means over the same runs. Other sources, such as real missions, are not
+    averaged.
+    """
+    are_runs = (frame["run"].notna() & (frame["seed"] != "")).groupby(frame["source"], observed=True).all()
+    return dict.fromkeys(map(str, are_runs.index[are_runs]), runs_sharing_draw(frame))
+
+
+def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.DataFrame:
+    """Average rows of the same seed and run.
+
+    A mean over other points, or other runs of a draw, than that of another manager would compare these points and not
+    the managers. So a metric is missing where not all of the wanted rows have a value; a row is left out where a
+    whole mission is missing.
+
+    Args:
+        frame: rows to average.
+        wanted: how many rows each run has where none is missing.
+    """
+    numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
+    by_run = frame.groupby(["seed", "run"], sort=False, observed=True)
+    sizes = by_run.size()
+    whole = sizes * 0 + wanted if isinstance(wanted, int) else wanted.reindex(sizes.index)
+    means = by_run[numbers].mean().where(by_run[numbers].count().eq(whole, axis=0))
+    return means[sizes == whole].reset_index()
+
+
+# What a reader should know
+
+
+def _notes(
+    groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame, alike_by_source: Mapping[str, int]
+) -> Iterator[str]:
+    if (alike := max(alike_by_source.values(), default=1)) > 1:
+        is_one = frame.loc[frame["source"].isin(list(alike_by_source)), SHARING].eq(alike).all()
+        what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs, of which some share a draw"
+        others = len(alike_by_source) < frame["source"].nunique()
+        of = f" of {', '.join(map(printable, alike_by_source))}" if others else ""
+        yield (
+            f"the values of {what} (runs_per_draw){of} are averaged: draws are independent, and runs are not; n and the"
+            f" runs needed{of and ' there'} are numbers of {'draws' if is_one else 'these averages'}"
+        )
+    if averaged and not all(group.is_of_missions for group in groups):
+        yield (
+            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep share its random"
+            " numbers, so that runs are independent and missions are not"
+        )
+    members = frame[_MEMBER].nunique() if _MEMBER in frame else 0
+    if members > 1:
+        yield (
+            f"runs have {members} sets of parameters (an ensemble): intervals and tests are for chance among runs with"
+            " these sets; how much the sets differ is in ensemble.csv"
+        )
+    if len(scenarios := set(frame["scenario"]) - {""}) > 1:
+        yield f"the missions are of different scenarios: {', '.join(sorted(scenarios))}"
+    few = min(len(group.frame) for group in groups)
+    if few < _FEW:
+        rough = f"intervals and numbers of runs needed from fewer than {_FEW} are rough"
+        yield f"the fewest runs of one of them are {few}: {rough}"
+    if any(group.frame[FOUND].isna().all() for group in groups):
+        yield "some files do not say which missions found the pipeline"
+
+
+def _mostly_lost(groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
+    """Yield the groups that did not find the pipeline in most of their missions, and in how many."""
+    for group in groups:
+        lost = 1.0 - group.frame[FOUND].dropna()
+        if len(lost) and lost.mean() > 0.5:
+            share = f"{lost.sum():.0f} of {len(lost)}" if group.is_of_missions else f"{lost.mean():.0%} of its"
+            yield group.name, f"{share} missions"
+
+
+def _never_found(groups: Sequence[Group]) -> Iterator[str]:
+    counts, ends = [], []
+    for group in groups:
+        is_lost = group.frame[FOUND] < 1.0
+        if is_lost.any() and group.is_of_missions:
+            times_s = group.frame.loc[is_lost, SEARCH_TIME]
+            counts.append(f"{group.name} {len(times_s)} of {len(is_lost)}")
+            ends.append((group.name, times_s.min(), times_s.max()))
+        elif is_lost.any():
+            counts.append(f"{group.name} {1.0 - group.frame[FOUND].mean():.1%}")
+    ended = f"the search time of missions that never found the pipeline ({listed(counts)}) is the time at which they"
+    if ends and max(high for *_, high in ends) - min(low for _, low, _ in ends) > _SAME_LIMIT_S:
+        times = [f"{name} after {low:.0f}{f' to {high:.0f}' if high > low else ''} s" for name, low, high in ends]
+        yield (
+            f"{ended} ended, which differs ({listed(times)}): a mission that ends early counts as a short search, and"
+            " means, differences and tests of the search time do not compare it; compare the share that found it"
+        )
+    elif counts:
+        yield f"{ended} ended: a mean search time is the mean up to that limit, and would be longer without it"
+
+
+def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:
+    """Say how many missions have no value of a metric; of FOUND that is said already."""
+    known = [(group, int(group.frame[metric.name].count())) for group in groups]
+    counts = [
+        f"{group.name} {len(group.frame) - n} of {len(group.frame)}" for group, n in known if 0 < n < len(group.frame)
+    ]
+    if counts and metric.name != FOUND:
+        what = "missions" if all(group.is_of_missions for group in groups) else "missions, or averages over missions,"
+        without = f"{what} without a {metric.title} ({listed(counts)})"
+        yield f"{without} are left out of it; they may be those that went worst"
+
+
+def printable(name: str) -> str:
+    """Return a name from a file without terminal control characters."""
+    return name if name.isprintable() else repr(name)[1:-1]
+
+
+def listed(parts: Sequence[str], most: int = 6) -> str:
+    """Write the first of several parts, and how many more there are."""
+    more = len(parts) - most
+    return ", ".join(parts[:most]) + (f" and {more} more" if more > 0 else "")
