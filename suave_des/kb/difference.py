@@ -17,8 +17,7 @@ from rdflib.term import Node
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate
 from suave_des.kb.matching import Probes
-from suave_des.kb.policy import Policy
-from suave_des.kb.space import PolicySpace, Situation
+from suave_des.kb.space import Decide, PolicySpace, Situation, States, compare
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
@@ -103,7 +102,8 @@ class PolicyDifference:
 
     Attributes:
         compared: number of states that both have.
-        cells: rows of the policies' cases that are decided differently; what differs has `_a` and `_b` at its end.
+        cells: a row for each kind of state that is decided differently: the columns of a policy's cases that tell it
+            from others; `statuses` and what happens, `_then`, of both, with `_a` and `_b` at the end; one such `state`.
         reported: number of states in which they decide alike, but infer different statuses.
         space: what the policies tell apart.
         functions: that have an objective.
@@ -163,25 +163,27 @@ class PolicyDifference:
             yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(row['states'], 'state')}"
 
 
-def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
-    """Compare two policies over the same space."""
+def compare_decisions(states: States, one: Decide, other: Decide, no_proof: tuple[str, ...]) -> PolicyDifference:
+    """Compare what two knowledge bases decide in all of some states; see PolicyDifference."""
     import pandas
 
-    functions = tuple(name for name in one.functions if name in other.functions)
-    compared = [*(f"{name}_then" for name in functions), "statuses"]
-    both = one.cases.merge(other.cases[["state", *compared]], on="state", suffixes=("_a", "_b"))
-
-    def differs(name: str) -> Any:
-        return both[f"{name}_a"] != both[f"{name}_b"]
-
-    decided = pandas.concat(map(differs, compared[:-1]), axis=1).any(axis=1)
+    reported, cells = 0, []
+    for situation, before, after in compare(one, other, map(Situation, states)):
+        state = situation.state
+        then = [outcome.choices(state, states.functions) for outcome in (before, after)]
+        if then[0] != then[1]:
+            statuses = ("; ".join(outcome.statuses) for outcome in (before, after))
+            cells.append((*states.row(state), *statuses, *then[0], *then[1], state))
+        elif before.statuses != after.statuses:
+            reported += states.numbers[state.components]
+    columns = [f"{name}_then_{side}" for side in "ab" for name in states.functions]
     return PolicyDifference(
-        compared=int(both["states"].sum()),
-        cells=both[decided],
-        reported=int(both["states"][~decided & differs("statuses")].sum()),
-        space=one.space,
-        functions=functions,
-        no_proof=tuple(dict.fromkeys((*one.no_proof, *other.no_proof))),
+        compared=sum(states.numbers[state.components] for state in states),
+        cells=pandas.DataFrame(cells, columns=[*states.columns(), "statuses_a", "statuses_b", *columns, "state"]),
+        reported=reported,
+        space=states.space,
+        functions=states.functions,
+        no_proof=no_proof,
     )
 
 

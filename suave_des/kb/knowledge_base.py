@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,18 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from suave_des.arguments import plain_arguments
-from suave_des.kb.difference import PolicyDifference, compare_policies
+from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.explain import Explanation, explain
-from suave_des.kb.policy import OnCount, Policy, make_policy
+from suave_des.kb.policy import Policy, make_policy
 from suave_des.kb.query import QueryResult, answer, graph_of
-from suave_des.kb.space import Outcome, PolicySpace, Situation
+from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
 from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.kb.tracing import pellet_for
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.rdf import Triple
-from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.state import ContradictionError, KnowledgeState, Number, Reasoning
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
@@ -246,14 +245,12 @@ class KnowledgeBase:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        space = self.space.common(other.space)
-        one = self.policy(max_failed, on_count, space)
-        # Java has Python search for cycles while it infers: without the first policy's cases that takes half the time.
-        gc.freeze()
-        try:
-            return compare_policies(one, other.policy(max_failed, on_count, space))
-        finally:
-            gc.unfreeze()
+        space, both = self.space.common(other.space), (self, other)
+        one, two = (States.of(each.base, each.settings, max_failed, space) for each in both)
+        states = one.shared(two)
+        decisions = [decide_all(each.base, states, each.outcome, on_count) for each in both]
+        no_proof = dict.fromkeys(reason for each in both for reason in regions_of(each.base).reasons)
+        return compare_decisions(states, *decisions, tuple(no_proof))
 
     def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
         """Answer a query in SPARQL.

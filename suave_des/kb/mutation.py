@@ -311,9 +311,10 @@ def mutate(
             reason = f"nothing differs in {len(states)} kinds of states"
             results[changed.mutant] = MutantResult(changed.mutant, EQUIVALENT, reason)
         else:
-            words = ", in a state of a test that does not expect it" if found.situation in of_tests else ""
-            reason = f"{difference(found.one, found.other)}{words}"
-            results[changed.mutant] = MutantResult(changed.mutant, SURVIVED, reason, found.situation.state)
+            situation, before, after = found
+            words = ", in a state of a test that does not expect it" if situation in of_tests else ""
+            reason = f"{difference(before, after)}{words}"
+            results[changed.mutant] = MutantResult(changed.mutant, SURVIVED, reason, situation.state)
         on_result()
     return [results[mutant] for mutant in mutants], len(states)
 

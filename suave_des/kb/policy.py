@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from suave_des.errors import InputError, KnowledgeError, number_of
+from suave_des.errors import number_of
 from suave_des.kb.space import (
     INCONSISTENT,
     Decide,
+    OnCount,
     Outcome,
     PolicySpace,
     Reports,
     Situation,
     States,
-    decision_keys,
+    decide_all,
     measured_attributes,
 )
 from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import regions_of
-from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, KnowledgeState
+from suave_des.knowledge.state import NONE_LEFT, KnowledgeState
 from suave_des.tables import Table
 
 if TYPE_CHECKING:  # an inference alone needs no pandas, the larger part of its start
@@ -31,7 +32,6 @@ if TYPE_CHECKING:  # an inference alone needs no pandas, the larger part of its 
 
 FLIP_FLOP: Final = "flip-flop"
 _EXAMPLES: Final = 5
-OnCount = Callable[[int, int], object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,109 +102,68 @@ def make_policy(
     space: PolicySpace | None = None,
     on_count: OnCount = lambda done, total: None,
 ) -> Policy:
-    """Decide every kind of state; those that differ in nothing on which a decision can depend, once.
+    """Decide every kind of state; see KnowledgeBase.policy.
 
     Args:
         base: the ontologies and rules.
         settings: measured attributes, and behaviour of the managing subsystem that is not in the rules.
         decide: concludes what follows and is decided in a situation.
-        max_failed: maximum number of components that report a status.
-        space: what to tell apart; None: what can have an effect.
-        on_count: called with the number of kinds of states that have been inferred so far, first 0, and how many have
-            to be.
-
-    Raises:
-        InputError: max_failed is negative, or there would be too many states.
-        KnowledgeError: there is nothing to decide, or the reasoner takes too long.
+        max_failed, space, on_count: as of KnowledgeBase.policy.
     """
-    if max_failed < 0:
-        raise InputError(f"{max_failed} components cannot fail", remedy="give 0 or more")
-    if not any(map(base.designs, base.functions)):
-        raise KnowledgeError(
-            "no function has a function design, so there is nothing to decide",
-            file=", ".join(map(str, base.files)),
-            remedy="give an ontology that uses TOMASys as suave.owl does",
-        )
     import pandas
 
     space = space or PolicySpace.of(base, settings)
     states = States.of(base, settings, max_failed, space)
     # States are inferred before all cases are made: memory that is full of cases makes each inference slower.
-    different: dict[Hashable, KnowledgeState] = {}
-    for key, state in zip(decision_keys(base, space, states), states, strict=True):
-        different.setdefault(key, state)
-    on_count(0, len(different))
-    decided: dict[Hashable, Outcome] = {}
-    for key, state in different.items():
-        decided[key] = decide(Situation(state))
-        on_count(len(decided), len(different))
-    functions = tuple(sorted({each.function for task in states.tasks for each in task.objectives}))
-    columns = [*space.attributes, "components", "states"]
-    columns += [f"{name}_now" for name in functions] + ["statuses"] + [f"{name}_then" for name in functions]
+    decided = decide_all(base, states, decide, on_count)
+    columns = [*states.columns(), "statuses", *(f"{name}_then" for name in states.functions)]
     columns += ["marks", "problem", "state", "reports", "flipping"]
-    outcomes = map(decided.__getitem__, decision_keys(base, space, states))
-    rows = _rows(states, functions, outcomes, decide, space)
     return Policy(
         space,
-        pandas.DataFrame(rows, columns=columns),
-        functions,
+        pandas.DataFrame(_rows(states, decided, decide), columns=columns),
+        states.functions,
         tuple(name for name in measured_attributes(base, settings) if name not in space.attributes),
         regions_of(base).reasons,
         max_failed,
     )
 
 
-def _rows(
-    states: States, functions: Sequence[str], outcomes: Iterator[Outcome], decide: Decide, space: PolicySpace
-) -> Iterator[tuple[Any, ...]]:
+def _rows(states: States, decided: Decide, decide: Decide) -> Iterator[tuple[Any, ...]]:
     """Rows of a policy's cases."""
     every = iter(states)
-    words = {reports: _in_words(reports, space) for reports in states.reports}
-    for (places, _), reports in itertools.product(states.measured, states.reports):
-        here = list(itertools.islice(outcomes, len(states.tasks)))
-        components = "; ".join(f"{name}={status}" for name, status in reports.components)
-        for task, outcome, flipping in zip(states.tasks, here, _flipping(states.tasks, here), strict=True):
-            state, asked = next(every), _asked(task)
+    for _, reports in itertools.product(states.measured, states.reports):
+        here = list(itertools.islice(every, len(states.tasks)))
+        outcomes, words = [decided(Situation(state)) for state in here], _in_words(reports, states.space)
+        for state, outcome, flipping in zip(here, outcomes, _flipping(here, outcomes), strict=True):
             marks = [INCONSISTENT]
             if outcome.reasoning is None:
                 outcome = decide(Situation(state))
             else:
                 marks = [NONE_LEFT] * bool(outcome.reasoning.plan.without_design) + [FLIP_FLOP] * bool(flipping)
-            yield (
-                *places,
-                components,
-                reports.combinations,
-                *((state.grounded(name) or NO_GROUNDING) if name in asked else "" for name in functions),
-                "; ".join(outcome.statuses),
-                *(outcome.choice(name) if name in asked else "" for name in functions),
-                "; ".join(marks),
-                outcome.contradiction,
-                state,
-                words[reports],
-                flipping,
-            )
+            statuses, then = "; ".join(outcome.statuses), outcome.choices(state, states.functions)
+            found = "; ".join(marks), outcome.contradiction
+            yield *states.row(state), statuses, *then, *found, state, words, flipping
 
 
-def _asked(task: KnowledgeState) -> tuple[str, ...]:
-    return tuple(each.function for each in task.objectives)
-
-
-def _flipping(tasks: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
-    """Functions of each task whose decisions lead through other groundings back to its own, all else being constant."""
+def _flipping(states: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
+    """Functions of each state whose decisions lead through other groundings back to its own, all else being equal."""
     after: dict[Hashable, Hashable] = {}
     groundings: dict[Hashable, dict[str, str]] = {}
-    for task, outcome in zip(tasks, outcomes, strict=True):
+    for state, outcome in zip(states, outcomes, strict=True):
+        now, present = (_asked(state), state.groundings), dict(state.groundings)
         chosen = {function: design for function, design in outcome.changes.items() if design != NONE_LEFT}
-        now = _asked(task), task.groundings
-        groundings[now] = dict(task.groundings)
-        after[now] = _asked(task), tuple(sorted({**dict(task.groundings), **chosen}.items()))
-    for task in tasks:
-        start = _asked(task), task.groundings
-        way: list[Hashable] = [start]
+        groundings[now] = present
+        after[now] = _asked(state), tuple(sorted({**present, **chosen}.items()))
+    for start in groundings:
+        way = [start]
         while (following := after[way[-1]]) in after and following not in way:
             way.append(following)
         designs = [groundings[each] for each in way] if following == start else []
-        yield tuple(name for name in _asked(task) if len({each.get(name) for each in designs}) > 1)
+        yield tuple(name for name in start[0] if len({each.get(name) for each in designs}) > 1)
+
+
+def _asked(state: KnowledgeState) -> tuple[str, ...]:
+    return tuple(each.function for each in state.objectives)
 
 
 def _in_words(reports: Reports, space: PolicySpace) -> str:

@@ -16,11 +16,11 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from math import comb
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, shown
 from suave_des.kb.states import LASTING, ManagingSettings
@@ -40,7 +40,7 @@ from suave_des.knowledge.rdf import (
 )
 from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, mirrored, texts_of
-from suave_des.knowledge.state import STAYS, Fact, KnowledgeState, Reasoning, exact
+from suave_des.knowledge.state import NO_GROUNDING, STAYS, Fact, KnowledgeState, Reasoning, exact
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 
 INCONSISTENT: Final = "inconsistent"
@@ -97,8 +97,14 @@ class Outcome:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
         return INCONSISTENT if self.reasoning is None else self.changes.get(function, STAYS)
 
+    def choices(self, state: KnowledgeState, functions: Iterable[str]) -> list[str]:
+        """What happens to the groundings of functions in the state that was decided; empty without an objective."""
+        asked = [each.function for each in state.objectives]
+        return [self.choice(name) if name in asked else "" for name in functions]
+
 
 Decide = Callable[[Situation], Outcome]
+OnCount = Callable[[int, int], object]
 
 
 def differing_decisions(one: Outcome, other: Outcome) -> Iterator[tuple[str, str, str]]:
@@ -116,23 +122,19 @@ def difference(one: Outcome, other: Outcome) -> str:
         return f"{name}: {after}, not {before}"
     for missing in sorted(map(str, one.inferred - other.inferred)):
         return f"{missing} does not follow"
-    return next((f"{more} follows" for more in sorted(map(str, other.inferred - one.inferred))), "")
+    for more in sorted(map(str, other.inferred - one.inferred)):
+        return f"{more} follows"
+    return "" if one.statuses == other.statuses else f"statuses: {'; '.join(other.statuses) or 'none'}"
 
 
-class Difference(NamedTuple):
-    """A situation in which two knowledge bases conclude or decide differently."""
-
-    situation: Situation
-    one: Outcome
-    other: Outcome
-
-
-def compare(one: Decide, other: Decide, situations: Iterable[Situation]) -> Iterator[Difference]:
-    """Find the situations in which two knowledge bases conclude or decide differently, in their order."""
+def compare(
+    one: Decide, other: Decide, situations: Iterable[Situation]
+) -> Iterator[tuple[Situation, Outcome, Outcome]]:
+    """Find the situations in which two knowledge bases conclude or decide differently, with both outcomes."""
     for situation in situations:
         before, after = one(situation), other(situation)
         if before is not after and difference(before, after):
-            yield Difference(situation, before, after)
+            yield situation, before, after
 
 
 #: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would take ten minutes.
@@ -158,6 +160,10 @@ class Scale:
     def __len__(self) -> int:
         """Number of places."""
         return 2 * len(self.numbers) + 2
+
+    def place(self, value: Decimal | None) -> int:
+        """The place of a measured value; None: it is not measured."""
+        return 0 if value is None else Regions(self.numbers, ()).region(value) + 1
 
     def low(self, place: int) -> Decimal | None:
         """The lower end of a place; None: it has none."""
@@ -542,12 +548,14 @@ class States:
     """Every kind of state that a space tells apart: any measured values, with any reports and any task.
 
     Attributes:
-        measured: place of each attribute's value, and (attribute, value) of those that are measured.
+        space: what is told apart.
+        measured: (attribute, value) of those attributes that are measured.
         reports: what components report.
         tasks: states with objectives and groundings only.
     """
 
-    measured: tuple[tuple[tuple[int, ...], tuple[tuple[str, Decimal], ...]], ...]
+    space: PolicySpace
+    measured: tuple[tuple[tuple[str, Decimal], ...], ...]
     reports: tuple[Reports, ...]
     tasks: tuple[KnowledgeState, ...]
 
@@ -556,15 +564,17 @@ class States:
         """Find the kinds of states of a knowledge base in which at most `max_failed` components report a status.
 
         Raises:
-            InputError: there would be too many states.
+            InputError: max_failed is negative, or there would be too many states.
         """
+        if max_failed < 0:
+            raise InputError(f"{max_failed} components cannot fail", remedy="give 0 or more")
         reports = tuple(component_reports(space.alike, space.statuses, max_failed))
         tasks = tuple(_tasks(base, settings, space))
         scale, attributes = space.scale, space.attributes
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
         if total <= LARGEST:  # else so many already that it does not matter how many values a range has
             measured = tuple(
-                (places, tuple((name, each) for name, each in zip(attributes, values, strict=True) if each is not None))
+                tuple((name, each) for name, each in zip(attributes, values, strict=True) if each is not None)
                 for places in itertools.product(range(len(scale)), repeat=len(attributes))
                 for values in scale.values(places)
             )
@@ -574,7 +584,7 @@ class States:
                 f"the policy has {total:,} kinds of states, which is too many",
                 remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes",
             )
-        return cls(measured, reports, tasks)
+        return cls(space, measured, reports, tasks)
 
     def __len__(self) -> int:
         """Number of kinds."""
@@ -582,8 +592,41 @@ class States:
 
     def __iter__(self) -> Iterator[KnowledgeState]:
         """One state of each kind; those that differ only in their task follow one another."""
-        for (_, values), reports, task in itertools.product(self.measured, self.reports, self.tasks):
+        for values, reports, task in itertools.product(self.measured, self.reports, self.tasks):
             yield KnowledgeState(task.objectives, task.groundings, reports.components, values)
+
+    @cached_property
+    def functions(self) -> tuple[str, ...]:
+        """All that have an objective in a state, by name."""
+        return tuple(sorted({each.function for task in self.tasks for each in task.objectives}))
+
+    def columns(self) -> list[str]:
+        """Names of what `row` returns."""
+        return [*self.space.attributes, "components", "states", *(f"{name}_now" for name in self.functions)]
+
+    def row(self, state: KnowledgeState) -> tuple[Any, ...]:
+        """Describe a state.
+
+        Returns:
+            the place of each attribute's value on the scale; the components that report; for how many states it stands;
+            the grounding of each function, empty without an objective.
+        """
+        values, asked = dict(state.measurements), [each.function for each in state.objectives]
+        return (
+            *(self.space.scale.place(values.get(name)) for name in self.space.attributes),
+            "; ".join(f"{name}={status}" for name, status in state.components),
+            self.numbers[state.components],
+            *((state.grounded(name) or NO_GROUNDING) if name in asked else "" for name in self.functions),
+        )
+
+    @cached_property
+    def numbers(self) -> dict[tuple[tuple[str, str], ...], int]:
+        """For how many states one with certain reports stands, as interchangeable components count one by one."""
+        return dict(self.reports)
+
+    def shared(self, other: States) -> States:
+        """The states that another knowledge base with the same space has, too."""
+        return replace(self, tasks=tuple(task for task in self.tasks if task in other.tasks))
 
 
 def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> Iterator[KnowledgeState]:
@@ -595,14 +638,48 @@ def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> It
             yield settings.state(dict.fromkeys(asked), groundings)
 
 
-def decision_keys(base: Ontology, space: PolicySpace, states: States) -> Iterator[Hashable]:
-    """What the decision in each kind of state can depend on: states with equal keys are decided alike."""
+def kind_of(base: Ontology, space: PolicySpace) -> Callable[[KnowledgeState], Hashable]:
+    """Make a function that returns what the decision in a state can depend on: the same for all decided alike."""
     functions = {*base.functions, *space.functions}
     effects = {each: [name for name in space.attributes if has_effect(base, name, [each])] for each in functions}
-    relevant = [sorted({name for each in task.objectives for name in effects[each.function]}) for task in states.tasks]
     regions = _regions(base, space.attributes)
-    for _, values in states.measured:
-        places = {name: value if regions is None else regions[name].region(value) for name, value in values}
-        seen = [tuple(map(places.get, names)) for names in relevant]
-        for reports in states.reports:
-            yield from ((number, reports.components, known) for number, known in enumerate(seen))
+
+    def kind(state: KnowledgeState) -> Hashable:
+        relevant = {name for each in state.objectives for name in effects[each.function]}
+        known = ((name, value) for name, value in state.measurements if name in relevant)
+        seen = tuple((name, value if regions is None else regions[name].region(value)) for name, value in known)
+        return state.objectives, state.groundings, state.components, seen
+
+    return kind
+
+
+def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount) -> Decide:
+    """Decide every state; those that differ in nothing on which a decision can depend, once.
+
+    Args:
+        base: the ontologies and rules.
+        states: to decide.
+        decide: concludes what follows and is decided in a situation.
+        on_count: called with the number of kinds of states that have been inferred so far, first 0, and how many have
+            to be.
+
+    Returns:
+        what is decided in each of the states; a contradiction is told with the values of another one of its kind.
+
+    Raises:
+        KnowledgeError: there is nothing to decide, or the reasoner takes too long.
+    """
+    if not any(map(base.designs, base.functions)):
+        raise KnowledgeError(
+            "no function has a function design, so there is nothing to decide",
+            file=", ".join(map(str, base.files)),
+            remedy="give an ontology that uses TOMASys as suave.owl does",
+        )
+    kind, different, decided = kind_of(base, states.space), dict[Hashable, KnowledgeState](), dict[Hashable, Outcome]()
+    for state in states:
+        different.setdefault(kind(state), state)
+    on_count(0, len(different))
+    for key, state in different.items():
+        decided[key] = decide(Situation(state))
+        on_count(len(decided), len(different))
+    return lambda situation: decided[kind(situation.state)]

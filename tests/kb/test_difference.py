@@ -11,14 +11,16 @@ import pytest
 from suave_des.kb.difference import (
     METRICS,
     compare_axioms,
+    compare_decisions,
     compare_missions,
-    compare_policies,
     firing_states,
     paired,
 )
 from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.space import Outcome, Situation, States
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
+from suave_des.knowledge.state import Decision, Fact, Plan
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, TOMASYS
@@ -113,20 +115,27 @@ def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_mis
     assert (found.metrics[2].difference.value, found.metrics[2].changed) == (0.5, 2)
 
 
-def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_design_differ(small):
-    policy = small.policy(max_failed=0)
-    cases, then = policy.cases, f"{SEARCH}_then"
-    (same, *_) = cases.index[cases[then] == "stays"]
-    for column, value, is_decided in (
-        (then, "inconsistent", True),
-        (then, "none left", True),
-        ("statuses", "x", False),
-    ):
-        changed = cases.copy()
-        changed.loc[same, column] = value
-        found = compare_policies(policy, replace(policy, cases=changed))
-        assert (found.states, found.reported) == ((1, 0) if is_decided else (0, 1))
-        assert list(found.cells["state"]) == [cases["state"][same]] * is_decided
+@pytest.mark.parametrize("change", ["inconsistent", "none left", "other statuses"])
+def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_design_differ(small, change):
+    states = States.of(small.base, small.settings, 0, small.space)
+    changed = next(each for each in states if each.grounded(SEARCH) and not small.outcome(Situation(each)).statuses)
+
+    def other(situation):
+        found = small.outcome(situation)
+        if situation.state != changed:
+            return found
+        if change == "inconsistent":
+            return Outcome(None, "it is")
+        if change == "none left":
+            return Outcome(replace(found.reasoning, plan=Plan((Decision(SEARCH, None, ""),))))
+        fact = Fact(f"o_{SEARCH[2:]}", "o_status", "X")
+        inference = replace(found.reasoning.inference, facts=found.reasoning.inference.facts | {fact})
+        return Outcome(replace(found.reasoning, inference=inference))
+
+    found = compare_decisions(states, small.outcome, other, ())
+    is_decided = change != "other statuses"
+    assert (found.states, found.reported) == ((1, 0) if is_decided else (0, 1))
+    assert list(found.cells["state"]) == [changed] * is_decided
 
 
 def rules_file(tmp_path: Path, text: str) -> Path:

@@ -18,7 +18,7 @@ from suave_des.kb.space import (
     Situation,
     States,
     component_reports,
-    decision_keys,
+    kind_of,
 )
 from suave_des.kb.states import ManagingSettings
 
@@ -229,7 +229,7 @@ def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_pa
     for rule, are_independent in (("", True), (with_numbers, True), (RULES["two attributes are compared"], False)):
         knowledge = extended(tmp_path, rule)
         states = States.of(knowledge.base, knowledge.settings, 0, knowledge.space)
-        different = len(set(decision_keys(knowledge.base, knowledge.space, states)))
+        different = len(set(map(kind_of(knowledge.base, knowledge.space), states)))
         assert (different < len(states) / 6) is are_independent
 
 
