@@ -248,9 +248,9 @@ class KnowledgeBase:
         space, both = self.space.common(other.space), (self, other)
         one, two = (States.of(each.base, each.settings, max_failed, space) for each in both)
         states = one.shared(two)
-        decisions = [decide_all(each.base, states, each.outcome, on_count) for each in both]
+        before, after = (decide_all(each.base, states, each.outcome, on_count) for each in both)
         no_proof = dict.fromkeys(reason for each in both for reason in regions_of(each.base).reasons)
-        return compare_decisions(states, *decisions, tuple(no_proof))
+        return compare_decisions(states, before, after, tuple(no_proof))
 
     def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
         """Answer a query in SPARQL.

@@ -32,6 +32,8 @@ if TYPE_CHECKING:  # an inference alone needs no pandas, the larger part of its 
 
 FLIP_FLOP: Final = "flip-flop"
 _EXAMPLES: Final = 5
+#: Functions that have an objective, and (function, design) of those that are grounded.
+_Task = tuple[tuple[str, ...], tuple[tuple[str, str], ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,23 +149,17 @@ def _rows(states: States, decided: Decide, decide: Decide) -> Iterator[tuple[Any
 
 def _flipping(states: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
     """Functions of each state whose decisions lead through other groundings back to its own, all else being equal."""
-    after: dict[Hashable, Hashable] = {}
-    groundings: dict[Hashable, dict[str, str]] = {}
+    after: dict[_Task, _Task] = {}
     for state, outcome in zip(states, outcomes, strict=True):
-        now, present = (_asked(state), state.groundings), dict(state.groundings)
+        asked = tuple(each.function for each in state.objectives)
         chosen = {function: design for function, design in outcome.changes.items() if design != NONE_LEFT}
-        groundings[now] = present
-        after[now] = _asked(state), tuple(sorted({**present, **chosen}.items()))
-    for start in groundings:
+        after[asked, state.groundings] = asked, tuple(sorted({**dict(state.groundings), **chosen}.items()))
+    for start in after:
         way = [start]
         while (following := after[way[-1]]) in after and following not in way:
             way.append(following)
-        designs = [groundings[each] for each in way] if following == start else []
+        designs = [dict(groundings) for _, groundings in way] if following == start else []
         yield tuple(name for name in start[0] if len({each.get(name) for each in designs}) > 1)
-
-
-def _asked(state: KnowledgeState) -> tuple[str, ...]:
-    return tuple(each.function for each in state.objectives)
 
 
 def _in_words(reports: Reports, space: PolicySpace) -> str:
