@@ -103,10 +103,11 @@ def run_mission(
     name = name_of(manager)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs([loaded], [name], replacements)
+    made = {} if folder is None else provenance(loaded, inputs, command)
     result = Simulator(loaded).run(name, run, seed, record=True)
     if folder is not None:
         make_output_folder(folder)
-        files = mission_files(result, loaded, provenance(loaded, inputs, command))
+        files = mission_files(result, loaded, made)
         write_files(folder, files, stale=(KNOWLEDGE_FILE,))
     return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
 

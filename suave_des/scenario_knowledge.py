@@ -54,12 +54,12 @@ def read_base(
     Raises:
         KnowledgeError: the ontologies or rules cannot be read.
     """
-    knowledge = scenario.knowledge
+    knowledge, values = scenario.knowledge, _values(scenario)
     named = [find(each, "ontology") for each in knowledge.ontologies] if ontologies is None else ontologies
     texts = [find(each, "ontology") for each in knowledge.rules] if rules is None else rules
     return Ontology.load(
         named,
-        values=_values(scenario),
+        values=values,
         rules=texts,
         disabled_rules=knowledge.disabled_rules,
         operators=scenario.revision.comparison_operators,
@@ -108,8 +108,9 @@ def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     same = *knowledge, loaded.ontologies, loaded.rules, operators
     reasoner = _opened.get(same)
     if reasoner is None:
+        base = open_base(loaded)
         try:
-            reasoner = Reasoner(open_base(loaded), loaded.scenario.knowledge.reasoner)
+            reasoner = Reasoner(base, loaded.scenario.knowledge.reasoner)
         except KnowledgeError as error:
             raise loaded.located(error) from None
         if len(_opened) >= OPENED:

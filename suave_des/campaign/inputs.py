@@ -37,7 +37,7 @@ from suave_des.resources import hashes, shipped_folder, shown_name
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.ontology import Ontology
+    pass
 
 _TIME_OUTS_S = {"owlready2": 1800.0}
 """Time that a mission may take with a reasoner, if not the default: owlready2 takes some two minutes a mission."""
@@ -158,19 +158,11 @@ def check_inputs(
         InputError: a function has no node; the knowledge base cannot be used; a manager refuses the scenario, or a file
             of it cannot be read.
     """
-    functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     inputs: dict[str, str] = {}
     given = any(replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
     if given or any(manager_class(name).needs_knowledge for name in managers):
-        from suave_des.knowledge.state import KnowledgeState
-        from suave_des.scenario_knowledge import open_knowledge
-
-        knowledge = open_knowledge(scenarios[0])
-        knowledge.analyze_and_plan(KnowledgeState())
-        for assumption in knowledge.base.assumptions.values():
-            logging.getLogger("suave_des").warning("note: %s", assumption)
-        inputs = hashes(knowledge.base.files)
-        report_mistakes(scenarios[0], knowledge.base)
+        inputs = _check_knowledge(scenarios[0])
+    functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     code = user_modules(managers, functions)
     for module in _defining(managers, functions):  # of a class that a package has installed, its module
         path = Path(getattr(sys.modules[module], "__file__", None) or "")
@@ -199,28 +191,37 @@ def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str])
     }
 
 
-def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
-    """Log the errors and warnings that `kb check` has without a reasoner, as it words them; once for the same files.
+def _check_knowledge(loaded: LoadedScenario) -> dict[str, str]:
+    """Open a scenario's knowledge base and draw its first conclusion; return the SHA-256 of each of its files.
 
-    This takes some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
+    What `kb check` would say without a reasoner is logged, errors and warnings, once for the same files. That takes
+    some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
     """
     from suave_des.knowledge.checks import findings_in
-    from suave_des.scenario_knowledge import subject_of
+    from suave_des.knowledge.state import KnowledgeState
+    from suave_des.scenario_knowledge import open_knowledge, subject_of
 
-    logger = logging.getLogger(MISTAKES_LOGGER)
+    knowledge = open_knowledge(loaded)
+    knowledge.analyze_and_plan(KnowledgeState())
+    base = knowledge.base
+    for assumption in base.assumptions.values():
+        logging.getLogger("suave_des").warning("note: %s", assumption)
+    logger, inputs = logging.getLogger(MISTAKES_LOGGER), hashes(base.files)
     shipped = [shipped_folder(kind).resolve() for kind in ("ontology", "scenarios")]
     files = (loaded.path, loaded.modes_path, *loaded.ontologies, *loaded.rules)
     if all(any(path.resolve().is_relative_to(folder) for folder in shipped) for path in files):
-        return
+        return inputs
     checked = base.content_hash, loaded.scenario.model_dump_json(), *loaded.inputs.values(), files
     if checked in _told or not logger.isEnabledFor(logging.WARNING):
-        return
+        return inputs
     _told.add(checked)
-    findings = ordered(findings_in(base, subject_of(loaded)))
-    if lines := [str(each) for each in findings if each.level is not Level.INFO]:
-        for line in lines:
-            logger.warning("%s", line)
+    subject = subject_of(loaded)
+    findings = [each for each in ordered(findings_in(base, subject)) if each.level is not Level.INFO]
+    for each in findings:
+        logger.warning("%s", each)
+    if findings:
         logger.warning("note: suave-des kb check, with the same files, looks for contradictions, too")
+    return inputs
 
 
 def trained_on(campaign: Campaign) -> Iterator[str]:
