@@ -108,11 +108,8 @@ def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     same = *knowledge, loaded.ontologies, loaded.rules, operators
     reasoner = _opened.get(same)
     if reasoner is None:
-        base = open_base(loaded)
-        try:
-            reasoner = Reasoner(base, loaded.scenario.knowledge.reasoner)
-        except KnowledgeError as error:
-            raise loaded.located(error) from None
+        opened = open_base(loaded)
+        reasoner = Reasoner(opened, loaded.scenario.knowledge.reasoner)
         if len(_opened) >= OPENED:
             del _opened[next(iter(_opened))]
         _opened[same] = reasoner

@@ -46,7 +46,6 @@ LARGEST = 1e12
 LONGEST_S = 1e9
 """Longest time: 31 years, in other words never."""
 FARTHEST_M = 10_000.0
-_LEAST_SHARE = 0.001
 
 
 class Strict(BaseModel):
@@ -158,7 +157,7 @@ class Normal(Drawn):
         else:
             scale = self.std * math.sqrt(2)
             share = (math.erf((high - self.mean) / scale) - math.erf((low - self.mean) / scale)) / 2
-        if share < _LEAST_SHARE:
+        if share < 0.001:
             problem = f"[{low:g}, {high:g}] leaves next to nothing of the distribution"
             raise wrong(problem, "move or widen it, or use distribution: uniform", "minimum", "maximum")
         return self
@@ -308,7 +307,6 @@ def support(distribution: AnyDistribution) -> tuple[float, float]:
 Positive = Annotated[Real, Field(gt=0, le=1e6)]
 Offset = Coordinate
 Component = Annotated[Real, Field(ge=-1, le=1)]
-_UNIT_TOLERANCE = 1e-3
 
 
 class Monitor(Strict):
@@ -425,7 +423,7 @@ class ThrusterDescription(Strict):
     @classmethod
     def _is_a_unit_vector(cls, value: Any) -> Any:
         length = math.hypot(*value)
-        if abs(length - 1.0) > _UNIT_TOLERANCE:
+        if abs(length - 1.0) > 1e-3:
             raise wrong(f"{list(value)} has length {length:.4g}", "give a vector of length 1")
         return value
 
@@ -613,16 +611,6 @@ def read_table(path: Path) -> tuple[SignalTable, str]:
     return (times_s, values), digest
 
 
-# Names of files and reasoners.
-
-FileName = Annotated[str, Field(min_length=1)]
-
-ReasonerName = Literal["cached", "pellet", "owlready2"]
-REASONERS: tuple[str, ...] = get_args(ReasonerName)
-
-_LONGEST_MISSION_S = 100_000.0
-
-
 # Differences between the exemplar's revisions, as data.
 
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -801,6 +789,10 @@ class Revision(Strict):
 
 # The mission, and what the scenario says about managers and metrics.
 
+FileName = Annotated[str, Field(min_length=1)]
+ReasonerName = Literal["cached", "pellet", "owlready2"]
+REASONERS: tuple[str, ...] = get_args(ReasonerName)
+
 
 class MissionFunctions(Strict):
     """Functions that the mission needs in addition to the exemplar's."""
@@ -825,7 +817,7 @@ class FunctionSettings(Strict):
 class MissionSettings(Strict):
     """The coordinator's time limit, and further functions that its tasks need."""
 
-    time_limit_s: Annotated[Real, Field(gt=0, le=_LONGEST_MISSION_S)] = 300.0
+    time_limit_s: Annotated[Real, Field(gt=0, le=100_000.0)] = 300.0
     """Time at which the mission ends."""
     functions: MissionFunctions = MissionFunctions()
     """Functions needed in addition to the exemplar's."""
@@ -1036,8 +1028,6 @@ class Requirement(Strict):
         return max(0.0, 1.0 - gap / self.tolerance) if self.tolerance > 0.0 else 0.0
 
 
-Metrics = Annotated[tuple[FurtherMetric, ...], Field(max_length=len(FURTHER_METRICS))]
-
 _DEFAULT_MODES = {GENERATE_SEARCH_PATH: "fd_spiral_low", FOLLOW_PIPELINE: "fd_follow_pipeline"}
 
 
@@ -1086,7 +1076,7 @@ class Scenario(Strict):
     """Settings of managing subsystems, by name."""
     reaction_metric: ReactionMetric = ReactionMetric()
     """Definition of a reaction, as in revision 1.5."""
-    metrics: Metrics = ()
+    metrics: Annotated[tuple[FurtherMetric, ...], Field(max_length=len(FURTHER_METRICS))] = ()
     """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
     """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15,
@@ -1111,11 +1101,8 @@ class Scenario(Strict):
     def needed_functions(self) -> tuple[str, ...]:
         """The functions that the mission needs."""
         own, surface = self.mission.functions, (SURFACE,) if self.leak is not None else ()
-        return tuple(
-            dict.fromkeys(
-                (*domain.MISSION_FUNCTIONS, *own.mission_wide, *own.search_pipeline, *own.inspect_pipeline, *surface)
-            )
-        )
+        tasks = *own.search_pipeline, *own.inspect_pipeline
+        return tuple(dict.fromkeys((*domain.MISSION_FUNCTIONS, *own.mission_wide, *tasks, *surface)))
 
     def without_effect(self) -> Iterator[str]:
         """Yield what changes no mission, and why, in words: a failure that comes too early, or what comes too late."""
@@ -1150,7 +1137,7 @@ class Scenario(Strict):
         return (*self.metrics, *(f"requirement_{name}" for name in self.requirements))
 
     @model_validator(mode="after")
-    def _metrics_fit(self) -> Self:
+    def _parts_fit(self) -> Self:
         for index, metric in enumerate(self.metrics):
             if metric in self.metrics[:index]:
                 raise wrong(f"{metric} is given twice", "name each metric once", "metrics")
@@ -1163,10 +1150,6 @@ class Scenario(Strict):
         for name, each in self.requirements.items():
             if each.attribute is not None and each.attribute not in measured:
                 raise wrong(f"nothing measures {each.attribute} ({name})", "add a signal of that name", "requirements")
-        return self
-
-    @model_validator(mode="after")
-    def _one_battery(self) -> Self:
         if self.battery is not None and BATTERY_LEVEL in self.signals:
             raise wrong("there are a battery and a signal battery_level", "remove one of them", "battery")
         return self

@@ -57,12 +57,8 @@ class ModeTable:
     @property
     def search_altitudes_m(self) -> dict[str, float]:
         """Altitude above the sea bed of each search mode that has one."""
-        modes = self.table.get(GENERATE_SEARCH_PATH, {}).values()
-        return {
-            each.name: float(each.parameters["spiral_altitude"])
-            for each in modes
-            if "spiral_altitude" in each.parameters
-        }
+        modes, key = self.table.get(GENERATE_SEARCH_PATH, {}).values(), "spiral_altitude"
+        return {each.name: float(each.parameters[key]) for each in modes if key in each.parameters}
 
     def get(self, function: str, mode: str) -> Mode | None:
         """Return one mode of a function; None if there is no such function, or it has no such mode."""

@@ -71,15 +71,10 @@ def field_docs(model: type[BaseModel]) -> dict[str, str]:
     for part in reversed(model.__mro__):
         if part is BaseModel or not issubclass(part, BaseModel):
             continue
-        body = _classes(part.__module__)[part.__name__].body
-        for field, text in pairwise(body):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                texts[field.target.id] = inspect.cleandoc(str(text.value.value))
+        for field, text in pairwise(_classes(part.__module__)[part.__name__].body):
+            match field, text:
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(meaning))):
+                    texts[name] = inspect.cleandoc(meaning)
     return texts
 
 
