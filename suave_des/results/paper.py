@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas
 
 from suave_des.arguments import plain_arguments
@@ -14,10 +15,10 @@ from suave_des.estimates import mean_of, std_of
 from suave_des.records.metrics import DISTANCE, METRICS, PAPER_METRICS, SEARCH_TIME
 from suave_des.records.missions import in_papers_order
 from suave_des.records.runs import read_runs
-from suave_des.resources import shipped_folder
-from suave_des.results.comparison import estimate_in, rows_of
+from suave_des.resources import find
+from suave_des.results.real import PAPERS_RUNS
 from suave_des.results.statistics import difference_interval
-from suave_des.results.validation import sample
+from suave_des.results.validation import interval_column, sample, table_of
 from suave_des.tables import Table, markdown_text
 
 _CLAIMS = {SEARCH_TIME: "find the pipeline sooner", DISTANCE: "inspect more of it"}
@@ -33,8 +34,8 @@ class PaperComparison:
 
     Attributes:
         figures: a row for each manager, in the order of the paper's table, metric, and statistic ("mean" or "std"): the
-            paper's figure (paper) and ours (here), each with the ends of its 95% interval; nan where there are too few
-            missions.
+            paper's figure (paper) and ours (here), each with the ends of its 95% interval, and difference (here -
+            paper); nan where there are too few missions; mark: whether ours is outside the paper's interval.
         published: missions behind the paper's table.
         ours: missions of the same managers.
     """
@@ -44,33 +45,29 @@ class PaperComparison:
     ours: pandas.DataFrame
 
     @property
-    def managers(self) -> Sequence[str]:
+    def managers(self) -> list[str]:
         """In the order of the paper's table."""
         return list(self.figures["manager"].unique())
 
     def table(self, metric: str = "") -> Table:
         """Return the figures as text; of one metric or, with a column for that, of both."""
-        rows = []
-        for row in rows_of(self.figures[self.figures["metric"].isin([metric] if metric else PAPER_METRICS)]):
-            paper, ours = estimate_in(row, "paper"), estimate_in(row, "here")
-            is_known = row["here"] is not None
-            figures = (f"{paper.value:.2f}", paper.text(".1f"), f"{ours.value:.2f}" if is_known else "")
-            apart = f"{ours.value - paper.value:+.2f}" if is_known else ""
-            mark = MARK if is_known and not paper.contains(ours.value) else ""
-            names = (row["manager"], *([] if metric else [METRICS[row["metric"]].heading]), row["statistic"])
-            rows.append((*names, *figures, ours.text(".1f"), apart, mark))
-        names = ("manager", "") if metric else ("manager", "metric", "")
-        headings = (*names, "paper", "95% interval", "here", "95% interval", "difference", "")
-        return Table(headings, rows, METRICS[metric].heading if metric else "", f"{'l' * len(names)}rrrrrl")
+        own = self.figures[self.figures["metric"].isin([metric] if metric else PAPER_METRICS)]
+        names = [("manager", "{manager}"), ("metric", "{of.heading}"), ("", "{statistic}")]
+        columns = ("paper", "{paper:.2f}"), interval_column("paper", ".1f"), ("here", "{here:.2f}")
+        apart = interval_column("here", ".1f"), ("difference", "{difference:+.2f}"), ("", "{mark}")
+        if metric:
+            del names[1]
+        title = METRICS[metric].heading if metric else ""
+        return table_of(own, title, f"{'l' * len(names)}rrrrrl", *names, *columns, *apart)
 
     def remarks(self) -> Iterator[str]:
         """Summarise the comparison in sentences."""
         sizes = self._sizes(self.published), self._sizes(self.ours)
         yield f"Paper: {sizes[0]}. Here: {sizes[1]}. Difference = here - paper."
-        known = self.figures.dropna(subset="here")
-        inside = int(known["here"].between(known["paper_ci95_low"], known["paper_ci95_high"]).sum())
-        rest = f"; those marked {MARK} do not" if inside < len(known) else ""
-        yield f"{inside} of {number_of(len(known), 'figure')} lie in the 95% intervals of the paper's{rest}."
+        marks = self.figures.loc[self.figures["here"].notna(), "mark"]
+        inside = int((marks == "").sum())
+        rest = f"; those marked {MARK} do not" if inside < len(marks) else ""
+        yield f"{inside} of {number_of(len(marks), 'figure')} lie in the 95% intervals of the paper's{rest}."
         yield (
             "Intervals: Student's t for means; chi-square for standard deviations, a rough guide only, because it"
             " assumes normally distributed values."
@@ -105,11 +102,6 @@ class PaperComparison:
         return "\n\n".join([self.table().markdown(), *map(markdown_text, self.remarks())]) + "\n"
 
 
-def published_runs() -> Path:
-    """Locate the shipped file of published runs."""
-    return shipped_folder("scenarios") / "published" / "seams2023_runs.csv"
-
-
 @plain_arguments
 def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) -> PaperComparison:
     """Compare the missions of a campaign with published figures.
@@ -121,7 +113,7 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
     Raises:
         InputError: the file cannot be read, or has fewer than two runs of a manager.
     """
-    theirs = in_papers_order(read_runs(published or published_runs()).frame)
+    theirs = in_papers_order(read_runs(published or find(PAPERS_RUNS, "scenarios/published")).frame)
     rows = []
     for manager in theirs["manager"].unique():
         for metric in PAPER_METRICS:
@@ -132,4 +124,8 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
                     raise InputError(problem, place=metric, remedy="an interval needs two or more")
                 row = {"manager": manager, "metric": metric, "statistic": statistic}
                 rows.append(row | paper.columns("paper") | here.columns("here"))
-    return PaperComparison(pandas.DataFrame(rows), theirs, runs)
+    figures = pandas.DataFrame(rows)
+    here = figures["here"]
+    is_outside = (here < figures["paper_ci95_low"]) | (here > figures["paper_ci95_high"])
+    figures = figures.assign(difference=here - figures["paper"], mark=np.where(is_outside, MARK, ""))
+    return PaperComparison(figures, theirs, runs)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from string import Formatter
 from types import MappingProxyType
 from typing import Any
 
@@ -28,7 +29,7 @@ from suave_des.tables import Table
 COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
 _LEAST_AGREEMENT = 0.5
-_TARGET = ("kind", "subject", "what", "value", "low", "high", "met")
+_TARGET = ("kind", "subject", "what", "value", "low", "high")
 _SIGNIFICANT_DIGITS = 8
 
 _Generators = Callable[[str], np.random.Generator]
@@ -157,8 +158,8 @@ def validate(
     if CONDITION in published and CONDITION in simulated:
         simulated = balanced(published, simulated, managers)
     sides = [side[side["manager"].isin(managers)] for side in (published, simulated)]
-    not_found_s = common_limit(*sides)
-    real, ours = sides = [with_limit(side, not_found_s) for side in sides]
+    not_found_s, sides = _with_common_limit(sides)
+    real, ours = sides
     samples = {
         (metric, manager): both
         for metric in COMPARED
@@ -166,6 +167,7 @@ def validate(
         if all(map(len, both := [sample(side, manager, metric) for side in sides]))
     }
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
+    cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")  # so narrow that none needs it
     pairs = pandas.DataFrame(
         [
             _pair(pair, metric, [samples[metric, name] for name in pair], generators)
@@ -175,32 +177,31 @@ def validate(
     )
     counted = compare_shares(shares, real, ours, managers)
     conditions = compare_conditions(real, ours, managers, COMPARED)
-    targets = _judged(_targets(cells, pairs, counted, over_conditions(conditions), limits))
+    required = _targets(cells, pairs, counted, over_conditions(conditions), limits)
+    targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
+    value, low, high = targets["value"], targets["low"].fillna(-math.inf), targets["high"].fillna(math.inf)
+    targets["met"] = value.between(low, high).astype(object).where(value.notna(), None)
     return Validation(tuple(managers), cells, pairs, counted, conditions, targets, not_found_s)
 
 
-def common_limit(*sides: pandas.DataFrame) -> float | None:
-    """Return one search time for all missions that are known not to have found the pipeline; none if there are none.
+def _with_common_limit(sides: list[pandas.DataFrame]) -> tuple[float | None, list[pandas.DataFrame]]:
+    """Give all missions that are known not to have found the pipeline one search time; none if there are none.
 
     Programs write different numbers for them, such as 250 and 251 s with a limit of 250 s, which a test of
     distributions would take for a difference. It is the median of those numbers on the last side that has some, but
     at least as great as every search time with success.
     """
-    not_found = [side.loc[~_found(side), SEARCH_TIME] for side in sides]
-    numbers = next((each for each in reversed(not_found) if len(each)), None)
+    found = [side[FOUND].astype("Float64").fillna(1.0) != 0.0 for side in sides]
+    lost = [side.loc[~is_found, SEARCH_TIME] for side, is_found in zip(sides, found, strict=True)]
+    numbers = next((each for each in reversed(lost) if len(each)), None)
     if numbers is None:
-        return None
-    return max(float(numbers.median()), *(float(side.loc[_found(side), SEARCH_TIME].max()) for side in sides))
-
-
-def with_limit(runs: pandas.DataFrame, limit_s: float | None) -> pandas.DataFrame:
-    """Return missions with the same search time for all that are known not to have found the pipeline."""
-    return runs if limit_s is None else runs.assign(**{SEARCH_TIME: runs[SEARCH_TIME].where(_found(runs), limit_s)})
-
-
-def _found(runs: pandas.DataFrame) -> pandas.Series[bool]:
-    """Whether missions found the pipeline, or may have."""
-    return runs[FOUND].astype("Float64").fillna(1.0) != 0.0
+        return None, sides
+    longest_s = [side.loc[is_found, SEARCH_TIME].max() for side, is_found in zip(sides, found, strict=True)]
+    limit_s = max(float(numbers.median()), *map(float, longest_s))
+    both = zip(sides, found, strict=True)
+    return limit_s, [
+        side.assign(**{SEARCH_TIME: side[SEARCH_TIME].where(is_found, limit_s)}) for side, is_found in both
+    ]
 
 
 def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
@@ -215,11 +216,6 @@ def _described(name: str, sample: Sample) -> dict[str, Any]:
     return {f"{name}_n": len(values), **row, f"{name}_median": float(np.median(sample)) if values else None}
 
 
-def _without_intervals(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
-    left_out = {end for name in names for end in interval_names(name)}
-    return {name: value for name, value in row.items() if name not in left_out}
-
-
 def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Generators) -> dict[str, Any]:
     """Compare the real and the simulated sample of a manager."""
     real, ours = samples
@@ -231,7 +227,7 @@ def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Gen
         "manager": manager,
         "metric": metric,
         **_described("published", real),
-        **_without_intervals(_described("simulated", ours), "simulated_std"),  # known so well that nothing needs it
+        **_described("simulated", ours),
         **statistics.difference_interval(ours, real).columns("difference_of_means"),
         **statistics.ratio_interval(real, ours, rng).columns("std_ratio"),
         **{"ks_distance": float(ks.statistic), "ks_p": float(ks.pvalue)},
@@ -375,7 +371,7 @@ def _targets(
     within: pandas.DataFrame,
     limits: Mapping[str, ConditionLimits],
 ) -> Iterator[tuple[Any, ...]]:
-    """Yield the requirements, with the columns of _TARGET but met.
+    """Yield the requirements, with the columns of _TARGET.
 
     The mean lies in the 95% t interval of the published one, the std in its chi-square interval; the KS p is 0.05 or
     more; at least half the subsamples as large as the published samples lead to the published conclusion; shares and
@@ -394,22 +390,11 @@ def _targets(
         if (low := each["target_low"]) == low:
             yield "share", each["manager"], each["name"], each["simulated_share"], low, each["target_high"]
     for each in within.to_dict("records"):
-        limit = limits.get(each["metric"])
-        if each["manager"] == "all" and limit is not None:
-            if limit.median_difference is not None:
-                value, most = each["difference"], limit.median_difference
-                yield "condition_median", "all", each["metric"], value, None, most
-            if limit.std_ratio is not None:
-                yield "condition_std", "all", each["metric"], each["std_ratio"], None, limit.std_ratio
-
-
-def _judged(found: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
-    """Say of each requirement whether its value lies between two ends, of which one may be open."""
-    rows = []
-    for *names, value, low, high in found:
-        value, low, high = (math.nan if each is None else float(each) for each in (value, low, high))
-        rows.append((*names, value, low, high, None if value != value else not (value < low or value > high)))
-    return pandas.DataFrame(rows, columns=_TARGET).astype({"met": object})
+        if each["manager"] == "all" and (limit := limits.get(each["metric"])) is not None:
+            most = (limit.median_difference, limit.std_ratio)
+            for kind, name, high in zip(("median", "std"), ("difference", "std_ratio"), most, strict=True):
+                if high is not None:
+                    yield f"condition_{kind}", "all", each["metric"], each[name], None, high
 
 
 # Tables
@@ -425,59 +410,58 @@ _KINDS = {
 }
 
 
-class _Number(float):
-    """A number of a row, written as nothing where it is missing; the styles "p" and "share" are our own."""
+class _Cells(Formatter):
+    """Writes values of a row into a template: nothing for a missing one; the styles "p" and "share" are our own."""
 
-    def __new__(cls, value: float | None) -> _Number:
-        return super().__new__(cls, math.nan if value is None else value)
-
-    def __format__(self, style: str) -> str:
-        if self != self:
+    def format_field(self, value: Any, style: str) -> str:
+        """Write a value."""
+        if value is None or value != value:
             return ""
         if style == "share":
-            return percent(self)
-        if style == "p":
-            style = ".3f" if self >= 0.001 else ".0e"
-        return format(float(self), style)
+            return percent(value)
+        return format(value, style if style != "p" else ".3f" if value >= 0.001 else ".0e")
 
 
-def _table(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
+_CELLS = _Cells()
+
+
+def table_of(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
     """Fill a table with the rows of a frame; each column has a heading and a template for its cells."""
     rows = []
     for row in rows_of(frame):
-        values = {name: each if isinstance(each, str) else _Number(each) for name, each in row.items()}
-        values["brief"] = METRICS[row["metric"]].brief if "metric" in row else ""
-        cells = (template.format_map(values) for _, template in columns)
+        values = {"of": METRICS.get(row.get("metric", "")), **row}
+        cells = (_CELLS.vformat(template, (), values) for _, template in columns)
         rows.append(["" if cell == " to " else cell for cell in cells])
     return Table([heading for heading, _ in columns], rows, title, align)
 
 
-def _interval(name: str, style: str) -> tuple[str, str]:
+def interval_column(name: str, style: str) -> tuple[str, str]:
+    """Return the heading and the template of a column with the interval of a value."""
     low, high = interval_names(name)
     return "95% interval", f"{{{low}:{style}}} to {{{high}:{style}}}"
 
 
 def _tables(validation: Validation, real: str) -> Iterator[Table]:
     runs = "real runs" if real == "real" else real
-    head = ("metric", "{brief}"), ("manager", "{manager}")
+    head = ("metric", "{of.brief}"), ("manager", "{manager}")
     numbers = [
         [(name, f"{{{side}_{name}:{'.0f' if name == 'n' else '.2f'}}}") for name in ("n", "mean", "std", "median")]
         for side in ("published", "simulated")
     ]
     title = f"Samples: {runs}, then simulated"
-    yield _table(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
+    yield table_of(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
     title = f"Simulated compared with {runs} (difference = simulated - {real})"
     columns: tuple[tuple[str, str], ...] = (
         ("difference of means", "{difference_of_means:+.2f}"),
-        _interval("difference_of_means", "+.1f"),
+        interval_column("difference_of_means", "+.1f"),
     )
-    ratio = ("std ratio", "{std_ratio:.2f}"), _interval("std_ratio", ".2f")
+    ratio = ("std ratio", "{std_ratio:.2f}"), interval_column("std_ratio", ".2f")
     tests = ("KS p", "{ks_p:p}"), ("AD p", "{ad_p:p}")
-    yield _table(validation.cells, title, "ll", *head, *columns, *ratio, *tests)
+    yield table_of(validation.cells, title, "ll", *head, *columns, *ratio, *tests)
     title = f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size"
     columns = (head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}"))
     better = (f"{real}: better", "{published_better}"), ("simulated agrees", "{agreement:share}")
-    yield _table(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better)
+    yield table_of(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better)
     title = f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)"
     shares = validation.shares
     if len(shares):
@@ -486,12 +470,12 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
         shares = shares.assign(mark=np.where((share < low) | (share > high), "*", ""))
     count = real, "{published_count:.0f} of {published_n:.0f}"
     simulated = ("simulated", "{simulated_share:share}"), ("", "{mark}")
-    interval = _interval("published_share", ".0%")
-    yield _table(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
+    interval = interval_column("published_share", ".0%")
+    yield table_of(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
     stds = (f"std: {real}", "{real_std:.2f}"), ("simulated", "{simulated_std:.2f}"), ("ratio", "{std_ratio:.2f}")
     columns = (*head, ("|difference|", "{difference:.2f}"), *stds)
     within = over_conditions(validation.conditions)
-    yield _table(within, "Within conditions: medians over the conditions", "ll", *columns)
+    yield table_of(within, "Within conditions: medians over the conditions", "ll", *columns)
     rows = [_target(each) for each in rows_of(validation.targets)]
     yield Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl")
 
@@ -500,6 +484,6 @@ def _target(each: Row) -> tuple[str, ...]:
     kind = each["kind"]
     what = f"{METRICS[each['what']].brief}: {_KINDS[kind]}" if kind in _KINDS else each["what"]
     style = ".0%" if kind in ("conclusion", "share") else ".2f"
-    value, low, high = (format(_Number(each[name]), style) for name in ("value", "low", "high"))
+    value, low, high = (_CELLS.format_field(each[name], style) for name in ("value", "low", "high"))
     must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else ""
     return each["subject"], what, value, must_be, _VERDICTS[each["met"]]
