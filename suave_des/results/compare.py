@@ -139,9 +139,9 @@ class CampaignFrame(pandas.DataFrame):
         Raises:
             InputError: there is no such kind of figure.
         """
-        from suave_des.results.figures import draw_frame
+        from suave_des.results.figures import draw_missions
 
-        return draw_frame(self, kind)
+        return draw_missions(missions_in(self), kind)
 
 
 def compare(

@@ -21,7 +21,6 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
-from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, shown, unknown
@@ -29,7 +28,7 @@ from suave_des.estimates import mean_of
 from suave_des.files import write_files
 from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
-from suave_des.records.missions import Missions, missions_of, read_missions
+from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
 from suave_des.results.groups import (
     Group,
@@ -41,7 +40,6 @@ from suave_des.results.groups import (
     runs_sharing_draw,
 )
 from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
-from suave_des.results.statistics import Sample
 from suave_des.results.style import folded, key_words, value_words
 
 ENDINGS = (".png", ".pdf", ".svg")
@@ -56,15 +54,6 @@ _DOTS = 400
 """More differences are drawn as so many, evenly taken in the order of their values."""
 _EACH_WITH_EACH = 4
 """More groups have too many pairs for one figure."""
-_MEAN: dict[str, Any] = {
-    "fmt": "D",
-    "ms": 3,
-    "mfc": "white",
-    "mew": 0.8,
-    "elinewidth": 1.2,
-    "capsize": 2.5,
-    "color": "k",
-}
 
 
 def draw_distributions(drawn: Groups) -> style.Picture:
@@ -84,27 +73,17 @@ def draw_distributions(drawn: Groups) -> style.Picture:
             mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
             axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
-    _mark_limit(figure.axes[0], drawn)
-    figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
-    figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
+    times = figure.axes[0]
+    if any((group.frame[FOUND] < 1.0).any() for group in groups):
+        times.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+        note: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
+        times.text(drawn.time_limit_s, 0.03, "not found ", transform=times.get_xaxis_transform(), **note)
+    times.set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
+    times.yaxis.set_major_formatter(PercentFormatter(1.0))
     curves = [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
     handles = [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
     _legend(figure, handles, labels)
     return figure
-
-
-def _mark_limit(axes: Axes, drawn: Groups) -> None:
-    """Mark the end of missions that never found the pipeline on an axis of search times, if there are any."""
-    if any((group.frame[FOUND] < 1.0).any() for group in drawn.groups):
-        axes.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
-        look: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
-        axes.text(drawn.time_limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
-
-
-def _jitter(number: int, height: float) -> NDArray[np.floating]:
-    """Spread points evenly over a height by the golden ratio: no random numbers, equal data give equal figures."""
-    places: NDArray[np.floating] = height * ((np.arange(number) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0)
-    return places
 
 
 def draw_differences(drawn: Groups) -> style.Picture:
@@ -156,14 +135,17 @@ def _draw_row_of_differences(
 ) -> None:
     values = apart.sort_values(kind="stable").to_numpy()
     rain = values[np.unique(np.linspace(0, len(values) - 1, _DOTS).astype(int))]
-    axes.plot(rain, row + 0.08 + _jitter(len(rain), 0.24), "o", color=colour, ms=2.4, alpha=0.6, mew=0)
+    # Spread over a height by the golden ratio, without random numbers: equal data give equal figures.
+    beside = 0.24 * ((np.arange(len(rain)) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0)
+    axes.plot(rain, row + 0.08 + beside, "o", color=colour, ms=2.4, alpha=0.6, mew=0)
     found = mean_of(values.tolist())
     errors = [[found.value - found.low], [found.high - found.value]] if found.has_interval else None
-    axes.errorbar(found.value, row - 0.1, xerr=errors, **_MEAN)
+    look: dict[str, Any] = {"fmt": "D", "ms": 3, "mfc": "white", "mew": 0.8, "elinewidth": 1.2, "capsize": 2.5}
+    axes.errorbar(found.value, row - 0.1, xerr=errors, color="k", **look)
     ends = zip(least_and_greatest(apart), (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
-        look: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
-        axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **look)
+        place: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
+        axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **place)
 
 
 def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
@@ -179,8 +161,8 @@ def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
     return zip(style.looks([group.name for group in groups]), groups, strict=True)
 
 
-def _label(group: Group, width: int = 40) -> str:
-    return style.text(folded(f"{group.name} (n = {len(group.frame):,})", width))
+def _label(group: Group) -> str:
+    return style.text(folded(f"{group.name} (n = {len(group.frame):,})"))
 
 
 def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
@@ -189,17 +171,13 @@ def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[s
 
 def _legend_columns(labels: Sequence[str]) -> int:
     """Return the number of columns with which a legend fits the width of a figure."""
-    most = len(labels) if len(labels) <= 4 else 3
-    widths_in = [_HANDLE_IN + _text_width_in(label) for label in labels]
-    for columns in range(most, 1, -1):
+    font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
+    parts = [[TextPath((0.0, 0.0), part, prop=font) for part in label.split("\n")] for label in labels]
+    widths_in = [_HANDLE_IN + max(float(part.get_extents().x1) for part in each) / 72.0 for each in parts]
+    for columns in range(len(labels) if len(labels) <= 4 else 3, 1, -1):
         if sum(max(column) for column in np.array_split(widths_in, columns)) <= style.WIDTH_IN:
             return columns
     return 1
-
-
-def _text_width_in(label: str) -> float:
-    font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
-    return max(float(TextPath((0.0, 0.0), part, prop=font).get_extents().x1) for part in label.split("\n")) / 72.0
 
 
 # Sweeps
@@ -356,16 +334,11 @@ def _draw_panel(
         long = max(map(len, words)) > 6 and len(words) > 2
         axes.set_xticks(range(len(words)), shown_words, rotation=30 if long else 0, ha="right" if long else "center")
         axes.set_xlim(-0.5, len(words) - 0.5)
-    elif _fit_as_ticks(values := np.unique(places)):
+    elif 1 < len(values := np.unique(places)) <= _MOST_TICKS and np.diff(values).min() > np.ptp(values) / _MOST_TICKS:
         axes.set_xticks(values, [f"{value:g}" for value in values])
     else:
         axes.xaxis.set_major_locator(MaxNLocator(4))
     return counts
-
-
-def _fit_as_ticks(values: Sample) -> bool:
-    """Return whether swept values are few enough, and far enough apart, to be written at the axis."""
-    return 1 < len(values) <= _MOST_TICKS and bool(np.diff(values).min() > np.ptp(values) / _MOST_TICKS)
 
 
 def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
@@ -419,6 +392,7 @@ def draw_folder(folder: str | Path, out: str | Path) -> None:
     draw_results([Path(folder)], Path(out))
 
 
+@style.publication()
 def draw_results(
     folders: Sequence[Path],
     out: Path,
@@ -439,16 +413,15 @@ def draw_results(
         InputError: there are no results of that kind in the folders, or the picture cannot be written.
     """
     check_picture(out)
-    with style.publication():
-        if not (folders[0] / TRAJECTORY_FILE).is_file():
-            figure = _of_missions(read_missions(folders), kind, parameters)
-        elif len(folders) > 1:
-            problem = "has a mission, of which one is drawn at a time"
-            raise InputError(problem, file=folders[0], remedy="give one folder")
-        else:
-            record = read_mission(folders[0])
-            figure = draw_mission(record, MAP if kind == AUTO else kind, rules_of(record) if kind == TIMELINE else {})
-        write_picture(figure, out)
+    if not (folders[0] / TRAJECTORY_FILE).is_file():
+        figure = draw_missions(read_missions(folders), kind, parameters)
+    elif len(folders) > 1:
+        problem = "has a mission, of which one is drawn at a time"
+        raise InputError(problem, file=folders[0], remedy="give one folder")
+    else:
+        record = read_mission(folders[0])
+        figure = draw_mission(record, MAP if kind == AUTO else kind, rules_of(record) if kind == TIMELINE else {})
+    write_picture(figure, out)
 
 
 def check_picture(out: Path) -> None:
@@ -478,6 +451,7 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
     write_files(out.parent, {out.name: picture.getvalue()})
 
 
+@style.publication()
 def draw_mission(record: MissionRecord, kind: str = MAP, rules: Rules = MappingProxyType({})) -> Figure:
     """Draw a mission.
 
@@ -491,21 +465,16 @@ def draw_mission(record: MissionRecord, kind: str = MAP, rules: Rules = MappingP
     """
     if kind not in (MAP, TIMELINE):
         raise unknown(f"there is no figure {shown(kind)} of a mission", kind, (MAP, TIMELINE), place="kind")
-    with style.publication():
-        return draw_timeline(record, rules) if kind == TIMELINE else draw_map(record)
+    return draw_timeline(record, rules) if kind == TIMELINE else draw_map(record)
 
 
-def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
-    """Draw the missions of a data frame with the columns of runs.csv.
+@style.publication()
+def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str] = ()) -> Figure:
+    """Draw missions: the means of a sweep, or of others the distributions, unless another kind is asked for.
 
     Raises:
-        InputError: there is no such figure of a campaign, or the frame lacks what it needs.
+        InputError: there is no such figure of a campaign, or the missions lack what it needs.
     """
-    with style.publication():
-        return _of_missions(missions_of(frame), kind, ())
-
-
-def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:
     if kind in (SWEEP, HEAT_MAP) or (kind == AUTO and missions.swept):
         if not missions.swept:
             raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")

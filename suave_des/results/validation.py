@@ -431,7 +431,7 @@ def table_of(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[st
     for row in rows_of(frame):
         values = {"of": METRICS.get(row.get("metric", "")), **row}
         cells = (_CELLS.vformat(template, (), values) for _, template in columns)
-        rows.append(["" if cell == " to " else cell for cell in cells])
+        rows.append(tuple("" if cell == " to " else cell for cell in cells))
     return Table([heading for heading, _ in columns], rows, title, align)
 
 

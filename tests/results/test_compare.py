@@ -12,11 +12,12 @@ from scipy import stats
 from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
+from suave_des.resources import find
 from suave_des.results.compare import Choices, compare_folders, compare_frame
 from suave_des.results.comparison import Comparison
-from suave_des.results.paper import published_runs
 from tests.helpers.compared import difference, interval, row, rows
 
+PUBLISHED = find("seams2023_runs.csv", "scenarios/published")
 MANAGERS = ("none", "random", "metacontrol")
 
 
@@ -33,7 +34,7 @@ def summary(comparison: Comparison, group: str, metric: str = "search_time_s") -
 
 @pytest.fixture(scope="module")
 def published() -> Comparison:
-    return compare_folders([published_runs()])
+    return compare_folders([PUBLISHED])
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +72,7 @@ class TestPublishedRuns:
         ]
 
     def test_p_values_are_scipys(self, published):
-        frame = pandas.read_csv(published_runs())
+        frame = pandas.read_csv(PUBLISHED)
         count = 0
         for first in MANAGERS:
             for second in MANAGERS[MANAGERS.index(first) + 1 :]:
@@ -226,7 +227,10 @@ def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(camp
     assert str(comparison).count(f"suave-des replay {campaign} --run {apart.abs().idxmax()} --managers bt,none") == 1
     frame = compare_frame(pandas.read_csv(campaign / "runs.csv"))
     assert frame.largest.rows and "replay" not in str(frame)
-    for unpaired in (compare_folders([published_runs()]), compare_folders([campaign], unpaired=True)):
+    for unpaired in (
+        compare_folders([PUBLISHED]),
+        compare_folders([campaign], unpaired=True),
+    ):
         assert not unpaired.largest.rows
 
 
@@ -323,7 +327,7 @@ class TestCaveats:
 )
 def test_a_choice_that_makes_no_sense_is_refused(choices, words):
     with pytest.raises(InputError, match=words):
-        compare_folders([published_runs()], **choices)
+        compare_folders([PUBLISHED], **choices)
 
 
 def test_the_frame_of_a_campaign_is_compared_and_drawn():

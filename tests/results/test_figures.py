@@ -13,12 +13,13 @@ from suave_des.errors import InputError
 from suave_des.estimates import mean_of
 from suave_des.records.mission_folder import MissionRecord, read_mission
 from suave_des.records.missions import missions_of, read_missions
+from suave_des.resources import find
 from suave_des.results import style
 from suave_des.results.figures import (
     draw_distributions,
     draw_folder,
-    draw_frame,
     draw_heat_map,
+    draw_missions,
     draw_results,
     draw_sweep,
     write_picture,
@@ -26,7 +27,6 @@ from suave_des.results.figures import (
 from suave_des.results.groups import grouped
 from suave_des.results.mission import adaptations, failure_spans, mode_spans
 from suave_des.results.mission_figures import draw_map, draw_timeline
-from suave_des.results.paper import published_runs
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +212,7 @@ def test_a_long_name_is_shown_whole(kind, campaign, tmp_path):
     frame = read_missions([campaign]).frame
     frame = frame.assign(manager=frame["manager"].astype(str) + LONG)
     with style.publication():
-        figure = draw_frame(frame, kind)
+        figure = draw_missions(missions_of(frame), kind)
         figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
         width_px = figure.bbox.width
         texts = [each for each in figure.findobj(Text) if LONG[:8] in each.get_text()]
@@ -240,7 +240,7 @@ def texts_of(figure: Figure) -> list[str]:
 
 
 def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits):
-    texts = texts_of(draw_frame(two_limits, "distributions"))
+    texts = texts_of(draw_missions(missions_of(two_limits), "distributions"))
     assert "none (n = 4)" in texts
     assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
 
@@ -251,7 +251,7 @@ class TestDifferences:
     def test_show_each_run_the_mean_and_the_runs_at_the_ends(self):
         frame = sweep_frame(1, 5).drop(columns=["start.x_m", "start.y_m"])
         other = frame.assign(manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0])
-        axes = draw_frame(pandas.concat([frame, other]), "differences").axes[0]
+        axes = draw_missions(missions_of(pandas.concat([frame, other])), "differences").axes[0]
         rain = next(line for line in axes.get_lines() if len(line.get_xdata()) == 5)
         assert sorted(rain.get_xdata()) == [1.0, 2.0, 3.0, 4.0, 40.0]
         assert [text.get_text() for text in axes.texts] == ["run 1", "run 5"]
@@ -260,13 +260,13 @@ class TestDifferences:
 
     def test_of_a_sweep_are_of_means_of_runs(self, two_limits):
         both = pandas.concat([two_limits, two_limits.assign(manager="other")])
-        texts = texts_of(draw_frame(both, "differences"))
+        texts = texts_of(draw_missions(missions_of(both), "differences"))
         assert any(text.endswith("other (n = 2)") for text in texts)
         assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
 
     def test_need_runs_with_the_same_random_numbers(self):
         with pytest.raises(InputError, match="share their random numbers"):
-            draw_frame(read_missions([published_runs()]).frame, "differences")
+            draw_missions(read_missions([find("seams2023_runs.csv", "scenarios/published")]), "differences")
 
 
 def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs():
