@@ -1,16 +1,25 @@
-"""Tables of text, and how each form of output writes them: terminal, Markdown, LaTeX, CSV, and HTML."""
+"""Tables of text, results that have tables, and how each form of output writes them: terminal, Markdown, LaTeX, CSV."""
 
 from __future__ import annotations
 
+import json
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from suave_des.files import csv_text
 
+if TYPE_CHECKING:
+    import pandas
+
 _LEAST_WIDTH = 12
 """A column of text is not made narrower than this, so that a table may be wider than it should be."""
+EFFECT = "effect"
+"""Heading of the widest column, the last one, which goes where the table would be too wide."""
 _BREAKS = re.compile(r"(?<=[:_./-])|(?<= )(?=[^\s=\d])|(?<=[^\W\d_A-ZÀ-Þ])(?=[A-ZÀ-Þ])")
 """Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a capital within a word."""
 _MARKDOWN = str.maketrans({**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"})
@@ -145,6 +154,112 @@ class Table:
 
     def _repr_html_(self) -> str:
         return self.html()
+
+
+class Section(NamedTuple):
+    """A part of what is written: tables under a title, what is said below them, and what follows from them."""
+
+    title: str
+    tables: Sequence[Table]
+    sentences: Sequence[str] = ()
+    below: str = ""
+
+
+class Written(ABC):
+    """Results that are written as text, Markdown, LaTeX, CSV and JSON."""
+
+    conclusion: str
+    notes: tuple[str, ...]
+
+    @abstractmethod
+    def sections(self) -> Iterator[Section]:
+        """Yield the tables of each metric, and others."""
+
+    @abstractmethod
+    def remarks(self) -> list[str]:
+        """Describe how the results were found, and what to know about the data."""
+
+    @abstractmethod
+    def frames(self) -> dict[str, pandas.DataFrame]:
+        """Return the statistics by what JSON calls them."""
+
+    def written(self, form: str, width: int = 95) -> str:
+        """Write the result as "table", which is text of that width, "csv", "json", "markdown" or "latex"."""
+        if form == "table":
+            return self.text(width)
+        writers = {"csv": self.csv, "json": self.json, "markdown": self.markdown, "latex": self.latex}
+        return writers[form]()
+
+    def text(self, width: int = 95) -> str:
+        """Write the conclusions, the tables, and the remarks, for a terminal of that width."""
+        parts = [folded(self.conclusion, width)]
+        for title, tables, sentences, below in self.sections():
+            for place, table in enumerate(tables):
+                heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
+                fits = table.headings[-1] != EFFECT or table.width() <= width
+                shown = table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
+                parts.append(heading + shown.text(width) + (f"\n{below}" if below else ""))
+            parts.append("\n".join(folded(f"- {each}", width) for each in sentences))
+        parts.append("\n".join(folded(line, width) for line in self.remarks()))
+        return "\n\n".join(filter(None, parts)) + "\n"
+
+    def __str__(self) -> str:
+        """Return all of it as text, as `suave-des compare` prints it."""
+        return self.text()
+
+    def markdown(self) -> str:
+        """Write the tables and the conclusions, for a page."""
+        parts = [markdown_text(self.conclusion)]
+        for title, tables, sentences, below in self.sections():
+            parts.append(f"### {capital(title)}" if title else "")
+            for table in tables:
+                parts += [f"{capital(table.title)}:" if table.title else "", table.markdown(), markdown_text(below)]
+            parts.append("\n".join(f"- {markdown_text(each)}" for each in sentences))
+        return "\n\n".join(filter(None, [*parts, *map(markdown_text, self.remarks())])) + "\n"
+
+    def _repr_markdown_(self) -> str:
+        return self.markdown()
+
+    def latex(self) -> str:
+        """Write the tables for LaTeX with booktabs."""
+        tables = [Table(each.headings, each.rows, title) for title, own, *_ in self.sections() for each in own]
+        notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
+        parts = [table.latex(note=note) for table, note in zip(tables, notes, strict=True)]
+        return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
+
+    def csv(self) -> str:
+        """Write all statistics as one table."""
+        import pandas  # takes a while, and most tables need none
+
+        frames = [each.astype(object) for each in self.frames().values() if len(each)]
+        frame = pandas.concat(frames or [pandas.DataFrame()])
+        if "other" in frame:
+            frame.insert(1, "other", frame.pop("other"))
+        return frame.to_csv(index=False, lineterminator="\n")
+
+    def json(self) -> str:
+        """Write all of it; numbers with all their digits, null where there is none."""
+        return json.dumps(self._content(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def _content(self) -> dict[str, Any]:
+        about = {"conclusion": self.conclusion, "notes": self.notes}
+        return about | {name: rows_of(frame) for name, frame in self.frames().items()}
+
+
+def rows_of(frame: pandas.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a frame as plain data."""
+    found: list[dict[str, Any]] = frame.astype(object).where(frame.notna(), None).to_dict("records")  # type: ignore[assignment]
+    return found
+
+
+def folded(text: str, width: int) -> str:
+    """Break a paragraph into lines for a terminal of that width."""
+    return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
+
+
+def capital(text: str) -> str:
+    """Begin a text with a capital, and leave the rest as it is."""
+    return text[:1].upper() + text[1:]
 
 
 def broken_name(name: str, width: int, indent: str = "  ") -> str:

@@ -18,11 +18,10 @@ from rich.text import Text
 
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
-from suave_des.tables import Table
+from suave_des.tables import Table, Written
 
 if TYPE_CHECKING:
     from suave_des.metrics.result import MissionMetrics, MissionResult
-    from suave_des.results.comparison import Written
 
 TEXT_WIDTH = 95
 """Columns of text at most, which is hard to read in longer lines."""

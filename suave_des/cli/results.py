@@ -32,8 +32,8 @@ from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.records.mission_folder import MissionRecord
-    from suave_des.results.comparison import Written
     from suave_des.results.mission_figures import Rules
+    from suave_des.tables import Written
 
 
 CompareFormat = Literal["table", "csv", "json", "markdown", "latex"]

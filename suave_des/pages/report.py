@@ -27,9 +27,9 @@ from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.missions import Missions, read_missions
 from suave_des.records.store import read_manifest
 from suave_des.results.compare import compare
-from suave_des.results.comparison import capital
 from suave_des.results.groups import grouped
 from suave_des.results.style import looks
+from suave_des.tables import capital
 
 LIMIT_BYTES: Final = 5_000_000
 PATHS: Final = 12

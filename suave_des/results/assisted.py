@@ -21,11 +21,11 @@ from suave_des.estimates import STUDENT, Estimate, t_quantile
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.records.missions import Missions
 from suave_des.results import statistics
-from suave_des.results.comparison import Row, Section, Written, capital, difference_claim, estimate_in, rows_of
+from suave_des.results.comparison import Row, estimate_in
 from suave_des.results.groups import Groups, first_alike, runs_sharing_draw
 from suave_des.results.real import CONDITION, matched
 from suave_des.results.statistics import Sample
-from suave_des.tables import Table
+from suave_des.tables import Section, Table, Written, capital, rows_of
 
 LEAST_CONDITIONS = 3
 LEAST_TO_WEIGH = 10
@@ -245,7 +245,7 @@ def _conclusion(row: Row, metric: Metric) -> str:
     """Write what an estimate shows, and whether the simulation helped."""
     found, interval = estimate_in(row, "assisted"), metric.interval
     if row["other"] and found.has_interval and not found.contains(0.0):
-        claim = difference_claim(row["group"], row["other"], found.value, metric)
+        claim = metric.claim(row["group"], row["other"], found.value)
         found = found if found.value > 0.0 else -found
     else:
         is_share = metric.name == FOUND and not row["other"]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from textwrap import fill
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas
 
@@ -17,13 +14,11 @@ from suave_des.estimates import Estimate, interval_names
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.results.groups import Groups, listed
 from suave_des.results.statistics import A12, FISHER, MANN_WHITNEY, MCNEMAR, RANK_BISERIAL, SIGNIFICANCE, WILCOXON
-from suave_des.tables import Table, markdown_text
+from suave_des.tables import EFFECT, Section, Table, Written, capital, rows_of
 
 Row = Mapping[str, Any]
 """A row of a frame by column, None where there is nothing."""
 _NO_TABLE = Table((), ())
-_EFFECT = "effect"
-"""Heading of the widest column, the last one, which goes where the table would be too wide."""
 _EFFECTS = {
     RANK_BISERIAL: "Effect: rank-biserial correlation, 1 if the first has the greater value in all pairs.",
     A12: "Effect: A12, the probability that a mission of the first has the greater value.",
@@ -52,104 +47,10 @@ _DIFFERENCE = (
 """Columns of the frames, in order."""
 
 
-def rows_of(frame: pandas.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a frame as plain data."""
-    found: list[dict[str, Any]] = frame.astype(object).where(frame.notna(), None).to_dict("records")  # type: ignore[assignment]
-    return found
-
-
 def estimate_in(row: Row, name: str) -> Estimate:
     """Return an estimate from the three columns that have it, as of Estimate.columns."""
     value, low, high = (math.nan if row[each] is None else row[each] for each in (name, *interval_names(name)))
     return Estimate(value, low, high)
-
-
-class Section(NamedTuple):
-    """A part of what is written: tables under a title, what is said below them, and what follows from them."""
-
-    title: str
-    tables: Sequence[Table]
-    sentences: Sequence[str] = ()
-    below: str = ""
-
-
-class Written(ABC):
-    """Results that are written as text, Markdown, LaTeX, CSV and JSON."""
-
-    conclusion: str
-    notes: tuple[str, ...]
-
-    @abstractmethod
-    def sections(self) -> Iterator[Section]:
-        """Yield the tables of each metric, and others."""
-
-    @abstractmethod
-    def remarks(self) -> list[str]:
-        """Describe how the results were found, and what to know about the data."""
-
-    @abstractmethod
-    def frames(self) -> dict[str, pandas.DataFrame]:
-        """Return the statistics by what JSON calls them."""
-
-    def written(self, form: str, width: int = 95) -> str:
-        """Write the result as "table", which is text of that width, "csv", "json", "markdown" or "latex"."""
-        if form == "table":
-            return self.text(width)
-        writers = {"csv": self.csv, "json": self.json, "markdown": self.markdown, "latex": self.latex}
-        return writers[form]()
-
-    def text(self, width: int = 95) -> str:
-        """Write the conclusions, the tables, and the remarks, for a terminal of that width."""
-        parts = [folded(self.conclusion, width)]
-        for title, tables, sentences, below in self.sections():
-            for place, table in enumerate(tables):
-                heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
-                fits = table.headings[-1] != _EFFECT or table.width() <= width
-                shown = table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
-                parts.append(heading + shown.text(width) + (f"\n{below}" if below else ""))
-            parts.append("\n".join(folded(f"- {each}", width) for each in sentences))
-        parts.append("\n".join(folded(line, width) for line in self.remarks()))
-        return "\n\n".join(filter(None, parts)) + "\n"
-
-    def __str__(self) -> str:
-        """Return all of it as text, as `suave-des compare` prints it."""
-        return self.text()
-
-    def markdown(self) -> str:
-        """Write the tables and the conclusions, for a page."""
-        parts = [markdown_text(self.conclusion)]
-        for title, tables, sentences, below in self.sections():
-            parts.append(f"### {capital(title)}" if title else "")
-            for table in tables:
-                parts += [f"{capital(table.title)}:" if table.title else "", table.markdown(), markdown_text(below)]
-            parts.append("\n".join(f"- {markdown_text(each)}" for each in sentences))
-        return "\n\n".join(filter(None, [*parts, *map(markdown_text, self.remarks())])) + "\n"
-
-    def _repr_markdown_(self) -> str:
-        return self.markdown()
-
-    def latex(self) -> str:
-        """Write the tables for LaTeX with booktabs."""
-        tables = [Table(each.headings, each.rows, title) for title, own, *_ in self.sections() for each in own]
-        notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
-        parts = [table.latex(note=note) for table, note in zip(tables, notes, strict=True)]
-        return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
-
-    def csv(self) -> str:
-        """Write all statistics as one table."""
-        frames = [each.astype(object) for each in self.frames().values() if len(each)]
-        frame = pandas.concat(frames or [pandas.DataFrame()])
-        if "other" in frame:
-            frame.insert(1, "other", frame.pop("other"))
-        return frame.to_csv(index=False, lineterminator="\n")
-
-    def json(self) -> str:
-        """Write all of it; numbers with all their digits, null where there is none."""
-        return json.dumps(self._content(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-    def _content(self) -> dict[str, Any]:
-        about = {"conclusion": self.conclusion, "notes": self.notes}
-        return about | {name: rows_of(frame) for name, frame in self.frames().items()}
 
 
 @dataclass(frozen=True)
@@ -269,16 +170,6 @@ class Comparison(Written):
         return {**super()._content(), "largest_differences": {"rows": self.largest.rows, "replay": self.replay}}
 
 
-def folded(text: str, width: int) -> str:
-    """Break a paragraph into lines for a terminal of that width."""
-    return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
-
-
-def capital(text: str) -> str:
-    """Begin a text with a capital, and leave the rest as it is."""
-    return text[:1].upper() + text[1:]
-
-
 # Tables
 
 
@@ -317,7 +208,7 @@ def _seconds(value: float | None) -> str:
 
 def _difference_table(metric: Metric, differences: Sequence[Row]) -> Table:
     """Return the difference of each pair; for shares, without an effect size."""
-    headings = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", _EFFECT)
+    headings = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", EFFECT)
     width = 6 if metric.name == FOUND else len(headings)
     return Table(headings[:width], [_difference_row(each, metric)[:width] for each in differences])
 
@@ -439,9 +330,10 @@ def conclusion(found: Row, metric: Metric) -> str:
         but = f" by the test, though {_OPEN}" if _is_open(found) else ""
         return f"No difference in {metric.title} is shown between {group} and {other}{but} ({mean}; {test})."
     if not _is_claimed(found):
-        claim = _rank_claim(found, metric, ranks)
+        less, greater = (other, group)[:: 1 if ranks > 0.0 else -1]
+        claim = metric.rank_claim(less, greater)
         return f"By ranks, {claim} ({test}), but no difference of the means is shown ({mean})."
-    claim = difference_claim(group, other, apart.value, metric)
+    claim = metric.claim(group, other, apart.value)
     if ranks * apart.value < 0.0:
         greater = group if ranks > 0 else other
         return (
@@ -449,15 +341,6 @@ def conclusion(found: Row, metric: Metric) -> str:
             f" ({interval}; {test}): the distributions differ in shape, so look at them."
         )
     return f"{claim} ({interval}; {test})."
-
-
-def _rank_claim(found: Row, metric: Metric, ranks: float) -> str:
-    """Write which manager mostly has more or less in single runs, the better one first."""
-    less, greater = (found["other"], found["group"])[:: 1 if ranks > 0.0 else -1]
-    if not metric.better:
-        return f"{greater} mostly exceeds {less} in {metric.title}"
-    first, phrase, second = (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
-    return f"{first} {phrase.format('mostly')} {second}"
 
 
 def _is_equal(found: Row) -> bool:
@@ -476,16 +359,6 @@ def _is_claimed(found: Row) -> bool:
     """Whether a difference of the means may be claimed."""
     is_open = found["difference"].contains(0.0) and _direction_of_ranks(found)
     return bool(found["p_holm"] < SIGNIFICANCE and not is_open)
-
-
-def difference_claim(first: str, second: str, value: float, metric: Metric) -> str:
-    """Write which of two managers has more or less, the better one first; the value is first - second."""
-    if value * (metric.better or 1) < 0.0:
-        first, second, value = second, first, -value
-    phrase = metric.more if value > 0.0 else metric.less
-    if not phrase:
-        phrase = f"has {{}} {'more' if value > 0.0 else 'less'} {metric.title} than"
-    return f"{first} {phrase.format(metric.amount(abs(value)))} {second}"
 
 
 def overall_conclusion(

@@ -125,7 +125,7 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
                 row = {"manager": manager, "metric": metric, "statistic": statistic}
                 rows.append(row | paper.columns("paper") | here.columns("here"))
     figures = pandas.DataFrame(rows)
-    here = figures["here"]
-    is_outside = (here < figures["paper_ci95_low"]) | (here > figures["paper_ci95_high"])
-    figures = figures.assign(difference=here - figures["paper"], mark=np.where(is_outside, MARK, ""))
+    ours = figures["here"].astype(float)
+    is_outside = (ours < figures["paper_ci95_low"]) | (ours > figures["paper_ci95_high"])
+    figures = figures.assign(difference=ours - figures["paper"], mark=np.where(is_outside, MARK, ""))
     return PaperComparison(figures, theirs, runs)

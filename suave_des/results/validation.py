@@ -21,10 +21,10 @@ from suave_des.errors import InputError, number_of
 from suave_des.estimates import interval_names, mean_of, percent, share_of, std_of
 from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME
 from suave_des.results import statistics
-from suave_des.results.comparison import Row, rows_of
+from suave_des.results.comparison import Row
 from suave_des.results.real import CONDITION, ConditionLimits, Region, Share, count
 from suave_des.results.statistics import SIGNIFICANCE, Sample
-from suave_des.tables import Table
+from suave_des.tables import Table, rows_of
 
 COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
 """Metrics that are compared where both sides have values."""

@@ -7,7 +7,8 @@ from typing import Any
 
 import pandas
 
-from suave_des.results.comparison import Comparison, rows_of
+from suave_des.results.comparison import Comparison
+from suave_des.tables import rows_of
 
 
 def rows(frame: pandas.DataFrame) -> list[Any]:
