@@ -26,12 +26,13 @@ from typing import Any
 
 from distributed import Client, KilledWorker, get_worker
 
-from suave_des.campaign.inputs import MAIN, code_versions, declared_files, user_modules
+from suave_des.campaign.inputs import MAIN, code_versions, user_modules
 from suave_des.campaign.missions import Campaign, Chunk, Executor, Finished, MissionRunner, WorkerError
 from suave_des.campaign.workers import finished, packed, unpacked
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.records.store import MissionKey
-from suave_des.registry import custom_functions
+from suave_des.registry import custom_functions, manager_class
+from suave_des.scenario.loader import declared_files
 
 ANSWER_TIMEOUT_S, _LOOK_S = 10.0, 1.0
 """Time for a scheduler to answer at all; and after which to look whether it is still there."""
@@ -119,7 +120,8 @@ def pack(campaign: Campaign) -> bytes:
     """Pack a campaign with the versions and the content of every file that it needs."""
     from suave_des.knowledge.ontology_file import collect
 
-    loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), campaign.spec.managers))
+    hooks = {name: manager_class(name).input_files for name in campaign.spec.managers}
+    loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), hooks))
     with suppress(InputError):  # reported by the managers that reason with it, if there are any
         loaded = replace(loaded, ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies))))
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]

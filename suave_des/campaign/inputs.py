@@ -34,7 +34,7 @@ from suave_des.files import LIMIT_BYTES, sha256_of
 from suave_des.learned import read_file
 from suave_des.registry import cause_of, custom_functions, is_built_in, manager_class, takes_argument
 from suave_des.resources import hashes, shipped_folder, shown_name
-from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.loader import LoadedScenario, declared_files, load_scenario
 
 if TYPE_CHECKING:
     pass
@@ -176,19 +176,10 @@ def check_inputs(
                 raise
             except Exception as error:  # whatever a manager's own code raises
                 raise InputError(f"manager {manager}: check raised {cause_of(error)}") from error
-    inputs |= hashes(declared_files(scenarios, managers).values(), LIMIT_BYTES)
+    declared = declared_files(scenarios, {name: manager_class(name).input_files for name in managers})
+    inputs |= hashes(declared.values(), LIMIT_BYTES)
     code = {place if place not in inputs else f"module {place}": path for place, path in code.items()}
     return inputs | {place: sha256_of(path) for place, path in code.items()}
-
-
-def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[tuple[str, str], Path]:
-    """Locate the files that managers declare, by manager and their names as given; each has to be there."""
-    return {
-        (manager, name): path
-        for loaded in scenarios
-        for manager in managers
-        for name, path in loaded.declared_files(manager, manager_class(manager).input_files)
-    }
 
 
 def _check_knowledge(loaded: LoadedScenario) -> dict[str, str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -69,28 +70,6 @@ class LoadedScenario:
         problem = f"manager {manager} reads this file, and it is not there"
         raise InputError(problem, file=name, remedy="give its path from here, or from the scenario that names it")
 
-    def declared_files(
-        self, manager: str, input_files: Callable[[Mapping[str, Any]], Collection[str]]
-    ) -> Iterator[tuple[str, Path]]:
-        """Yield name and place of each file that a manager's class declares by its hook `input_files`.
-
-        Raises:
-            InputError: a file does not exist, or the class does not declare a list of names.
-        """
-        try:
-            names = input_files(self.manager_settings(manager))
-            names = names if isinstance(names, str) else tuple(names)
-        except InputError:
-            raise
-        except Exception as error:
-            problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
-            raise InputError(problem, remedy="give its settings by --manager-option NAME=VALUE") from error
-        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-            problem = f"manager {manager}: input_files gave {shown(names)}"
-            raise InputError(problem, remedy="return a list of file names as text")
-        for name in names:
-            yield name, self.manager_file(manager, name)
-
     def located(self, error: InputError) -> InputError:
         """Add file and line to an error about a name that only the ontology could check.
 
@@ -107,18 +86,33 @@ class LoadedScenario:
         return self.layer.error(error.problem, ("knowledge", part, key), error.remedy)
 
 
-class Replacements(TypedDict, total=False):
-    """Replacements of a scenario's own files and settings, and additions to them.
+def declared_files(
+    scenarios: Iterable[LoadedScenario], input_files: Mapping[str, Callable[[Mapping[str, Any]], Collection[str]]]
+) -> dict[tuple[str, str], Path]:
+    """Locate the files that managers declare by their hooks `input_files`, by manager and their names as given.
 
-    Attributes:
-        ontologies: files to use in place of the scenario's.
-        modes_file: file to use in place of the scenario's.
-        reasoner: to use in place of the scenario's.
-        rules: files of rules as text, in addition to the scenario's.
-        disabled_rules: names of rules to disable, in addition to the scenario's.
-        values: new values by key path, as of `with_values`.
-        manager_options: settings of managers, by manager and key, over the scenario's.
+    Raises:
+        InputError: a file does not exist, or a class does not declare a list of names.
     """
+    found = dict[tuple[str, str], Path]()
+    for loaded, (manager, hook) in product(scenarios, input_files.items()):
+        try:
+            names = hook(loaded.manager_settings(manager))
+            names = names if isinstance(names, str) else tuple(names)
+        except InputError:
+            raise
+        except Exception as error:
+            problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
+            raise InputError(problem, remedy="give its settings by --manager-option NAME=VALUE") from error
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            problem = f"manager {manager}: input_files gave {shown(names)}"
+            raise InputError(problem, remedy="return a list of file names as text")
+        found |= {(manager, name): loaded.manager_file(manager, name) for name in names}
+    return found
+
+
+class Replacements(TypedDict, total=False):
+    """Replacements of a scenario's own files and settings, and additions to them, as `load_scenario` describes them."""
 
     ontologies: Sequence[str | Path]
     modes_file: str | Path | None
@@ -144,8 +138,8 @@ def load_scenario(
             unchanged, and its files cannot be replaced.
         over: content that goes over the file's, as that of a file of which it is the base.
         replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
-            text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path and
-            settings of managers over all that.
+            text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path, as of
+            with_values, and manager_options (settings by manager and key) over all that.
 
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.

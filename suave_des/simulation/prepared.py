@@ -19,7 +19,7 @@ from suave_des.draws import Draws
 from suave_des.learned import read_learned
 from suave_des.managed.follow import InspectionPath
 from suave_des.registry import custom_functions, manager_class
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.loader import LoadedScenario, declared_files
 from suave_des.scenario.models import Calibration, CurrentWaveDescription, VehicleDescription
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
@@ -78,7 +78,8 @@ class PreparedScenario:
             InputError: a file is not there; or the training result cannot be read, or has something else in it.
         """
         if manager not in self._manager_inputs:
-            declared = dict(self.loaded.declared_files(manager, manager_class(manager).input_files))
+            found = declared_files([self.loaded], {manager: manager_class(manager).input_files})
+            declared = {name: path for (_, name), path in found.items()}
             name = None if self.training is not None else self.loaded.manager_settings(manager).get("learned")
             path = None if name is None else self.loaded.manager_file(manager, str(name))
             self._manager_inputs[manager] = declared, {} if path is None else read_learned(path)
