@@ -219,11 +219,11 @@ def _frame_of(
     for remark in result.remarks:
         warnings.warn(remark, stacklevel=_CALLER)
     if result.failures:
-        problem = f"{len(result.failures)} of {result.planned} missions failed, see attrs['failures']: "
+        problem = f"{len(result.failures)} of {result.campaign.planned} missions failed, see attrs['failures']: "
         warnings.warn(f"{problem}{result.failures[0]}", stacklevel=_CALLER)
     frame = CampaignFrame(result.frame())
     frame.attrs.update(result.report())
-    frame.attrs["runs_sharing_draw"] = result.variation.runs_sharing_draw
+    frame.attrs["runs_sharing_draw"] = result.campaign.variation.runs_sharing_draw
     frame.attrs["summary"] = list(result.summary)
     frame.attrs["interrupted"] = interrupted
     frame.attrs["folder"] = None if result.folder is None else str(result.folder)

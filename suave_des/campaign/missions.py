@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
@@ -112,12 +113,10 @@ class Campaign:
         manager = self.spec.managers[key.manager]
         return key, MissionFailure(manager, key.run, time_s, cause, lasting=False, point=key.point)
 
-    def timed_out(
-        self, key: MissionKey, time_s: float | None = None, place: str = ""
-    ) -> tuple[MissionKey, MissionFailure]:
-        """Return the outcome of a mission that took too long, at a place in its manager's code."""
-        cause = f"not done after {self.spec.time_out_s:g} s (time-out){place and f', in {place}'}"
-        return self.failed(key, cause, time_s)
+    @property
+    def too_long(self) -> str:
+        """The cause where a mission took too long."""
+        return f"not done after {self.spec.time_out_s:g} s (time-out)"
 
 
 Executor = Callable[[Campaign, Iterable[MissionKey], int], Iterator[list[Finished]]]
@@ -136,7 +135,8 @@ class MissionRunner:
         self.campaign, self._variation = campaign, campaign.variation
         # Load or compile what missions run, before the first one's time counts: a mission of a second does.
         short_mission(campaign.loaded)
-        self._point, self._simulators = -1, dict[int | None, "Simulator"]()
+        members = len(self._variation.ensemble.members) if self._variation.ensemble else 1
+        self._simulator = lru_cache(members)(self._simulator_of)  # missions come point by point
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
         self._number = Counter[int]()
         self._too_long, self._in_time = Counter[int](), set[int]()
@@ -150,7 +150,7 @@ class MissionRunner:
         """
         check_range("run", run, 1, self.campaign.spec.runs)
         check_range("point", point, 0, self._variation.sweep.points - 1)
-        simulator = self._simulator(point, run)
+        simulator = self._simulator(point, self._variation.member(run))
         return simulator.run(manager, run, self.campaign.spec.seed, record=True), simulator.loaded
 
     def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
@@ -188,15 +188,18 @@ class MissionRunner:
     def _outcome(self, key: MissionKey) -> tuple[Row | MissionFailure, list[Remark]]:
         """Run a mission; return its outcome, and what its manager's author should know."""
         spec, variation, manager = self.campaign.spec, self._variation, self.campaign.spec.managers[key.manager]
-        simulator = self._simulator(key.point, key.run)
+        values, member = variation.sweep.values(key.point), variation.member(key.run)
+        simulator = self._simulator(key.point, member)
         try:
             with _time_limit(spec.time_out_s):
                 result = simulator.run(manager, key.run, spec.seed, record=spec.record_knowledge)
         except MissionError as error:
             return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point), []
         except MissionTimeOut as error:
-            return self.campaign.timed_out(key, error.time_s, place_of(error))[1], []
-        values, member = variation.sweep.values(key.point), variation.member(key.run)
+            place = place_of(error)
+            return self.campaign.failed(key, f"{self.campaign.too_long}{place and f', in {place}'}", error.time_s)[
+                1
+            ], []
         drawn = (result.drawn[path] for path in variation.drawn)
         members = () if member is None else (member,)
         row = (*row_of(result.metrics), *map(cell_of, values.values()), *drawn, *members, *further_of(result))
@@ -206,17 +209,13 @@ class MissionRunner:
             row = (*row, known)
         return row, [Remark(manager, text) for text in result.remarks]
 
-    def _simulator(self, point: int, run: int) -> Simulator:
-        """Return the simulator of a point and of a run's member of the ensemble; missions come point by point."""
+    def _simulator_of(self, point: int, member: int | None) -> Simulator:
+        """Make the simulator of a point and of a member of the ensemble."""
         from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
 
-        variation, member = self._variation, self._variation.member(run)
-        if point != self._point:
-            self._point, self._simulators = point, {}
-        if member not in self._simulators:
-            loaded = variation.scenario(self.campaign.loaded, point, member)
-            self._simulators[member] = Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
-        return self._simulators[member]
+        variation = self._variation
+        loaded = variation.scenario(self.campaign.loaded, point, member)
+        return Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
 
 
 # Time limits, so that a manager that never returns costs its own mission only.

@@ -54,16 +54,14 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
     if quiet or sys.stderr is None:
         yield None
         return
-    text, over, live, width = _Text(label), threading.Event(), is_live(), 0
+    text, over, live = _Text(label), threading.Event(), is_live()
     waits_s: Iterable[float] = repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
 
     def draw(*, end: str = "") -> None:
-        nonlocal width
-        line = text.line()[: shutil.get_terminal_size().columns - 1] if live else f"suave-des: {text.line()}\n"
+        width = shutil.get_terminal_size().columns - 1
+        line = f"\r{text.line()[:width]:<{width}}{end}" if live else f"suave-des: {text.line()}\n"
         with suppress(OSError):  # nobody reads it any more
-            sys.stderr.write(f"\r{line:<{width}}{end}" if live else line)
-            sys.stderr.flush()
-        width = len(line)
+            print(line, end="", file=sys.stderr, flush=True)
 
     def draw_until_over() -> None:
         """Draw from a thread, so that it goes on during a long mission."""
@@ -81,7 +79,7 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
         drawer.join()
         if live:
             draw(end="\n")
-        elif width and text.progress is not None:
+        elif text.progress is not None and text.age_s > _FIRST_LINE_S:  # else it had no line so far
             draw()
 
 
@@ -102,11 +100,16 @@ class _Text:
             self._first_s, self._before = self._last_s, progress.done
         self.progress = progress
 
+    @property
+    def age_s(self) -> float:
+        """Time since it began."""
+        return time.monotonic() - self._began_s
+
     def line(self) -> str:
         """Return missions that are done and failed, their rate, and the time that is left."""
         progress = self.progress
         if progress is None:
-            return f"{self.label}: starting, {_time(time.monotonic() - self._began_s)} {_FIRST_TIME}"
+            return f"{self.label}: starting, {_time(self.age_s)} {_FIRST_TIME}"
         parts = [f"{progress.done} of {progress.total} missions"]
         if progress.failed:
             parts.append(f"{progress.failed} failed")

@@ -11,7 +11,6 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from suave_des.campaign.missions import Campaign
-from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
 from suave_des.files import csv_text, json_text
@@ -29,7 +28,6 @@ from suave_des.records.store import (
     runs_pieces,
     write_campaign,
 )
-from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:
     import pandas
@@ -50,9 +48,7 @@ class CampaignResult:
     """The result of a campaign.
 
     Attributes:
-        spec: the specification.
-        loaded: the scenario.
-        variation: differences between missions apart from manager and run.
+        campaign: what was run.
         done: number of missions that have a row.
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv, by column: for each manager, at each point that was reached.
@@ -61,9 +57,7 @@ class CampaignResult:
             there are not.
     """
 
-    spec: CampaignSpec
-    loaded: LoadedScenario
-    variation: Variation
+    campaign: Campaign
     done: int
     failures: tuple[MissionFailure, ...]
     summary: tuple[dict[str, Any], ...]
@@ -73,17 +67,12 @@ class CampaignResult:
     @property
     def folder(self) -> Path | None:
         """The folder of the files; None if there are none."""
-        return self.spec.out
-
-    @property
-    def planned(self) -> int:
-        """Number of missions that were to be run."""
-        return self.variation.sweep.points * len(self.spec.managers) * self.spec.runs
+        return self.campaign.spec.out
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
-        return (*COLUMNS, *self.variation.columns, *self.loaded.scenario.further_columns)
+        return (*COLUMNS, *self.campaign.variation.columns, *self.campaign.loaded.scenario.further_columns)
 
     def _kept(self) -> Iterator[tuple[MissionKey, Row]]:
         for key, outcome in self.outcomes():
@@ -110,31 +99,33 @@ class CampaignResult:
         import pandas
 
         types: dict[str, Any] = {name: _TYPES[kind] for name, kind in COLUMN_TYPES.items() if kind in _TYPES}
-        types["scenario"] = pandas.CategoricalDtype([self.loaded.scenario.name])
-        types["manager"] = pandas.CategoricalDtype(list(self.spec.managers))
+        types["scenario"] = pandas.CategoricalDtype([self.campaign.loaded.scenario.name])
+        types["manager"] = pandas.CategoricalDtype(list(self.campaign.spec.managers))
         return pandas.DataFrame.from_records(self.rows, columns=list(self.columns)).astype(types)
 
     def differences(self) -> list[dict[str, Any]]:
         """Return how managers differ, over the members of the ensemble, as in ensemble.csv; empty without one."""
-        varied = self.variation
+        varied = self.campaign.variation
         if varied.ensemble is None:
             return []
-        found = differences(self._kept(), self.spec.managers, _PLACES, varied.ensemble, varied.runs_sharing_draw)
+        found = differences(
+            self._kept(), self.campaign.spec.managers, _PLACES, varied.ensemble, varied.runs_sharing_draw
+        )
         return [{**each, **_swept(varied, each.pop("point"))} for each in found]
 
     def report(self) -> dict[str, Any]:
         """Return how many missions were run, and what failed, as in manifest.json."""
         return {
             "missions": {
-                "planned": self.planned,
+                "planned": self.campaign.planned,
                 "done": self.done,
                 "failed": len(self.failures),
-                "left_out": self.planned - self.done - len(self.failures),
+                "left_out": self.campaign.planned - self.done - len(self.failures),
             },
             **({"remarks": list(self.remarks)} if self.remarks else {}),
             "failures": [
                 {
-                    **{"manager": each.manager, "run": each.run, **self.variation.sweep.values(each.point)},
+                    **{"manager": each.manager, "run": each.run, **self.campaign.variation.sweep.values(each.point)},
                     **{"time_s": each.time_s, "cause": each.cause},
                 }
                 for each in self.failures
@@ -143,7 +134,7 @@ class CampaignResult:
 
     def kept(self) -> str:
         """Say how many missions are done, and where they are."""
-        kept = f"{self.done} of {self.planned} missions {'is' if self.done == 1 else 'are'} done"
+        kept = f"{self.done} of {self.campaign.planned} missions {'is' if self.done == 1 else 'are'} done"
         if self.folder is None:
             return kept
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
@@ -154,15 +145,20 @@ class CampaignResult:
         Raises:
             InputError: they cannot be written; nothing half-written stays.
         """
-        spec, sweep = self.spec, self.variation.sweep
+        spec, sweep = self.campaign.spec, self.campaign.variation.sweep
         assert self.folder is not None
-        about = {"scenario": self.loaded.scenario.name, "managers": spec.managers, "runs": spec.runs, "seed": spec.seed}
+        about = {
+            "scenario": self.campaign.loaded.scenario.name,
+            "managers": spec.managers,
+            "runs": spec.runs,
+            "seed": spec.seed,
+        }
         files: dict[str, Content] = {
             RUNS_FILE: runs_pieces(self.columns, self.stream()),
             SUMMARY_FILE: csv_text((*SUMMARY_COLUMNS, *sweep.parameters), [(*row.values(),) for row in self.summary]),
             MANIFEST_FILE: json_text({**about, **self._varied(), **self.report(), **provenance}),
         }
-        if self.variation.ensemble is not None:
+        if self.campaign.variation.ensemble is not None:
             columns = (*ENSEMBLE_COLUMNS, *sweep.parameters)
             rows = ([each[name] for name in columns] for each in self.differences())
             files[ENSEMBLE_FILE] = csv_text(columns, rows)
@@ -172,20 +168,20 @@ class CampaignResult:
 
     def _varied(self) -> dict[str, Any]:
         """Return what varies, for the manifest."""
-        variation, ensemble = self.variation, self.variation.ensemble
+        variation, ensemble = self.campaign.variation, self.campaign.variation.ensemble
         if not variation.columns:
             return {}
         return {
             "sweep": variation.sweep.plain(),
             "points": variation.sweep.points,
-            "perturbations": dict(self.spec.perturbations),
-            "runs_per_draw": self.spec.runs_per_draw,
+            "perturbations": dict(self.campaign.spec.perturbations),
+            "runs_per_draw": self.campaign.spec.runs_per_draw,
             **({"ensemble": ensemble.name, "ensemble_members": len(ensemble.members)} if ensemble else {}),
         }
 
     def _knowledge_lines(self) -> Iterator[str]:
         """Yield the lines of knowledge_states.jsonl; none of managers that do not reason."""
-        yield scenario_line(self.loaded.scenario)
+        yield scenario_line(self.campaign.loaded.scenario)
         for _, row in self._kept():
             if line := row[len(self.columns)]:
                 yield str(line)
@@ -194,7 +190,7 @@ class CampaignResult:
         """Yield name and content of the exemplar's own files, one for each manager, named as its runner does."""
         from suave_des.records.runs import exemplar_names, suave_pieces  # with pandas, which takes a while
 
-        scenario, runs, managers = self.loaded.scenario, self.spec.runs, self.spec.managers
+        scenario, runs, managers = self.campaign.loaded.scenario, self.campaign.spec.runs, self.campaign.spec.managers
         revision, limit_s = scenario.revision.name, scenario.mission.time_limit_s
         files = exemplar_names(managers, revision, has_battery=scenario.battery is not None)
         for number, (file, name) in enumerate(files):
@@ -228,7 +224,7 @@ def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remark
         for number, name in enumerate(spec.managers)
     )
     done = sum(int(figures[0] or 0) for figures in found.values())
-    return CampaignResult(spec, campaign.loaded, variation, done, tuple(failures), summary, outcomes, tuple(remarks))
+    return CampaignResult(campaign, done, tuple(failures), summary, outcomes, tuple(remarks))
 
 
 def _swept(variation: Variation, point: int) -> dict[str, Any]:

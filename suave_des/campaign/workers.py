@@ -154,7 +154,7 @@ class LocalWorkers:
         attempts = died + 1
         self._again.extend(others)
         if len(suspects) == 1 and worker.is_overdue:
-            yield [campaign.timed_out(suspects[0])]
+            yield [campaign.failed(suspects[0], campaign.too_long)]
         elif len(suspects) == 1 and attempts >= _ATTEMPTS:
             cause = f"its worker process ended with status {status}, {attempts} times (killed, or out of memory?)"
             yield [campaign.failed(suspects[0], cause)]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from enum import StrEnum
 from functools import partial
 from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 from textwrap import fill
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -54,12 +53,6 @@ _MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
 """Options of a campaign that is resumed, too."""
 
 
-class ResultFormat(StrEnum):
-    """Result files to write besides our own."""
-
-    SUAVE = "suave"
-
-
 def campaign(
     scenario: Annotated[
         str | None,
@@ -80,7 +73,7 @@ def campaign(
     ] = None,
     yes: Trusted = False,
     form: Annotated[
-        ResultFormat | None, typer.Option("--format", help="Also write the exemplar's own files into DIR/suave.")
+        Literal["suave"] | None, typer.Option("--format", help="Also write the exemplar's own files into DIR/suave.")
     ] = None,
     manager_option: ManagerOptions = None,
     quiet: Quiet = False,
@@ -111,18 +104,18 @@ def campaign(
             result = resume_campaign(resume, confirmed=yes, **settings)
         else:
             assert scenario is not None
-            settings |= {"suave_format": form is ResultFormat.SUAVE, "command": command_line(), **files.replacements}
+            settings |= {"suave_format": form == "suave", "command": command_line(), **files.replacements}
             result = run_campaign(scenario, settings_of=partial(manager_options, manager_option), **settings)
     console = output()
     print_table(console, _summary(result))
-    if (sharing := result.variation.runs_sharing_draw) > 1:
+    if (sharing := result.campaign.variation.runs_sharing_draw) > 1:
         console.print(f"{sharing} runs share each draw: intervals treat draws as independent, not runs")
     if len(result.summary) > _ROWS_SHOWN:
         more = f"... and {len(result.summary) - _ROWS_SHOWN + 1} rows more"
         console.print(f"{more}, all in {result.folder}/summary.csv")
     if found := result.differences():
         console.print()
-        print_table(console, _differences(found, result.variation.sweep.parameters))
+        print_table(console, _differences(found, result.campaign.variation.sweep.parameters))
     kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
     console.print(f"{kept} in {result.folder}/runs.csv")
     exit_telling_failures(result)
@@ -138,14 +131,16 @@ def _summary(result: CampaignResult) -> Table:
         half = "" if low is None or high is None else f" ± {(high - low) / 2.0:.2f}"
         return f"{number(mean)}{half}", number(std)
 
-    parameters = result.variation.sweep.parameters
+    parameters = result.campaign.variation.sweep.parameters
     rows = []
     for cells in result.summary[: _ROWS_SHOWN if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1]:
         swept = (f"{cells[name]:.6g}" if isinstance(cells[name], float) else str(cells[name]) for name in parameters)
         found = "" if cells["found_share"] is None else percent(cells["found_share"])
         measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
         rows.append([*swept, cells["manager"], str(cells["n"]), found, *measured])
-    title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
+    title = (
+        f"{result.campaign.loaded.scenario.name}, seed {result.campaign.spec.seed}: means ± half their 95% intervals"
+    )
     means = [heading for metric in PAPER_METRICS for heading in (METRICS[metric].brief, "std")]
     headings = [*parameters, "manager", "missions", "found", *means]
     return Table(headings, rows, f"{title}, standard deviations", f"{'r' * len(parameters)}l")
@@ -183,7 +178,7 @@ def exit_telling_failures(result: CampaignResult) -> None:
     for first, *others in islice(alike.values(), _FAILURES_SHOWN):
         count = f" ({len(others) + 1} missions like this)" if others else ""
         console.print(f"suave-des: failed: {' '.join(str(first).split())}{count}")
-    console.print(f"suave-des: {len(result.failures)} of {result.planned} missions failed, see manifest.json")
+    console.print(f"suave-des: {len(result.failures)} of {result.campaign.planned} missions failed, see manifest.json")
     raise typer.Exit(3)
 
 

@@ -10,6 +10,7 @@ import inspect
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args, get_type_hints
@@ -34,23 +35,14 @@ def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]
     return complete
 
 
-def _managers() -> Iterable[str]:
-    from suave_des.registry import manager_names
-
-    return manager_names()
-
-
-def _metrics() -> Iterable[str]:
-    from suave_des.records.metrics import METRICS
-
-    return METRICS
-
-
 def _scenarios() -> Iterable[str]:
     return sorted(path.stem for path in shipped_folder("scenarios").glob("*.yaml") if "_modes" not in path.stem)
 
 
-complete_managers, complete_metrics, complete_scenarios = map(_completing, (_managers, _metrics, _scenarios))
+# Modules that take a while are imported only when a shell asks.
+complete_managers = _completing(lambda: import_module("suave_des.registry").manager_names())
+complete_metrics = _completing(lambda: import_module("suave_des.records.metrics").METRICS)
+complete_scenarios = _completing(_scenarios)
 
 Scenario = Annotated[
     str,

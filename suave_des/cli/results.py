@@ -190,7 +190,7 @@ def validate(
     shares, limits, targets_paths = targets_of(real, targets)
     word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
 
-    campaign: CampaignResult | None = None
+    result: CampaignResult | None = None
     sources: dict[str, object] = {
         "data": [{"file": _shown(file.path), "sha256": file.sha256} for file in real.files],
         "targets": [_shown(path) for path in targets_paths],
@@ -212,11 +212,11 @@ def validate(
         runs = -(-_RUNS // len(conditions or "1"))
         settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
         with progress.shown(name, quiet=quiet) as show:
-            campaign = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
-        simulated = campaign.frame()
-        sources |= {"scenario": campaign.loaded.scenario.name, "runs": settings["runs"]}
-        if not set(campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
-            exit_telling_failures(campaign)
+            result = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
+        simulated = result.frame()
+        sources |= {"scenario": result.campaign.loaded.scenario.name, "runs": settings["runs"]}
+        if not set(result.campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
+            exit_telling_failures(result)
     if conditions is not None:
         simulated = simulated.assign(**{CONDITION: conditions.numbers(simulated)})
     validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
@@ -236,8 +236,8 @@ def validate(
         about = {"version": __version__, "command": command_line(), **sources}
         write_files(out, validation.texts(about), stale=FILES)
         console.print(f"\nTables and validation.json are in {out}")
-    if campaign is not None:
-        exit_telling_failures(campaign)
+    if result is not None:
+        exit_telling_failures(result)
     if strict and not validation.all_met:
         raise typer.Exit(TARGETS_NOT_MET)
 

@@ -60,12 +60,6 @@ def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
     """
     library = plotly_script()
     missions = read_missions(folders)
-    note = "Paths and timelines are in the report of one campaign's folder only"
-    ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": note}
-    if len(folders) == 1 and folders[0].is_dir() and missions.frame["run"].notna().all():
-        managers = list(dict.fromkeys(missions.frame["manager"]))
-        fitting = max(1, min(runs, _MOST_WAYS // len(managers))) if runs else 0
-        ways = _paths_of(folders[0], missions.frame, managers, fitting)
     scenarios = [name for name in dict.fromkeys(missions.frame["scenario"]) if name]
     title = ", ".join([*scenarios, *dict.fromkeys(missions.frame["manager"])])
     content = {
@@ -74,7 +68,7 @@ def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
         "folders": [str(folder) for folder in folders],
         "made": [_made(folder) for folder in folders],
         "results": _results(missions),
-        "ways": ways,
+        "ways": _ways(folders, missions.frame, runs),
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
     size = len(text.encode(errors="backslashreplace"))  # as it is written
@@ -189,10 +183,10 @@ def _made(folder: Path) -> dict[str, Any]:
 # Ways
 
 
-def _paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> dict[str, Any]:
+def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[str, Any]:
     """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
 
-    `groups` are managers in the order of the page's groups; `runs` is how many runs of each: 0 for none.
+    `runs` is how many runs of each manager: 0 for none.
 
     Returns:
         pipeline: vertices, x and y in m; paths: in the order of groups and runs; note: why there are none, or empty. A
@@ -200,18 +194,19 @@ def _paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs
         modes (times at which the mode of the function that moves it changed, with its name), and events (times of mode
         requests, component reports and the first sight, with kind and detail).
     """
-    note = "Paths and timelines are left out; suave-des report --paths N adds those of N runs"
+    ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": ""}
+    if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():
+        return ways | {"note": "Paths and timelines are in the report of one campaign's folder only"}
     if runs == 0:
-        return {"pipeline": [], "paths": [], "note": note}
+        return ways | {"note": "Paths and timelines are left out; suave-des report --paths N adds those of N runs"}
+    managers = list(dict.fromkeys(frame["manager"]))
     try:
-        opened = opened_campaign(folder)
+        opened = opened_campaign(folders[0])
         vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
-        paths = list(_paths(opened, frame, groups, runs))
+        paths = list(_paths(opened, frame, managers, max(1, min(runs, _MOST_WAYS // len(managers)))))
     except SuaveDesError as error:
-        note = f"Paths and timelines are left out: {getattr(error, 'problem', error)}"
-        return {"pipeline": [], "paths": [], "note": note}
-    note = "" if paths else "No mission could be run again as it was"
-    return {"pipeline": vertices, "paths": paths, "note": note}
+        return ways | {"note": f"Paths and timelines are left out: {getattr(error, 'problem', error)}"}
+    return {"pipeline": vertices, "paths": paths, "note": "" if paths else "No mission could be run again as it was"}
 
 
 def _paths(

@@ -29,7 +29,11 @@ def write(folder: Path, text: str) -> Path:
 def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path):
     path = write(tmp_path, HEAD)
     result = run_campaign(path)
-    assert (result.spec.managers, result.spec.runs, result.spec.seed) == (("none", "random"), 4, 7)
+    assert (result.campaign.spec.managers, result.campaign.spec.runs, result.campaign.spec.seed) == (
+        ("none", "random"),
+        4,
+        7,
+    )
     assert result.rows == run_campaign("seams2023", ["none", "random"], 4, 7).rows
     other = run_campaign(path, ["none"], 2, 8)
     assert (other.spec.managers, other.spec.runs, other.spec.seed) == (("none",), 2, 8)
