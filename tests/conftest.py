@@ -19,10 +19,11 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from suave_des.caches import private_cache
+from tests.helpers.command import command
 from tests.helpers.owl_text import suave_copy
 from tests.helpers.quick_workers import _warm_process, quick_campaigns, quick_workers
 
-__all__ = ["_warm_process", "quick_campaigns", "quick_workers", "suave_copy"]
+__all__ = ["_warm_process", "command", "quick_campaigns", "quick_workers", "suave_copy"]
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")

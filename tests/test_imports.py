@@ -45,6 +45,29 @@ print(numpy.asarray(jpype.JArray(jpype.JDouble)(numpy.arange(3.0))))
 """
 
 
+HEAVY = "numpy numba pandas scipy matplotlib simpy pydantic_core yaml owlready2 rdflib jpype multiprocessing"
+
+
+@pytest.mark.parametrize(
+    ("program", "unused"),
+    [
+        (
+            "import suave_des\nassert not [name for name in sys.modules if name.startswith('suave_des.')]",
+            HEAVY + " rich",
+        ),
+        ("import suave_des.cli.main as cli\ntry:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass", HEAVY),
+        (
+            "import suave_des; suave_des.Mission('seams2023').advance(5.0)",
+            "matplotlib plotly gymnasium http.server distributed pandas owlready2 jpype",
+        ),
+    ],
+    ids=["package", "help", "mission"],
+)
+def test_what_is_not_used_is_not_loaded(program, unused):
+    done = python("-c", f"import sys\n{program}\nprint(sorted(set({unused.split()}) & set(sys.modules)))")
+    assert done.stdout.splitlines()[-1:] == ["[]"], done.stderr
+
+
 def test_linear_algebra_is_loaded_by_what_uses_it_only():
     first, second, third = python("-c", COMPILING).stdout.splitlines()
     assert first == "3.0 False"

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -24,6 +24,7 @@ from suave_des.errors import InputError
 from suave_des.records.store import STORE_FILE
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD
+from tests.helpers.command import has_size, wait_until
 
 _TELLS_WHAT_IT_OPENS = """
 import os, sys
@@ -125,14 +126,6 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     """End a process as the system does when memory is short."""
     process.send_signal(signal.SIGKILL)
     process.wait()
-
-
-def wait_until(is_so: Callable[[], bool], longest_s: float = 120.0) -> None:
-    """Wait for something, and fail if it does not come."""
-    end_s = time.monotonic() + longest_s
-    while not is_so():
-        assert time.monotonic() < end_s
-        time.sleep(0.05)
 
 
 MINE = "my_managers.careful:Careful"
@@ -246,7 +239,7 @@ def test_ctrl_c_on_the_command_line(cluster, scenario, tmp_path):
     asked = ["short.yaml", "--managers", "none", "--runs", "100000", "--scheduler", cluster.address, "--out", "out"]
     process = chaos.start(asked, tmp_path)
     journal = tmp_path / "out" / f"{STORE_FILE}-wal"
-    wait_until(lambda: journal.exists() and journal.stat().st_size > 200_000)
+    wait_until(lambda: has_size(journal, 200_000))
     process.send_signal(signal.SIGINT)
     status, err = chaos.ended(process)
     assert status == 130

@@ -2,7 +2,6 @@
 
 import random
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from suave_des.records import store as stores
 from suave_des.records.store import STORE_FILE, Outcome, Store, StoreError, has_campaign
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD
-from tests.helpers.command import python
+from tests.helpers.command import python, wait_until
 
 MANAGERS = ["none", "random"]
 
@@ -163,10 +162,7 @@ class TestRefusals:
     def test_two_campaigns_on_one_folder(self, scenario, tmp_path):
         process = chaos.start([str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path)
         try:
-            started = time.monotonic()
-            while not has_campaign(tmp_path / "out"):
-                assert time.monotonic() < started + 60
-                time.sleep(0.05)
+            wait_until(lambda: has_campaign(tmp_path / "out"))
             taken = "another campaign is running in the output folder"
             with pytest.raises(InputError, match=taken):
                 resume_campaign(tmp_path / "out")

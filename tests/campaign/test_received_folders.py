@@ -14,7 +14,6 @@ from suave_des.campaign import campaign
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.inputs import read_campaign
 from suave_des.campaign.spec import CampaignSpec
-from suave_des.cli.main import main
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.files import write_files
 from suave_des.records.store import _crc, _note
@@ -219,14 +218,12 @@ class TestOverwrite:
             run_campaign("release15", ["bt"], 2, 1, out=received, overwrite=True)
         assert not {"runs.csv", "summary.csv", "manifest.json"} & set(found)
 
-    def test_results_of_another_campaign_than_the_store_s_are_not_drawn(self, received, tmp_path, capsys):
+    def test_results_of_another_campaign_than_the_store_s_are_not_drawn(self, received, tmp_path, command):
         other = tmp_path / "other"
         run_campaign("seams2023", ["none"], 3, 2, out=other)
         shutil.copy(other / "campaign.sqlite", received / "campaign.sqlite")
-        with pytest.raises(SystemExit) as ended:
-            main(["figure", str(received), "--out", str(tmp_path / "x.png")])
-        assert ended.value.code == 2
-        assert "are of different campaigns" in capsys.readouterr().err
+        status, _, error = command("figure", received, "--out", tmp_path / "x.png")
+        assert status == 2 and "are of different campaigns" in error
 
 
 def test_the_time_out_follows_the_reasoner():

@@ -1,7 +1,6 @@
 """A campaign that is told to stop, by Ctrl-C or by kill, keeps what is done and leaves no empty folder."""
 
 import _thread
-import csv
 import os
 import signal
 import subprocess
@@ -19,6 +18,8 @@ from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.workers import LocalWorkers
 from suave_des.interrupts import Stopped, signals_raised
 from suave_des.records.store import STORE_FILE, Store
+from tests.helpers import rows_of
+from tests.helpers.command import has_size, wait_until
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 RUNS = 100_000
@@ -26,19 +27,12 @@ RUNS = 100_000
 FILES = [STORE_FILE, "manifest.json", "runs.csv", "summary.csv"]
 
 
-def wait_for(path: Path, size: int = 0) -> None:
-    until = time.monotonic() + 60.0
-    while not (path.exists() and path.stat().st_size >= size):
-        assert time.monotonic() < until
-        time.sleep(0.002)
-
-
 @pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(("number", "workers"), [*zip(STATUS, (1, 2), strict=True)])
 def test_what_is_done_is_kept(number, workers, scenario, tmp_path):
     asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
     process = chaos.start(asked, tmp_path)
-    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
+    wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
     children = chaos.workers_of(process)
     process.send_signal(number)
     status, err = chaos.ended(process)
@@ -48,8 +42,7 @@ def test_what_is_done_is_kept(number, workers, scenario, tmp_path):
         f" of {RUNS} missions are done, and kept in out; suave-des campaign --resume out runs the rest\n"
     )
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
-    with (tmp_path / "out" / "runs.csv").open(newline="") as file:
-        assert 0 < len(list(csv.DictReader(file))) < RUNS
+    assert 0 < len(rows_of(tmp_path / "out")) < RUNS
     assert len(children) == (0 if workers == 1 else 2)
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
@@ -60,7 +53,7 @@ def test_what_is_done_is_kept(number, workers, scenario, tmp_path):
 )
 def test_no_empty_folder_is_left(number, after_s, scenario, tmp_path):
     process = chaos.start([str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path)
-    wait_for(tmp_path / "out" / STORE_FILE)
+    wait_until((tmp_path / "out" / STORE_FILE).exists)
     time.sleep(after_s)
     process.send_signal(number)
     status, err = chaos.ended(process)
@@ -78,7 +71,7 @@ def test_workers_leave_ctrl_c_to_the_campaign(scenario, tmp_path):
     process = chaos.start(
         [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"], tmp_path
     )
-    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
+    wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
     for child in chaos.workers_of(process):
         os.kill(child, signal.SIGINT)
     assert chaos.ended(process) == (0, "")
@@ -97,7 +90,7 @@ def test_a_signal_to_all_its_processes_is_told_once(number, scenario, tmp_path):
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # under nohup it is ignored
     )
-    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
+    wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
     os.killpg(process.pid, number)
     _, err = process.communicate(timeout=120)
     assert process.returncode == 128 + number

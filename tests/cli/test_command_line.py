@@ -1,6 +1,5 @@
 """The command line: exit statuses, one line for an error, and what each command prints and writes."""
 
-import csv
 import io
 import json
 import re
@@ -10,12 +9,10 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.console import PlainConsole, print_timeline
-from suave_des.cli.main import main
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import rows_of
-from tests.helpers.command import python
 
 FILE = "campaign: 1\nscenario: seams2023\nmanagers: [none]\n"
 
@@ -33,18 +30,6 @@ class Raises(NoManager):
             raise RuntimeError("never seen a pipeline before")
         super().task_requested(task)
 """
-
-
-def test_help_imports_nothing_heavy():
-    code = (
-        "import sys\n"
-        "from suave_des.cli.main import main\n"
-        "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'numba', 'pandas', 'scipy', 'matplotlib', 'simpy', 'pydantic_core', 'yaml',"
-        " 'owlready2', 'rdflib', 'jpype', 'multiprocessing'}\n"
-        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)\n"
-    )
-    assert python("-c", code).stderr.strip() == "[]"
 
 
 @pytest.mark.parametrize(
@@ -187,27 +172,19 @@ SHORT = "base: seams2023.yaml\nmission: {time_limit_s: 2}\n"
 PERIODS = "sweep:\n  visibility.period_s: [{}]\n"
 
 
-def printed(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """Run a campaign file's missions; return the lines from the table's heading on."""
-    (folder / "short.yaml").write_text(SHORT)
-    (folder / "sweep.yaml").write_text(HEAD + text)
-    with pytest.raises(SystemExit, match="0"):
-        main(["campaign", str(folder / "sweep.yaml"), "--out", str(folder / "out"), "--workers", "1", "--quiet"])
-    return capsys.readouterr().out.splitlines()
-
-
 @pytest.mark.parametrize(("points", "shown"), [(40, 40), (41, 39), (57, 39)])
-def test_a_long_sweep_has_its_first_rows_and_where_the_others_are(points, shown, tmp_path, capsys):
-    lines = printed(PERIODS.format(", ".join(str(40 + number) for number in range(points))), tmp_path, capsys)
+def test_a_long_sweep_has_its_first_rows_and_where_the_others_are(points, shown, command):
+    Path("short.yaml").write_text(SHORT)
+    Path("sweep.yaml").write_text(HEAD + PERIODS.format(", ".join(str(40 + number) for number in range(points))))
+    lines = command("campaign", "sweep.yaml", "--out", "out", "--workers", "1", "--quiet").out.splitlines()
     rows = [line.split()[0] for line in lines if line.split()[1:2] == ["none"]]
     assert rows == [str(40 + number) for number in range(shown)]
     more = [line for line in lines if "rows more" in line]
     if shown == points:
         assert more == []
     else:
-        assert more == [f"... and {points - shown} rows more, all in {tmp_path}/out/summary.csv"]
-    with (tmp_path / "out" / "summary.csv").open() as file:
-        assert sum(1 for _ in csv.DictReader(file)) == points
+        assert more == [f"... and {points - shown} rows more, all in out/summary.csv"]
+    assert len(rows_of(Path("out/summary.csv"))) == points
 
 
 IMPROVES = "revision.metacontrol.improve_when_exceeded"

@@ -10,8 +10,10 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -67,6 +69,40 @@ def command_here(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]
                 if str(getattr(module, "__file__", None) or "").startswith(str(cwd)):
                     del sys.modules[name]
     return subprocess.CompletedProcess(arguments, status, out.getvalue(), err.getvalue())
+
+
+def wait_until(is_so: Callable[[], object], longest_s: float = 120.0) -> None:
+    """Wait for something, and fail if it does not come."""
+    end_s = time.monotonic() + longest_s
+    while not is_so():
+        assert time.monotonic() < end_s
+        time.sleep(0.005)
+
+
+def has_size(path: Path, size: int) -> bool:
+    """Whether a file is there and has that size, in bytes."""
+    return path.exists() and path.stat().st_size >= size
+
+
+class Ended(NamedTuple):
+    """What a command has left."""
+
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
+    """Runs the command line in this process, in the current folder."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def run(*arguments: object) -> Ended:
+        with pytest.raises(SystemExit) as ended:
+            main(list(map(str, arguments)))
+        return Ended(int(ended.value.code or 0), *capsys.readouterr())
+
+    return run
 
 
 @contextlib.contextmanager

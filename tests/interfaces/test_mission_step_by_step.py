@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from suave_des import InputError, Mission, load_scenario
 from suave_des.simulation.simulator import Simulator
-from tests.helpers.command import python
 
 SEARCH = "f_generate_search_path"
 
@@ -77,13 +76,3 @@ def test_it_does_not_go_back(simulator, until):
     mission.advance(5.0)
     with pytest.raises(InputError, match="cannot go to"):
         mission.advance(until)
-
-
-def test_a_mission_loads_nothing_that_draws_learns_or_serves():
-    program = (
-        "import sys, suave_des\n"
-        "suave_des.Mission('seams2023').advance(5.0)\n"
-        "unused = {'matplotlib', 'plotly', 'gymnasium', 'http.server', 'distributed', 'pandas', 'owlready2', 'jpype'}\n"
-        "print(sorted(unused & set(sys.modules)))"
-    )
-    assert python("-c", program).stdout.strip() == "[]"

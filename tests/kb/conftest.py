@@ -1,8 +1,9 @@
 """What the tests of `kb` share: one knowledge base, edited copies, and the command line."""
 
+from functools import partial
+
 import pytest
 
-from suave_des.cli.main import main
 from suave_des.kb.knowledge_base import KnowledgeBase
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 
@@ -19,13 +20,6 @@ def small():
 
 
 @pytest.fixture
-def command(capsys):
+def command(command):
     """Runs `suave-des kb ...` in this process: (status, output, errors)."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as end:
-            main(["kb", *map(str, arguments)])
-        said = capsys.readouterr()
-        return int(end.value.code or 0), said.out, said.err
-
-    return run
+    return partial(command, "kb")

@@ -7,7 +7,6 @@ from decimal import Decimal
 
 import pytest
 
-from suave_des.cli.main import main
 from suave_des.errors import KnowledgeError, Level
 from suave_des.kb.check import Subject, check, states_to_ask
 from suave_des.knowledge.ontology import Ontology
@@ -78,22 +77,17 @@ def test_exact_values_are_reported(tmp_path):
     assert only(found_by_pellet(tmp_path, rules), "rule A computes with add").level is Level.INFO
 
 
-def command(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as caught:
-        main(["kb", "check", *arguments])
-    return int(str(caught.value.code or 0))
-
-
-def test_formats_and_exit_status(tmp_path, capsys):
+def test_formats_and_exit_status(tmp_path, command):
     rules = tmp_path / "mine.swrl"
     rules.write_text("A: requiresO(?g, ?o) -> Role(?g)", encoding="utf-8")
-    assert command("--rules", str(rules)) == 0
-    assert f"WARN   {rules}: line 1, rule A, column 4: can never fire" in capsys.readouterr().out
-    assert command("--rules", str(rules), "--fail-on", "warn", "--format", "json") == 1
-    first = json.loads(capsys.readouterr().out)[0]
+    status, out, _ = command("check", "--rules", rules)
+    assert status == 0 and f"WARN   {rules}: line 1, rule A, column 4: can never fire" in out
+    status, out, _ = command("check", "--rules", rules, "--fail-on", "warn", "--format", "json")
+    assert status == 1
+    first = json.loads(out)[0]
     assert (first["level"], first["file"], first["line"], first["column"]) == ("WARN", str(rules), 1, 4)
     rules.write_text("A: Rol(?g) -> Role(?g)", encoding="utf-8")
-    assert command("--rules", str(rules)) == 1
+    assert command("check", "--rules", rules)[0] == 1
 
 
 def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(tmp_path):

@@ -8,16 +8,9 @@ import pytest
 
 from suave_des import run_mission
 from suave_des.campaign.campaign import run_campaign
-from suave_des.cli.main import main
 from suave_des.pages.replay import mission_on_page
 from suave_des.records.mission_folder import read_mission
 from suave_des.resources import shipped_folder
-
-
-def status(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(each) for each in arguments])
-    return ended.value.code or 0
 
 
 @pytest.fixture(scope="module")
@@ -91,11 +84,11 @@ def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_pat
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_replay_says_what_is_wrong(arguments, told, mission, campaign, tmp_path, monkeypatch, capsys):
+def test_replay_says_what_is_wrong(arguments, told, mission, campaign, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     given = [each.format(mission=mission, campaign=campaign) for each in arguments]
-    assert status("replay", *given) == 2
-    assert told in capsys.readouterr().err
+    status, _, error = command("replay", *given)
+    assert status == 2 and told in error
     assert list(tmp_path.iterdir()) == []
 
 
@@ -104,10 +97,10 @@ def test_replay_says_what_is_wrong(arguments, told, mission, campaign, tmp_path,
     [("a,b\n1,2\n", "has no column"), ("manager,search_time_s,distance_inspected_m\n", "no missions")],
     ids=["foreign", "no missions"],
 )
-def test_report_says_what_is_wrong(content, told, tmp_path, capsys):
+def test_report_says_what_is_wrong(content, told, tmp_path, command):
     (tmp_path / "runs.csv").write_text(content, encoding="utf-8")
-    assert status("report", tmp_path) == 2
-    assert told in capsys.readouterr().err
+    status, _, error = command("report", tmp_path)
+    assert status == 2 and told in error
     assert not (tmp_path / "report.html").exists()
 
 

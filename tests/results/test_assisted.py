@@ -1,6 +1,7 @@
 """Real missions assisted by simulated ones: the estimator, what it is given, and how often its intervals hold."""
 
 import math
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -21,24 +22,12 @@ def missions(
     seed: int, conditions: np.ndarray, runs: int, shift_s: float = 0.0, noise_s: float = 2.0, managers: str = "ab"
 ) -> pandas.DataFrame:
     """Missions of managers whose search takes 60 s more for each metre of start.y_m; the second's 10 s more."""
-    chance = np.random.default_rng(seed)
-    rows = [
-        {
-            "manager": manager,
-            "scenario": "s",
-            "run": run,
-            "seed": seed,
-            "start.y_m": y_m,
-            "search_time_s": 60.0 * y_m + 10.0 * (manager == "b") + shift_s + noise_s * chance.normal(),
-            "distance_inspected_m": 20.0 * y_m + noise_s * chance.normal(),
-            "pipeline_found": True,
-            "mission_duration_s": 300.0,
-        }
-        for manager in managers
-        for y_m in conditions
-        for run in range(1, runs + 1)
-    ]
-    return pandas.DataFrame(rows)
+    rows = product(managers, conditions, range(1, runs + 1))
+    frame = pandas.DataFrame(rows, columns=["manager", "start.y_m", "run"]).assign(scenario="s", seed=seed)
+    noise = noise_s * np.random.default_rng(seed).normal(size=(len(frame), 2))
+    search_time_s = 60.0 * frame["start.y_m"] + 10.0 * (frame["manager"] == "b") + shift_s + noise[:, 0]
+    frame = frame.assign(search_time_s=search_time_s, distance_inspected_m=20.0 * frame["start.y_m"] + noise[:, 1])
+    return frame.assign(pipeline_found=True, mission_duration_s=300.0)
 
 
 def population(seed: int = 3, draws: int = 200, **changed: float) -> pandas.DataFrame:

@@ -46,20 +46,10 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def runs(**values: list[float]) -> pandas.DataFrame:
     """Missions of managers with given search times, run by run, with seed 1; 300 s: not found."""
-    return pandas.DataFrame(
-        [
-            {
-                "manager": manager,
-                "run": run,
-                "seed": 1,
-                "search_time_s": time_s,
-                "pipeline_found": time_s < 300.0,
-                "distance_inspected_m": 300.0 - time_s,
-            }
-            for manager, times_s in values.items()
-            for run, time_s in enumerate(times_s, 1)
-        ]
-    )
+    rows = [(manager, run, time_s) for manager, times_s in values.items() for run, time_s in enumerate(times_s, 1)]
+    frame = pandas.DataFrame(rows, columns=["manager", "run", "search_time_s"]).assign(seed=1)
+    times_s = frame["search_time_s"]
+    return frame.assign(pipeline_found=times_s < 300.0, distance_inspected_m=300.0 - times_s)
 
 
 class TestPublishedRuns:

@@ -1,5 +1,6 @@
 """Figures are drawn from result files alone."""
 
+from itertools import product
 from pathlib import Path
 
 import pandas
@@ -99,21 +100,10 @@ def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path):
 
 def sweep_frame(points: int, runs: int) -> pandas.DataFrame:
     """Missions in which the run alone decides the search time, at many points of a sweep."""
-    rows = [
-        {
-            "manager": "a",
-            "seed": 1,
-            "run": run,
-            "search_time_s": 100.0 + 10.0 * run,
-            "distance_inspected_m": 1.0,
-            "pipeline_found": True,
-            "start.x_m": float(point),
-            "start.y_m": float(point % 2),
-        }
-        for point in range(points)
-        for run in range(1, runs + 1)
-    ]
-    return pandas.DataFrame(rows)
+    frame = pandas.DataFrame(product(range(points), range(1, runs + 1)), columns=["start.x_m", "run"])
+    frame = frame.astype({"start.x_m": float}).assign(manager="a", seed=1, distance_inspected_m=1.0)
+    swept = {"search_time_s": 100.0 + 10.0 * frame["run"], "start.y_m": frame["start.x_m"] % 2}
+    return frame.assign(pipeline_found=True, **swept)
 
 
 def test_the_intervals_of_a_sweep_are_those_of_its_runs():

@@ -1,6 +1,7 @@
 """What is averaged before managers are compared: values over the same points and runs, and runs that share a draw."""
 
 import json
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -21,23 +22,10 @@ PUBLISHED = Path(__file__).parents[2] / "scenarios" / "published"
 
 def two_points(**changed: float) -> pandas.DataFrame:
     """Missions of managers a and b at two points of a sweep, with equal reaction times: 2 s, and 6 s at the second."""
-    rows = [
-        {
-            "manager": manager,
-            "scenario": "s",
-            "run": run,
-            "seed": 1,
-            "search_time_s": 100.0 + run,
-            "distance_inspected_m": 50.0,
-            "pipeline_found": True,
-            "mean_reaction_time_s": 2.0 + 4.0 * point,
-            "start.y_m": float(point),
-        }
-        for manager in "ab"
-        for run in range(1, 41)
-        for point in range(2)
-    ]
-    return pandas.DataFrame(rows).assign(**changed)
+    frame = pandas.DataFrame(product("ab", range(1, 41), [0.0, 1.0]), columns=["manager", "run", "start.y_m"])
+    frame = frame.assign(scenario="s", seed=1, search_time_s=100.0 + frame["run"], distance_inspected_m=50.0)
+    frame = frame.assign(pipeline_found=True, mean_reaction_time_s=2.0 + 4.0 * frame["start.y_m"])
+    return frame.assign(**changed)
 
 
 def reactions(frame: pandas.DataFrame) -> Comparison:

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.spec import read_campaign_file
-from suave_des.cli.main import main
 from suave_des.errors import InputError
 from suave_des.scenario.exemplar import MISSION_FILE, REVISIONS, RUNNER_FILE, export_config, import_config
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
@@ -167,37 +166,31 @@ class TestWhatTheExemplarCannotExpress:
 
 
 class TestCommand:
-    def ended(self, *arguments: str) -> int:
-        with pytest.raises(SystemExit) as ended:
-            main(["export-config", *arguments])
-        return ended.value.code
-
-    def test_writes_files_that_import_config_reads(self, write, capsys):
+    def test_writes_files_that_import_config_reads(self, write, command):
         write("mine.yaml", "base: release15\nbattery: {}\nmission: {time_limit_s: 240}\n")
         write("c.yaml", "campaign: 1\nscenario: mine.yaml\nmanagers: [bt]\nruns: 3\nseed: 7\n")
-        assert self.ended("c.yaml", "--out", "there") == 0
-        assert capsys.readouterr().out == "written: there/mission_config.yaml, there/runner_config.yml\n"
-        with pytest.raises(SystemExit) as ended:
-            files = [f"there/{MISSION_FILE}", f"there/{RUNNER_FILE}"]
-            main(["import-config", *files, "--out", "again.yaml", "--campaign", "again_c.yaml"])
-        assert ended.value.code == 0
+        told = "written: there/mission_config.yaml, there/runner_config.yml\n"
+        assert command("export-config", "c.yaml", "--out", "there") == (0, told, "")
+        files = [f"there/{MISSION_FILE}", f"there/{RUNNER_FILE}"]
+        assert command("import-config", *files, "--out", "again.yaml", "--campaign", "again_c.yaml").status == 0
         assert load_scenario("again.yaml").scenario.mission.time_limit_s == 240
         settings = read_campaign_file("again_c.yaml").settings
         assert (settings.managers, settings.runs, settings.seed) == (("bt",), 3, 7)
 
-    def test_values_have_the_types_of_the_nodes_parameters(self, write):
+    def test_values_have_the_types_of_the_nodes_parameters(self, write, command):
         write("mine.yaml", "base: release15\nmission: {time_limit_s: 240}\nstart: {x_m: -16}\n")
-        assert self.ended("mine.yaml", "--out", "there") == 0
+        assert command("export-config", "mine.yaml", "--out", "there").status == 0
         mission, runner = (yaml.safe_load(Path("there", name).read_text()) for name in (MISSION_FILE, RUNNER_FILE))
         limit = mission["/mission_node"]["ros__parameters"]["time_limit"]
         x_m = runner["/suave_runner_node"]["ros__parameters"]["initial_pos_x"]
         assert (type(limit), type(x_m)) == (int, float)  # ROS 2 refuses a parameter of another type
 
-    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, capsys):
+    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, command):
         write("there/mission_config.yaml", "kept")
-        assert self.ended("release15", "--out", "there") == 2
-        assert "exists already" in capsys.readouterr().err
+        export = ("export-config", "release15", "--out")
+        status, _, error = command(*export, "there")
+        assert status == 2 and "exists already" in error
         assert Path("there/mission_config.yaml").read_text() == "kept"
-        assert self.ended("release15", "--out", "there", "--overwrite") == 0
-        assert capsys.readouterr().out.startswith("not expressed: battery: nothing here")
-        assert self.ended("release15", "--out", "no/where") == 2
+        status, out, _ = command(*export, "there", "--overwrite")
+        assert status == 0 and out.startswith("not expressed: battery: nothing here")
+        assert command(*export, "no/where").status == 2

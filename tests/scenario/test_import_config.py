@@ -1,6 +1,5 @@
 """The exemplar's configuration files become ours, and nothing in them is dropped silently."""
 
-import csv
 import json
 import re
 from pathlib import Path
@@ -9,10 +8,10 @@ import pytest
 import yaml
 
 from suave_des.campaign.campaign import run_campaign
-from suave_des.cli.main import main
 from suave_des.errors import InputError
 from suave_des.scenario.exemplar import REVISIONS, import_config
 from suave_des.scenario.loader import load_scenario
+from tests.helpers import rows_of
 
 UPSTREAM = Path(__file__).parents[1] / "data" / "exemplar"
 MANAGERS = ("none", "random", "metacontrol", "bt", "bt_extended")
@@ -300,14 +299,11 @@ class TestCampaign:
         assert [each.time_s for each in mine().thruster_events] == [35, 60]
         assert mine().start.x_m == -17
 
-    def test_can_be_run(self, imported, tmp_path):
+    def test_can_be_run(self, imported, command):
         runner = RUNNER_15.replace('"num_runs": 20', '"num_runs": 6').replace('"metacontrol"', '"bt"')
         imported(runner, MISSION_15.replace("300.0", "60.0"), campaign=True)
-        with pytest.raises(SystemExit) as ended:
-            main(["campaign", "campaign.yaml", "--workers", "1", "--out", "out"])
-        assert ended.value.code == 0
-        with Path("out/runs.csv").open(newline="") as file:
-            rows = list(csv.DictReader(file))
+        assert command("campaign", "campaign.yaml", "--workers", "1", "--out", "out").status == 0
+        rows = rows_of(Path("out"))
         assert [row["manager"] for row in rows] == ["none"] * 6 + ["bt"] * 6
         first, second = ([float(row[f"thruster_events.{event}.time_s"]) for row in rows] for event in (0, 1))
         assert [later - sooner for sooner, later in zip(first, second, strict=True)] == pytest.approx([25] * 12)
@@ -494,18 +490,14 @@ class TestBadInput:
 
 
 class TestCommand:
-    def ended(self, *arguments: str) -> int:
-        with pytest.raises(SystemExit) as ended:
-            main(["import-config", *arguments])
-        return ended.value.code
-
-    def test_writes_scenario_and_campaign_and_tells_the_rest(self, write, capsys):
+    def test_writes_scenario_and_campaign_and_tells_the_rest(self, write, command):
         write("mission.yaml", MISSION_15)
         write("runner.yaml", RUNNER_15)
         write("sub/keep.txt", "")
         arguments = ["mission.yaml", "runner.yaml", "--out", "mine.yaml", "--campaign", "sub/campaign.yaml"]
-        assert self.ended(*arguments) == 0
-        told = capsys.readouterr().out.splitlines()
+        status, out, _ = command("import-config", *arguments)
+        told = out.splitlines()
+        assert status == 0
         assert told[-2].startswith("mine.yaml is written, based on release15: only revision 1.5 has ")
         assert told[-1] == "sub/campaign.yaml is written"
         assert any("no counterpart" in line and "mission_metrics.result_path" in line for line in told)
@@ -526,13 +518,11 @@ class TestCommand:
             (["--out", "mine.yaml"], "FILE"),
         ],
     )
-    def test_bad_input_is_one_line_and_nothing_is_written(self, write, capsys, arguments, problem):
+    def test_bad_input_is_one_line_and_nothing_is_written(self, write, command, arguments, problem):
         for name, content in (("mission.yaml", MISSION_15), ("runner.yaml", RUNNER_15), ("there.yaml", "kept")):
             write(name, content)
-        assert self.ended(*arguments) == 2
-        captured = capsys.readouterr()
-        assert captured.out == ""
-        assert len(captured.err.splitlines()) == 1
-        assert problem in captured.err
+        status, out, error = command("import-config", *arguments)
+        assert (status, out, len(error.splitlines())) == (2, "", 1)
+        assert problem in error
         assert sorted(path.name for path in Path().iterdir()) == ["mission.yaml", "runner.yaml", "there.yaml"]
         assert Path("there.yaml").read_text() == "kept"
