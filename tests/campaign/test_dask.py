@@ -61,13 +61,9 @@ class Cluster:
         hooks = folder / "hooks"
         hooks.mkdir(parents=True)
         (hooks / "sitecustomize.py").write_text(_TELLS_WHAT_IT_OPENS)
-        own = {
-            name: value
-            for name, value in os.environ.items()
-            if not name.startswith(("SUAVE_DES_", "XDG_", "DASK_", "PYTEST_"))
-        }
+        ours = ("SUAVE_DES_", "XDG_", "DASK_", "PYTEST_")
         self._environment = {
-            **own,
+            **{name: value for name, value in os.environ.items() if not name.startswith(ours)},
             "HOME": str(folder),
             "PYTHONPATH": os.pathsep.join([str(hooks), str(Path(suave_des.__file__).parents[1])]),
             **_QUIET,

@@ -1,6 +1,5 @@
 """How worker processes start, without the script that asked for them, and how they end."""
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,17 +10,15 @@ from suave_des import run_campaign
 from suave_des.campaign.spec import CampaignSpec
 from tests.helpers.command import python, wait_until
 
-CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers=2).to_csv(index=False))\n"
-MINE = "from suave_des.managing.simple import RandomManager\nclass Mine(RandomManager):\n    pass\n"
-
-
-def run_script(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    (folder / "script.py").write_text("from suave_des import run_campaign\n" + text)
-    return python("script.py", cwd=folder)
-
-
-def call(scenario: Path, managers: list[str]) -> str:
-    return CALL.format(scenario=str(scenario), managers=managers)
+SCRIPT = """
+import sys
+from suave_des import run_campaign
+from suave_des.managing.simple import RandomManager
+class Mine(RandomManager):
+    pass
+print(run_campaign(sys.argv[1], ["__main__:Mine", "none"], runs=12, seed=1, workers=2).to_csv(index=False))
+print("numba" in sys.modules)
+"""
 
 
 def without_workers(scenario: Path, managers: list[str]) -> str:
@@ -30,8 +27,8 @@ def without_workers(scenario: Path, managers: list[str]) -> str:
 
 
 def test_a_script_that_defines_a_manager_needs_no_guard_nor_loads_the_compiler(scenario, tmp_path):
-    look = "import sys\nprint('numba' in sys.modules)\n"
-    done = run_script(MINE + call(scenario, ["__main__:Mine", "none"]) + look, tmp_path)
+    (tmp_path / "script.py").write_text(SCRIPT)
+    done = python("script.py", scenario, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     expected = without_workers(scenario, ["random", "none"]).replace(",random,", ",__main__:Mine,")
     assert done.stdout == expected + "\nFalse\n"

@@ -22,10 +22,11 @@ ONE_MISSION = ["run", "seams2023", "--manager", "none"]
 CAMPAIGN = ["campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", "--out", "out"]
 
 
-def run(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(*arguments: str, command: list[str] = COMMAND, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command in the current folder, with the user's caches."""
     kept = {name: value for name, value in os.environ.items() if name not in ("SUAVE_DES_CACHE_DIR", "NUMBA_CACHE_DIR")}
     return subprocess.run(
-        [*COMMAND, *arguments], cwd=cwd, env={**kept, **environment}, capture_output=True, text=True, timeout=300
+        [*command, *arguments], env={**kept, **environment}, capture_output=True, text=True, timeout=300
     )
 
 
@@ -44,11 +45,7 @@ def small_loop(tmp_path: Path) -> list[str]:
 
 class TestCacheFolder:
     def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(self, tmp_path, small_loop):
-        kept = {
-            name: value for name, value in os.environ.items() if name not in ("SUAVE_DES_CACHE_DIR", "NUMBA_CACHE_DIR")
-        }
-        nowhere = {"HOME": "/dev/null/home", "XDG_CACHE_HOME": "", "TMPDIR": str(tmp_path)}
-        done = subprocess.run(small_loop, env={**kept, **nowhere}, capture_output=True, text=True, timeout=120)
+        done = run(command=small_loop, HOME="/dev/null/home", XDG_CACHE_HOME="", TMPDIR=str(tmp_path))
         assert (done.returncode, done.stdout) == (0, "55.0\n")
         assert done.stderr.count("the cache folder cannot be used") == 1
         (folder,) = tmp_path.glob("suave-des-*")
@@ -110,7 +107,7 @@ def test_files_named_like_python_s_own_modules_are_not_run_by_workers(tmp_path):
         "from suave_des.managing.simple import NoManager\n\n\nclass Mine(NoManager):\n    pass\n"
     )
     managers = ["campaign", "seams2023", "--managers", "none,mine:Mine", "--runs", "2", "--workers", "2"]
-    done = run(*managers, "--out", "out", "--quiet", cwd=tmp_path)
+    done = run(*managers, "--out", "out", "--quiet")
     assert done.returncode == 0, done.stderr
     assert not list(tmp_path.glob("ran-*"))
 
@@ -181,7 +178,7 @@ class TestStopped:
 
 class TestOutput:
     def test_in_ascii_has_other_characters(self, tmp_path):
-        done = run(*CAMPAIGN, cwd=tmp_path, PYTHONIOENCODING="ascii")
+        done = run(*CAMPAIGN, PYTHONIOENCODING="ascii")
         assert done.returncode == 0
         assert " ? " in done.stdout and done.stdout.isascii()
 
@@ -202,7 +199,7 @@ class TestOutput:
 def test_java_takes_no_options_from_the_environment_and_leaves_nothing_in_the_temporary_folder(tmp_path):
     options = {"JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption", "_JAVA_OPTIONS": "-XX:+NoSuchOption"}
     arguments = ["kb", "infer", "--reasoner", "pellet", "--at", "water_visibility=1"]
-    done = run(*arguments, cwd=tmp_path, TMPDIR=str(tmp_path), **options)
+    done = run(*arguments, TMPDIR=str(tmp_path), **options)
     assert (done.returncode, done.stderr) == (0, "")
     assert not list(tmp_path.glob(".java_pid*"))
 
@@ -216,7 +213,7 @@ class TestLimits:
     CATASTROPHIC = 'SELECT ?x WHERE { ?x a ?c . FILTER(REGEX("' + "a" * 44 + '", "(a+)+b")) }'
 
     def test_of_a_query_holds_within_a_regular_expression(self, tmp_path):
-        done = run("kb", "query", "--time-limit", "1", self.CATASTROPHIC, cwd=tmp_path)
+        done = run("kb", "query", "--time-limit", "1", self.CATASTROPHIC)
         assert done.returncode == 2
         assert done.stderr == "suave-des: answering the query: not done after 1 s (allow more with --time-limit)\n"
 

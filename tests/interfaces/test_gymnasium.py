@@ -15,11 +15,6 @@ from tests.helpers.command import python
 NAME = "suave_des/PipelineInspection-v0"
 
 
-@pytest.fixture(scope="module")
-def simulator() -> Simulator:
-    return Simulator(load_scenario("seams2023"))
-
-
 def play(environment: gymnasium.Env, action: object, seed: int) -> tuple[list, float, dict]:
     observation, info = environment.reset(seed=seed)
     seen, total, is_over = [observation], 0.0, False

@@ -4,15 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des import InputError, Mission, load_scenario
-from suave_des.simulation.simulator import Simulator
+from suave_des import InputError, Mission
 
 SEARCH = "f_generate_search_path"
-
-
-@pytest.fixture(scope="module")
-def simulator() -> Simulator:
-    return Simulator(load_scenario("seams2023"))
 
 
 @given(steps_s=st.lists(st.floats(0.0, 40.0), min_size=1, max_size=30))

@@ -12,16 +12,11 @@ from http.client import HTTPConnection
 import jsonschema
 import pytest
 
-from suave_des import InputError, Mission, load_scenario
+from suave_des import InputError, Mission
 from suave_des.interfaces.serve import Server, Session
 from suave_des.simulation.simulator import Simulator
 
 SEARCH = "f_generate_search_path"
-
-
-@pytest.fixture(scope="module")
-def simulator() -> Simulator:
-    return Simulator(load_scenario("seams2023"))
 
 
 @pytest.fixture

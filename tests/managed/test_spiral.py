@@ -167,21 +167,14 @@ def test_inactive_it_sends_nothing(name):
     assert len(search.vehicle.commanded) == 3
 
 
-def test_revision_2023_goes_on_with_its_spiral_when_activated_again():
-    search = searching("2023", obeys=True)
+@pytest.mark.parametrize(("name", "origin", "reached"), [("2023", ORIGIN, 8), ("1.5", (-10.0, 1.0), 1)])
+def test_activated_again_revision_2023_goes_on_with_its_spiral_and_15_starts_afresh_where_it_is(name, origin, reached):
+    search = searching(name, obeys=True)
     search.ticks(7)
     search.node.apply(INACTIVE)
     search.ticks(5)
+    if origin != ORIGIN:
+        search.vehicle.place = (*origin, -19.0)
     search.node.apply(spiral_at(1.0))
     search.ticks(1)
-    assert search.spiral(ORIGIN)[-1] == point(8, 8)
-
-
-def test_revision_15_starts_afresh_where_it_is_when_activated_again():
-    search = searching("1.5", obeys=True)
-    search.ticks(7)
-    search.node.apply(INACTIVE)
-    search.vehicle.place = (-10.0, 1.0, -19.0)
-    search.node.apply(spiral_at(1.0))
-    search.ticks(1)
-    assert search.spiral((-10.0, 1.0))[-1] == point(1, 1)
+    assert search.spiral(origin)[-1] == point(reached, reached)
