@@ -36,7 +36,7 @@ def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path):
     )
     assert result.rows == run_campaign("seams2023", ["none", "random"], 4, 7).rows
     other = run_campaign(path, ["none"], 2, 8)
-    assert (other.spec.managers, other.spec.runs, other.spec.seed) == (("none",), 2, 8)
+    assert (other.campaign.spec.managers, other.campaign.spec.runs, other.campaign.spec.seed) == (("none",), 2, 8)
 
 
 def test_each_value_of_a_sweep_gives_the_missions_of_a_scenario_that_has_it(tmp_path):
