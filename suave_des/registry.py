@@ -168,9 +168,11 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
         raise InputError(problem, remedy=nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}")
     if found not in _checked and not module_name.startswith("suave_des."):
         _check_hooks(what, found, base)
-        if issubclass(found, ManagingSubsystem) and not _are_kinds(found.subscribes_to):
+        subscribed: Any = getattr(found, "subscribes_to", ())
+        are_kinds = isinstance(subscribed, Collection) and all(each in list(Kind) for each in subscribed)
+        if not (are_kinds or isinstance(subscribed, property)):
             remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
-            raise InputError(f"{what}: subscribes_to is {shown(found.subscribes_to)}", remedy=remedy)
+            raise InputError(f"{what}: subscribes_to is {shown(subscribed)}", remedy=remedy)
         _checked.add(found)
     return found
 
@@ -195,12 +197,6 @@ def _imported(what: str, module: str) -> ModuleType:
             raise InputError(problem, file=own[-1].filename, place=f"line {own[-1].lineno}") from error
         remedy = "module must be importable: installed, or in the current folder or one on PYTHONPATH"
         raise InputError(problem, remedy=remedy) from error
-
-
-def _are_kinds(subscribed: Any) -> bool:
-    if isinstance(subscribed, Collection) and not isinstance(subscribed, str):
-        return all(each in list(Kind) for each in subscribed)
-    return isinstance(subscribed, property)
 
 
 def _check_hooks(what: str, kind: type, root: type) -> None:
