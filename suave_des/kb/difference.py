@@ -54,7 +54,7 @@ def compare_axioms(one: Ontology, other: Ontology) -> tuple[list[str], list[str]
 
 def _axioms(base: Ontology) -> Iterator[str]:
     """Write every axiom, fact and rule as text; what a rule consists of is no axiom of its own."""
-    for triple in (*base.content.triples, *base.model.triples()):
+    for triple in (*base.content.triples, *chain.from_iterable(base.model.own.values())):
         if not str(triple[2]).startswith(SWRL):
             yield _triple(base, triple)
     yield from _structure(base)

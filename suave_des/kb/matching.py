@@ -9,11 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Final
-
-from rdflib import BNode
 
 from suave_des.kb.space import Situation
 from suave_des.knowledge.ontology import Content, Ontology
@@ -21,7 +18,6 @@ from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable
-from suave_des.knowledge.rules.files import with_triples
 from suave_des.knowledge.state import ContradictionError, Value
 
 #: Begins the IRIs of what is added to a knowledge base to question it.
@@ -255,7 +251,7 @@ def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
     """What Pellet computes for the first argument, or one value if the atom holds."""
     result = atom.arguments[0] if computes else Lit("true", XSD + "boolean")
     head = Atom("data", f"{PROBE}#value", (Named(f"{PROBE}#it"), result))
-    rule = with_triples(Rule("probe", "", Path(), True, BNode(), (), (atom,), (head,)))
+    rule = Rule("probe", (atom,), (head,))
     known = ((f"{PROBE}#it", RDF_TYPE, OWL + "Thing"),)
     found = entailed(Content(known, (), (rule,)).n_triples(), [head])
     return tuple(sorted(value for _, _, value in found if isinstance(value, Lit)))
@@ -281,11 +277,8 @@ class Probes:
 
     def __init__(self, base: Ontology, limit: TimeLimit, bodies: Iterable[Body]) -> None:
         self._base, self._limit, self._bodies = base, limit, tuple(dict.fromkeys(bodies))
-        rules = (
-            Rule(f"probe {number}", "", Path(), True, BNode(), (), body, (_head(number),))
-            for number, body in enumerate(self._bodies)
-        )
-        probed = base.with_rules((*base.rules, *map(with_triples, rules)))
+        rules = (Rule(f"probe {number}", body, (_head(number),)) for number, body in enumerate(self._bodies))
+        probed = base.with_rules((*base.rules, *rules))
         self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
 
     def holding(self, situation: Situation) -> frozenset[Body] | None:

@@ -38,7 +38,7 @@ from suave_des.knowledge.rules import (
     mirrored,
     write_atom,
 )
-from suave_des.knowledge.rules.files import fatal_problems, with_triples
+from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.tables import Table
 
@@ -106,7 +106,7 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
         body, head = list(rule.body), list(rule.head)
         side, at = (body, number) if number < len(body) else (head, number - len(body))
         side[at : at + 1] = [] if atom is None else [atom]
-        new = with_triples(replace(rule, body=tuple(body), head=tuple(head)))
+        new = replace(rule, body=tuple(body), head=tuple(head), triples=())
         is_same = new.head == rule.head and set(new.body) == set(rule.body)
         if not is_same and not fatal_problems(new, base.vocabulary):
             found.append(Mutant(operator, rule, new))

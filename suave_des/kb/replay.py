@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -14,7 +13,6 @@ from suave_des.kb.matching import with_bindings
 from suave_des.kb.space import Situation, differing_decisions
 from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
 from suave_des.kb.tracing import Tracer, pellet_for
-from suave_des.knowledge.ontology import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.state import NONE_LEFT, STAYS
 from suave_des.metrics.result import KnowledgeRecord
@@ -140,11 +138,12 @@ class _Trial:
         base, settings = read_base(scenario), ManagingSettings.of(scenario)
         self.before = KnowledgeBase.of(base, settings, scenario.knowledge.reasoner, limit)
         tried = () if rule is None else read_rules(rule, base.vocabulary)
+        unwanted = () if disabled is None else (disabled,)
         try:
-            content = with_rules(base.content, [tried], () if disabled is None else (disabled,))
+            base.check_names((), unwanted)
         except KnowledgeError as error:
             raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
-        self.after = self.before.changed(replace(base, content=content))
+        self.after = self.before.changed(base.with_files((), [tried], unwanted))
         self.with_rule = self.after.base if disabled is None else base
         names = {disabled, *(each.name for each in tried)}
         self.rules = [each for each in self.with_rule.content.enabled_rules if each.name in names]

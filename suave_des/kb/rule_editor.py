@@ -29,7 +29,7 @@ from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
 from suave_des.knowledge.rdf import RDF as RDF_NS
 from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
 from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.rules.files import ENABLED, rules_of
+from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
@@ -170,22 +170,24 @@ def _name(element: etree._Element) -> str | None:
 
 def _rule_xml(rule: Rule) -> str:
     """The element of a rule. Its variables and built-ins are declared where it uses them, so that they go with it."""
-    declared = {triple[0]: _VARIABLE for triple in rule.triples if triple[2] == _VARIABLE}
+    triples = triples_of(rule)
+    start = triples[0][0]
+    declared = {triple[0]: _VARIABLE for triple in triples if triple[2] == _VARIABLE}
     builtins = {URIRef(atom.predicate): URIRef(SWRL + "Builtin") for atom in rule.body if atom.kind == "builtin"}
-    of: dict[Node, list[RdfTriple]] = {rule.node: []}
+    of: dict[Node, list[RdfTriple]] = {start: []}
     if not rule.enabled:
-        of[rule.node].append((rule.node, ENABLED, _truth(False)))
-    for triple in rule.triples:
+        of[start].append((start, ENABLED, _truth(False)))
+    for triple in triples:
         of.setdefault(triple[0], []).append(triple)
     for name, kind in (*declared.items(), *builtins.items()):
         of[name] = [(name, RDF.type, kind)]
-    order = [rule.node]
+    order = [start]
     for node in order:  # a list nests as deep as it is long, which is too deep for a recursion
         order += [value for _, predicate, value in of[node] if value in of and predicate != RDF.type]
     texts: dict[Node, str] = {}
     for node in reversed(order):
         texts[node] = "".join(_property_xml(predicate, value, texts) for _, predicate, value in of[node])
-    inside = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", texts[rule.node])
+    inside = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", texts[start])
     return f"    <rdf:Description {_DECLARED}>{inside}\n    </rdf:Description>\n"
 
 

@@ -303,7 +303,8 @@ def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None =
     measured = base.model.measurements[attribute]
     triples = base.content.triples
     designs = base.model.estimated if functions is None else itertools.chain(*map(base.designs, functions))
-    if measured.own or has_expressions(base) or any(attribute in base.model.estimated[name] for name in designs):
+    is_expected = any(attribute in base.model.estimated[name] for name in designs)
+    if is_expected or base.model.own[measured] or has_expressions(base):
         return True
     related = ("subPropertyOf", "inverseOf", "equivalentProperty")
     if any(
@@ -316,7 +317,7 @@ def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None =
     domains = {str(o) for s, p, o in triples if p == RDFS + "domain" and s in _CARRIED}
     above = ((s, str(o)) for s, p, o in triples if p in (RDFS + "subClassOf", OWL + "equivalentClass"))
     classes = reached({TOMASYS + "QAvalue", OWL + "Thing", *domains}, above)
-    return any(_can_match(rule, iri, measured.iri, classes) for rule in base.content.enabled_rules)
+    return any(_can_match(rule, iri, measured, classes) for rule in base.content.enabled_rules)
 
 
 def has_expressions(base: Ontology) -> bool:
@@ -361,7 +362,7 @@ def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     if any(rules) or any(f"<{iri}>" in line for iri in (a, b) for line in content.structure):
         return False
     swap: dict[str | Lit, str] = {a: b, b: a}
-    known = (*content.triples, *model.initial.get(one, ()), *model.initial.get(other, ()))
+    known = (*content.triples, *model.own[a], *model.own[b])
     own = {triple for triple in known if triple[0] in swap or triple[2] in swap}
     return own == {(swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own}
 
@@ -535,7 +536,7 @@ def _is_plain(base: Ontology) -> bool:
         or any(p == SAME or o == OWL + "InverseFunctionalProperty" for _, p, o in triples)
         or len({*own}) < len(own)
         or has_expressions(base)
-        or any(measurement.own for measurement in base.model.measurements.values())
+        or any(base.model.own[measurement] for measurement in base.model.measurements.values())
         or any(atom.kind in ("same", "different") for atom in atoms)
         or any(
             atom.predicate in _OF_VALUES or (atom.kind == "object" and atom.predicate in functional) for atom in heads

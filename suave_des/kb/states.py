@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
-from rdflib import BNode
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
@@ -18,7 +17,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
 from suave_des.knowledge.reasoner import triggers_adaptation
 from suave_des.knowledge.rules import Atom, Named, Rule, RuleError, Term, Variable, texts_of
-from suave_des.knowledge.rules.files import RulesFile, Vocabulary, fatal_problems, read_rule
+from suave_des.knowledge.rules.files import RulesFile, Vocabulary, check_rule, fatal_problems, looked_up
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, ObjectiveState
 from suave_des.records.mission_folder import (
@@ -97,7 +96,7 @@ class FactReader:
         if isinstance(value, Lit):
             atom = Atom("data", predicate, (Variable("x"), value))
             concluded = Atom("class", OWL + "Thing", (Variable("x"),))
-            asked = Rule("", "", Path(), True, BNode(), (), (atom,), (concluded,))
+            asked = Rule("", (atom,), (concluded,))
             for problem in fatal_problems(asked, self.base.vocabulary):
                 raise InputError(problem.message, remedy=problem.remedy)
         return fact_of((subject, predicate, value), self.base.names)
@@ -128,7 +127,7 @@ def read_rules(given: str, vocabulary: Vocabulary) -> tuple[Rule, ...]:
     """
     if given.endswith(".swrl") and "->" not in given:
         return RulesFile.read(Path(given)).rules(vocabulary)
-    return (read_rule(given, vocabulary, Path("the rule")),)
+    return (check_rule(looked_up(parse_rule(given, Path("the rule")), vocabulary), vocabulary),)
 
 
 def _parsed(text: str) -> Atom:

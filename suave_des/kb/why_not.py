@@ -167,7 +167,7 @@ class RuleQuestions:
         """Whether what an atom asks for is neither in states nor concluded by a rule."""
         content = self._usable.content
         concluded = content.head_properties() | content.head_classes()
-        of_states = {triple[1] for individual in self._usable.model.individuals() for triple in individual.own}
+        of_states = {triple[1] for own in self._usable.model.own.values() for triple in own}
         return atom.kind in FACT_KINDS and atom.predicate not in _IN_STATES | concluded | of_states
 
     @cached_property

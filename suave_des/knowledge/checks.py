@@ -27,7 +27,7 @@ from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_
 from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term, Variable, write_atom
-from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile, Vocabulary, about_rule, fatal_problems
+from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile, about_rule, fatal_problems, looked_up
 from suave_des.resources import shipped_folder
 
 
@@ -109,8 +109,7 @@ class Material:
 
     def is_of_metamodel(self, rule: Rule) -> bool:
         """Whether a rule is one of TOMASys or mros."""
-        source = self.base.source_of(rule)
-        return source is not None and is_metamodel(source)
+        return any(source.path == rule.file and is_metamodel(source) for source in self.base.sources)
 
     def is_own(self, rule: Rule) -> bool:
         """Whether a rule is in a file that the user gave, and not one of TOMASys."""
@@ -125,7 +124,7 @@ class Material:
     def suspicious(self, rule: Rule, place: Place | None, message: str, remedy: str | None = None) -> Finding:
         """Make a finding about a rule; of one in an imported ontology it is a note."""
         level = Level.WARN if self.is_own(rule) else Level.INFO
-        return about_rule(rule, message, place, remedy, level, self.base.place_of(rule))
+        return about_rule(rule, message, place, remedy, level)
 
 
 def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[Finding]:
@@ -138,23 +137,24 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
     Raises:
         InputError: a file of rules cannot be read at all; the scenario names a value or a rule that is not there.
     """
-    findings = list[Finding]()
-
-    def usable(file: RulesFile, vocabulary: Vocabulary) -> Sequence[Rule]:
-        found = list(file.looked_up(vocabulary))
-        findings.extend(map(Finding.of, file.parsed.errors))
-        findings.extend(replace(Finding.of(rule), rule=name) for name, rule in found if isinstance(rule, RuleError))
-        if not found and not file.parsed.errors:
-            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(file.path)))
-        return [rule for _, rule in found if isinstance(rule, Rule)]
-
     files = [RulesFile.read(path) for path in subject.rules]
     try:
-        base = Ontology.merged(sources, files, usable, subject.values, subject.disabled_rules, subject.operators)
+        base = Ontology.merged(sources, subject.values, subject.operators)
     except KnowledgeError as error:
-        if error.file is None:  # about a name that the scenario gives, and no file
-            raise
-        return [*findings, Finding.of(error)]
+        return [Finding.of(error)]
+    findings, groups = list[Finding](), []
+    for file in files:
+        findings += map(Finding.of, file.errors)
+        if not file.parsed and not file.errors:
+            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(file.path)))
+        groups.append(group := list[Rule]())
+        for rule in file.parsed:
+            try:
+                group.append(looked_up(rule, base.vocabulary))
+            except RuleError as error:
+                findings.append(replace(Finding.of(error), rule=rule.name))
+    base = base.with_files(files, groups, subject.disabled_rules)
+    base.check_names(subject.values, subject.disabled_rules)
     return [*findings, *findings_in(base, subject)]
 
 
@@ -190,8 +190,7 @@ def undefined_names(material: Material) -> Iterator[Finding]:
     Only those of the ontologies' own namespaces: names of other vocabularies may be defined elsewhere.
     """
     model, kinds, triples = material.base.model, material.base.vocabulary.kinds, material.content.triples
-    of_states = {each.iri for each in model.individuals()}
-    described = {subject for subject, _, _ in triples} | of_states
+    described = {subject for subject, _, _ in triples} | model.in_states
     namespaces = {rdf.namespace(iri) for iri in described}
     assumed = {(model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed}
     for subject, predicate, value in triples:
@@ -208,7 +207,7 @@ def undefined_names(material: Material) -> Iterator[Finding]:
                 used = local_name(predicate), str(value), ("individual",)
         if used is not None and rdf.namespace(used[1]) in namespaces:
             words, name, meant = used
-            known = [iri for iri in described - of_states - {subject} if kinds.get(iri, frozenset()) & {*meant}]
+            known = [iri for iri in described - model.in_states - {subject} if kinds.get(iri, frozenset()) & {*meant}]
             same = sorted(iri for iri in known if local_name(iri) == local_name(name))
             remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
             problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
@@ -253,10 +252,10 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
         problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
         yield material.about(Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <")
     valued = {subject for subject, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE}
-    for name, each in model.measurements.items():
-        if measured is not None and each.iri in valued and name not in measured:
-            problem = f"hasValue of {local_name(each.iri)} is not used: {name} has the value that missions measure"
-            yield material.about(Level.WARN, local_name(each.iri), problem, "measure it in the scenario")
+    for name, iri in model.measurements.items():
+        if measured is not None and iri in valued and name not in measured:
+            problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
+            yield material.about(Level.WARN, local_name(iri), problem, "measure it in the scenario")
 
 
 def attributes_declared_twice(material: Material) -> Iterator[Finding]:
@@ -347,7 +346,7 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
             f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
             f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator",
             file=rule.file,
-            place=base.place_of(rule),
+            place=f"line {rule.line}" if rule.line else None,
             remedy=f'write revision: "2023" in the scenario, or use ontologies of revision {revision}',
         )
 
@@ -366,9 +365,8 @@ def another_revision(material: Material) -> Iterator[Finding]:
 def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
     """Find what Pellet would drop or ignore without a word."""
     for rule in material.rules:
-        for each in fatal_problems(rule, material.base.vocabulary) if rule not in material.for_other_models else ():
-            place = Place(each.line or 1, each.column) if each.column else None
-            yield about_rule(rule, each.message, place, each.remedy, Level.ERROR, material.base.place_of(rule))
+        if rule not in material.for_other_models:
+            yield from fatal_problems(rule, material.base.vocabulary)
 
 
 def shared_names(material: Material) -> Iterator[Finding]:

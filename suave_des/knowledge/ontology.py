@@ -26,7 +26,7 @@ from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts, place_of, supplies
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.rules import EXPRESSION, Rule
-from suave_des.knowledge.rules.files import RulesFile, Vocabulary, check_property_use, rules_of
+from suave_des.knowledge.rules.files import RulesFile, Vocabulary, check_property_use, rules_of, triples_of
 from suave_des.knowledge.state import Fact, KnowledgeState, Value, grounding_name, measurement_name, objective_name
 from suave_des.resources import shipped_folder
 
@@ -124,11 +124,7 @@ def _named(iris: Iterable[str]) -> tuple[str, ...]:
 
 
 def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Content:
-    """Merge the triples and rules of files, with the values of named QAvalue individuals replaced.
-
-    Raises:
-        KnowledgeError: a value names no individual with a hasValue.
-    """
+    """Merge the triples and rules of files, with the values of named QAvalue individuals replaced."""
     triples, structure, rules = dict[rdf.Triple, None](), list[str](), list[Rule]()
     shipped = shipped_folder("ontology")
     # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology replaces them.
@@ -143,57 +139,22 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
         rules += [rule for rule in found if source.path.parent != shipped or rule.name not in given_mros]
         # Triples about the ontology itself (imports, versions) are no part of its content.
         ontologies = set(source.graph.subjects(RDF.type, OWL_TERMS.Ontology))
-        inside = {triple for rule in found for triple in rule.triples}
-        for triple in sorted(set(source.graph) - inside):
+        for triple in sorted(set(source.graph).difference(*(rule.triples for rule in found))):
             # Protégé declares the built-ins, about which Pellet logs a warning.
             if str(triple[1]) in _ANNOTATIONS or triple[0] in ontologies or triple[2] == URIRef(rdf.SWRL + "Builtin"):
                 continue
             if any(isinstance(term, BNode) for term in triple):
                 structure.append(rdf.n_triple_with_nodes(triple, f"f{number}", {}))
-            else:
-                triples[str(triple[0]), str(triple[1]), rdf.term_of(triple[2])] = None
-    return Content(_override(tuple(sorted(triples, key=str)), values), tuple(structure), _in_order(rules))
-
-
-def with_rules(content: Content, more: Iterable[Sequence[Rule]], disabled: Collection[str]) -> Content:
-    """Add the rules of text files and disable rules.
-
-    A file's rules replace all rules of the same names that were read before, of ontologies or of files: so a rule
-    can be tried in another wording, or disabled by its mark.
-
-    Raises:
-        KnowledgeError: there is no rule of a name to disable.
-    """
-    rules, replaced = list(content.rules), list[tuple[Rule, Rule]]()
-    for group in more:
-        new = {rule.name: rule for rule in group}
-        replaced += [(rule, new[rule.name]) for rule in rules if rule.name in new]
-        rules = [rule for rule in rules if rule.name not in new] + list(group)
-    _check_known(disabled, {rule.name for rule in rules}, "disabled_rules", "there is no rule {} to switch off")
-    rules = [replace(rule, enabled=rule.enabled and rule.name not in disabled) for rule in rules]
-    return replace(content, rules=_in_order(rules), replaced=tuple(replaced))
+                continue
+            subject, predicate, value = str(triple[0]), str(triple[1]), rdf.term_of(triple[2])
+            if predicate == rdf.HAS_VALUE and local_name(subject) in values:
+                value = Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal")
+            triples[subject, predicate, value] = None
+    return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules))
 
 
 def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text, str(rule.file))))
-
-
-def _check_known(names: Iterable[str], known: Collection[str], key: str, problem: str) -> None:
-    """Check names that a scenario gives under a key of `knowledge`."""
-    for name in sorted(set(names).difference(known)):
-        remedy = nearest(name, known) or f"known: {', '.join(sorted(known)) or 'none'}"
-        raise KnowledgeError(problem.format(name), place=f"{key}.{name}", remedy=remedy)
-
-
-def _override(triples: tuple[rdf.Triple, ...], values: Mapping[str, Decimal]) -> tuple[rdf.Triple, ...]:
-    known = {local_name(triple[0]) for triple in triples if triple[1] == rdf.HAS_VALUE}
-    _check_known(values, known, "values", "the ontology has no individual {} with a hasValue")
-    return tuple(
-        (subject, predicate, Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal"))
-        if predicate == rdf.HAS_VALUE and local_name(subject) in values
-        else (subject, predicate, value)
-        for subject, predicate, value in triples
-    )
 
 
 def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[rdf.Triple]:
@@ -214,10 +175,11 @@ def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
 
 def _rule_lines(rule: Rule, number: int) -> list[str]:
     """A rule's N-Triples, with an IRI for the rule and numbered blank nodes."""
-    renamed: dict[Node, str] = {rule.node: f"<{RULE_IRI}{number}>"}
-    for term in (term for triple in rule.triples for term in (triple[0], triple[2]) if isinstance(term, BNode)):
+    triples = triples_of(rule)
+    renamed: dict[Node, str] = {triples[0][0]: f"<{RULE_IRI}{number}>"}
+    for term in (term for triple in triples for term in (triple[0], triple[2]) if isinstance(term, BNode)):
         renamed.setdefault(term, f"_:r{number}n{len(renamed)}")
-    kept = (triple for triple in rule.triples if str(triple[1]) not in _ANNOTATIONS)
+    kept = (triple for triple in triples if str(triple[1]) not in _ANNOTATIONS)
     return [rdf.n_triple_with_nodes(triple, f"r{number}", renamed) for triple in kept]
 
 
@@ -244,19 +206,6 @@ _STATE_PROPERTIES: Final = frozenset(
 
 
 @dataclass(frozen=True)
-class Individual:
-    """An individual that exists only in some states, with what the ontologies assert of it (for example hasNFR)."""
-
-    iri: str
-    own: tuple[rdf.Triple, ...] = ()
-
-    def described_as(self, kind: str) -> Iterator[rdf.Triple]:
-        """Its class of TOMASys, and what the ontologies assert of it."""
-        yield self.iri, rdf.RDF_TYPE, rdf.TOMASYS + kind
-        yield from self.own
-
-
-@dataclass(frozen=True)
 class Model:
     """The named things of an ontology that states are made of.
 
@@ -265,28 +214,25 @@ class Model:
         objectives: the objective that a function may get, by the function's name.
         groundings: the grounding that a function design may get, by the design's name.
         measurements: the measured value that a quality attribute type may get, by the type's name.
+        own: what the ontologies assert of objectives (for example hasNFR), groundings, measurements and the status of
+            components, by IRI: it holds in states that have them.
         estimated: the quality attribute types of which a design has an expected value, by the design's name.
-        initial: what the ontologies assert of a component's status, by the component's name.
     """
 
     functions: Mapping[str, str]
     designs: Mapping[str, str]
     components: Mapping[str, str]
     attributes: Mapping[str, str]
-    objectives: Mapping[str, Individual]
-    groundings: Mapping[str, Individual]
-    measurements: Mapping[str, Individual]
+    objectives: Mapping[str, str]
+    groundings: Mapping[str, str]
+    measurements: Mapping[str, str]
+    own: Mapping[str, tuple[rdf.Triple, ...]]
     estimated: Mapping[str, frozenset[str]]
-    initial: Mapping[str, tuple[rdf.Triple, ...]]
 
-    def individuals(self) -> Iterator[Individual]:
-        """All objectives, groundings and measurements that states may have."""
-        return chain.from_iterable(group.values() for group in (self.objectives, self.groundings, self.measurements))
-
-    def triples(self) -> Iterator[rdf.Triple]:
-        """Assertions of the ontologies that only apply in states: about these individuals, and components' statuses."""
-        own = (individual.own for individual in self.individuals())
-        return chain.from_iterable((*own, *self.initial.values()))
+    @cached_property
+    def in_states(self) -> frozenset[str]:
+        """The IRIs of all objectives, groundings and measurements that states may have."""
+        return frozenset((*self.objectives.values(), *self.groundings.values(), *self.measurements.values()))
 
     def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
         """Return the triples that assert a state, for every reasoner in the same order.
@@ -304,43 +250,43 @@ class Model:
                 if name not in known:
                     remedy = f"known: {', '.join(sorted(known)) or 'none'}"
                     raise KnowledgeError(f"the knowledge base has no {what} {name}", remedy=remedy)
-        present = {self.objectives[objective.function].iri for objective in state.objectives}
-        present |= {self.groundings[design].iri for _, design in state.groundings}
-        present |= {self.measurements[name].iri for name, _ in state.measurements if name in self.attributes}
-        absent = {individual.iri for individual in self.individuals()} - present
+        present = {self.objectives[objective.function] for objective in state.objectives}
+        present |= {self.groundings[design] for _, design in state.groundings}
+        present |= {self.measurements[name] for name, _ in state.measurements if name in self.attributes}
+        absent = self.in_states - present
         return tuple(triple for triple in self._triples(state) if triple[2] not in absent)
 
     def _triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
         for objective in state.objectives:
-            individual = self.objectives[objective.function]
-            yield from individual.described_as("Objective")
-            yield individual.iri, _TYPE_F, self.functions[objective.function]
+            iri = self.objectives[objective.function]
+            yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "Objective"), *self.own[iri])
+            yield iri, _TYPE_F, self.functions[objective.function]
             if objective.status is not None:
-                yield individual.iri, rdf.O_STATUS, Lit(objective.status, rdf.XSD + "string")
+                yield iri, rdf.O_STATUS, Lit(objective.status, rdf.XSD + "string")
             if objective.always_improve:
-                yield individual.iri, _ALWAYS, Lit("true", rdf.XSD + "boolean")
+                yield iri, _ALWAYS, Lit("true", rdf.XSD + "boolean")
         required = {objective.function for objective in state.objectives}
         for function, design in state.groundings:
-            individual = self.groundings[design]
-            yield from individual.described_as("FunctionGrounding")
-            yield individual.iri, _TYPE_FD, self.designs[design]
+            iri = self.groundings[design]
+            yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "FunctionGrounding"), *self.own[iri])
+            yield iri, _TYPE_FD, self.designs[design]
             if function in required:
-                yield individual.iri, _SOLVES_O, self.objectives[function].iri
+                yield iri, _SOLVES_O, self.objectives[function]
             for name, _ in state.measurements:
                 if name in self.estimated[design]:
-                    yield individual.iri, rdf.HAS_QA_VALUE, self.measurements[name].iri
+                    yield iri, rdf.HAS_QA_VALUE, self.measurements[name]
         reported = dict(state.components)
         for name, iri in self.components.items():
             if name in reported:
                 yield iri, rdf.C_STATUS, Lit(reported[name], rdf.XSD + "string")
             else:
-                yield from self.initial.get(name, ())
+                yield from self.own[iri]
         for name, value in state.measurements:
             if name in self.attributes:
-                individual = self.measurements[name]
-                yield from individual.described_as("QAvalue")
-                yield individual.iri, rdf.IS_QA_TYPE, self.attributes[name]
-                yield individual.iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.XSD + "decimal")
+                iri = self.measurements[name]
+                yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "QAvalue"), *self.own[iri])
+                yield iri, rdf.IS_QA_TYPE, self.attributes[name]
+                yield iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.XSD + "decimal")
 
 
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
@@ -369,73 +315,45 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
 
     functions = by_name(_members(triples, "Function") | linked(_SOLVES_F, 2), "functions")
     designs = by_name(_members(triples, "FunctionDesign") | linked(_SOLVES_F, 0), "function designs")
-    parts = (
-        _members(triples, "Component")
-        | linked(rdf.MROS + "requiredBy", 0)
-        | {s for s, p, _ in triples if p == rdf.C_STATUS}
-    )
-    components = by_name(parts, "components")
-    attributes = by_name(
-        _members(triples, "QualityAttributeType") | linked(rdf.IS_QA_TYPE, 2), "quality attribute types"
-    )
+    parts = _members(triples, "Component") | linked(rdf.MROS + "requiredBy", 0)
+    components = by_name(parts | {s for s, p, _ in triples if p == rdf.C_STATUS}, "components")
+    types = _members(triples, "QualityAttributeType") | linked(rdf.IS_QA_TYPE, 2)
+    attributes = by_name(types, "quality attribute types")
     existing = {local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)}
+    named = ((functions, objective_name), (designs, grounding_name), (attributes, measurement_name))
     groups = [
         {name: existing.get(rename(name), rdf.namespace(iri) + rename(name)) for name, iri in things.items()}
-        for things, rename in (
-            (functions, objective_name),
-            (designs, grounding_name),
-            (attributes, measurement_name),
-        )
+        for things, rename in named
     ]
-    in_states = {iri for group in groups for iri in group.values()}
-    if len(in_states) < sum(map(len, groups)):
+    objectives, groundings, measurements = groups
+    in_states = [*objectives.values(), *groundings.values(), *measurements.values()]
+    if len(set(in_states)) < len(in_states):
         raise KnowledgeError(
             "two functions, function designs or quality attribute types differ in their prefix only",
             file=sources[0].path,
             remedy="rename one, for example f_search and search",
         )
-    own: dict[str, list[rdf.Triple]] = {iri: [] for iri in in_states}
+    own: dict[str, list[rdf.Triple]] = {iri: [] for iri in (*in_states, *components.values())}
+    individuals, kept = {*in_states}, list[rdf.Triple]()
     for triple in triples:
         subject, predicate, value = triple
-        holder = subject if subject in in_states else value
-        if isinstance(holder, str) and holder in own and predicate not in _STATE_PROPERTIES and rdf.is_fact(triple):
+        holder = next((str(term) for term in (subject, value) if term in individuals), None)
+        if predicate == rdf.C_STATUS:
+            own[subject].append(triple)
+        elif holder is None:
+            kept.append(triple)
+        elif predicate not in _STATE_PROPERTIES and rdf.is_fact(triple):
             own[holder].append(triple)
-    objectives, groundings, measurements = (
-        {name: Individual(iri, tuple(own[iri])) for name, iri in group.items()} for group in groups
-    )
     estimated: dict[str, set[str]] = {name: set() for name in designs}
     for design, attribute, _ in estimations(triples, designs, attributes):
         estimated[design].add(attribute)
     model = Model(
-        functions=functions,
-        designs=designs,
-        components=components,
-        attributes=attributes,
-        objectives=objectives,
-        groundings=groundings,
-        measurements=measurements,
+        *(functions, designs, components, attributes),
+        *(objectives, groundings, measurements),
+        own={iri: tuple(found) for iri, found in own.items()},
         estimated={name: frozenset(found) for name, found in estimated.items()},
-        initial={
-            name: tuple(triple for triple in triples if triple[:2] == (iri, rdf.C_STATUS))
-            for name, iri in components.items()
-        },
     )
-    kept = tuple(t for t in triples if t[0] not in in_states and t[2] not in in_states and t[1] != rdf.C_STATUS)
-    return model, replace(content, triples=kept)
-
-
-def with_operators(content: Content, model: Model, operators: Mapping[str, str]) -> tuple[Content, dict[str, str]]:
-    """Add the comparison operators of quality attribute types that have none; return those that were added, by name."""
-    present = {subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR}
-    added = {
-        name: sign
-        for name, sign in sorted(operators.items())
-        if name in model.attributes and model.attributes[name] not in present
-    }
-    if not added:
-        return content, {}
-    more = [(model.attributes[name], rdf.QA_OPERATOR, Lit(sign, rdf.XSD + "string")) for name, sign in added.items()]
-    return replace(content, triples=tuple(sorted((*content.triples, *more), key=str))), added
+    return model, replace(content, triples=tuple(kept))
 
 
 def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
@@ -550,7 +468,9 @@ class Ontology:
         """
         sources = collect([Path(path) for path in ontologies] or [shipped_folder("ontology") / "suave.owl"])
         files = [RulesFile.read(Path(path)) for path in rules]
-        base = cls.merged(sources, files, RulesFile.rules, values or {}, disabled_rules, operators or {})
+        base = cls.merged(sources, values or {}, operators or {})
+        base = base.with_files(files, [file.rules(base.vocabulary) for file in files], disabled_rules)
+        base.check_names(values or {}, disabled_rules)
         for subject, problem, remedy in wrong_values(base.stated):
             raise _wrong_in(subject, sources, problem, remedy)
         check_property_use(base.content.enabled_rules, base.vocabulary)
@@ -558,41 +478,78 @@ class Ontology:
 
     @classmethod
     def merged(
-        cls,
-        sources: Sequence[OntologyFile],
-        files: Sequence[RulesFile],
-        usable: Callable[[RulesFile, Vocabulary], Sequence[Rule]],
-        values: Mapping[str, Decimal],
-        disabled_rules: Collection[str],
-        operators: Mapping[str, str],
+        cls, sources: Sequence[OntologyFile], values: Mapping[str, Decimal], operators: Mapping[str, str]
     ) -> Ontology:
-        """Merge files that have been read; values and property use are not checked.
+        """Merge ontologies that have been read with their imports; nothing else is checked.
 
         Args:
-            sources: the ontologies with their imports.
-            files: of rules as text.
-            usable: gives those rules of a file that can be used.
-            values, disabled_rules, operators: as of load.
+            sources, values, operators: as of load.
 
         Raises:
-            KnowledgeError: two things share a name, a value names no QAvalue, or there is no such rule to disable.
+            KnowledgeError: two functions, designs, components or quality attribute types share a name.
         """
+        contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources)
         merged = merge(sources, values)
         model, content = build_model(merged, sources)
-        content, assumed = with_operators(content, model, operators)
-        individuals = (individual.iri for individual in model.individuals())
-        vocabulary = Vocabulary.of(merged.triples, individuals, enumerated_texts(sources))
+        present = {subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR}
+        without = {name: iri for name, iri in model.attributes.items() if iri not in present}
+        assumed = {name: sign for name, sign in sorted(operators.items()) if name in without}
+        if assumed:
+            more = [(without[name], rdf.QA_OPERATOR, Lit(sign, rdf.XSD + "string")) for name, sign in assumed.items()]
+            content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
+        numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
         return cls(
-            files=(*sorted(source.path for source in sources), *(file.path for file in files)),
-            content_hash=_content_hash(sources, values, assumed, files, disabled_rules),
-            content=with_rules(content, [usable(file, vocabulary) for file in files], disabled_rules),
+            files=tuple(sorted(source.path for source in sources)),
+            content_hash=_digest(contents, numbers, assumed),
+            content=content,
             names=rdf.Names(merged.triples),
             model=model,
-            vocabulary=vocabulary,
+            vocabulary=Vocabulary.of(merged.triples, model.in_states, enumerated_texts(sources)),
             sources=tuple(sources),
             stated=merged.triples,
             assumed=assumed,
         )
+
+    def with_files(
+        self, files: Sequence[RulesFile], rules: Sequence[Sequence[Rule]], disabled_rules: Collection[str]
+    ) -> Ontology:
+        """Add files of rules as text, and disable rules.
+
+        A file's rules replace all rules of the same names that were read before, of ontologies or of files: so a rule
+        can be tried in another wording, or disabled by its mark.
+
+        Args:
+            files: in the order in which they are given.
+            rules: those rules of each file that can be used.
+            disabled_rules: names.
+        """
+        found, replaced = list(self.rules), list[tuple[Rule, Rule]]()
+        for group in rules:
+            new = {rule.name: rule for rule in group}
+            replaced += [(rule, new[rule.name]) for rule in found if rule.name in new]
+            found = [rule for rule in found if rule.name not in new] + list(group)
+        found = [replace(rule, enabled=False) if rule.name in disabled_rules else rule for rule in found]
+        return replace(
+            self,
+            files=(*self.files, *(file.path for file in files)),
+            content_hash=_digest(self.content_hash, [file.text for file in files], sorted(set(disabled_rules))),
+            content=replace(self.content, rules=_in_order(found), replaced=tuple(replaced)),
+        )
+
+    def check_names(self, values: Iterable[str], disabled_rules: Iterable[str]) -> None:
+        """Check the names that a scenario gives: of values to replace, and of rules to disable.
+
+        Raises:
+            KnowledgeError: a value names no individual with a hasValue, or there is no such rule.
+        """
+        valued = {local_name(subject) for subject, predicate, _ in self.stated if predicate == rdf.HAS_VALUE}
+        for key, names, known, problem in (
+            ("values", values, valued, "the ontology has no individual {} with a hasValue"),
+            ("disabled_rules", disabled_rules, {rule.name for rule in self.rules}, "there is no rule {} to switch off"),
+        ):
+            for name in sorted(set(names).difference(known)):
+                remedy = nearest(name, known) or f"known: {', '.join(sorted(known)) or 'none'}"
+                raise KnowledgeError(problem.format(name), place=f"{key}.{name}", remedy=remedy)
 
     def with_rules(self, rules: Iterable[Rule]) -> Ontology:
         """Return the same ontology with different rules, enabled or not."""
@@ -604,7 +561,7 @@ class Ontology:
 
     def with_triples(self, triples: Iterable[rdf.Triple]) -> Ontology:
         """Return the ontology with different triples, in which the model is found again."""
-        whole = replace(self.content, triples=(*triples, *self.model.triples()))
+        whole = replace(self.content, triples=(*triples, *chain.from_iterable(self.model.own.values())))
         model, content = build_model(whole, self.sources)
         return replace(self, content=content, model=model, names=rdf.Names(whole.triples), stated=whole.triples)
 
@@ -658,16 +615,6 @@ class Ontology:
                 found[design][attribute] = min(value, found[design].get(attribute, value))
         return {name: dict(sorted(expected.items())) for name, expected in found.items()}
 
-    def source_of(self, rule: Rule) -> OntologyFile | None:
-        """The ontology that a rule is from; None for a rule as text."""
-        return next((each for each in self.sources if each.path == rule.file), None)
-
-    def place_of(self, rule: Rule) -> str | None:
-        """The line of a rule in its file, as "line 12", as far as the file shows where it is."""
-        source = self.source_of(rule)
-        line = None if source is None else source.line_of_rule(rule.name)
-        return rule.place or (f"line {line}" if line else None)
-
     def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
         """Return the triples that assert a state.
 
@@ -700,14 +647,5 @@ class Ontology:
             raise KnowledgeError(problem, file=", ".join(map(str, self.files)), remedy=remedy)
 
 
-def _content_hash(
-    sources: Sequence[OntologyFile],
-    values: Mapping[str, Decimal],
-    operators: Mapping[str, str],
-    files: Sequence[RulesFile],
-    disabled: Collection[str],
-) -> str:
-    contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources)
-    numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
-    parts = contents, numbers, dict(operators), [file.text for file in files], sorted(set(disabled))
+def _digest(*parts: object) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -52,7 +52,7 @@ _ENDINGS: Final = (".owl", ".rdf", ".xml")
 _SHIPPED: Final = {"tomasys": "tomasys.owl", "mros": "tomasys.owl", "suave": "suave.owl"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OntologyFile:
     """An ontology file that has been read and parsed.
 
@@ -70,7 +70,7 @@ class OntologyFile:
     iris: tuple[str, ...]
     base: str | None
     imports: tuple[tuple[str, int], ...]
-    graph: Graph = field(repr=False, compare=False)
+    graph: Graph = field(repr=False)
 
     def line_of(self, name: str) -> int | None:
         """The first line that describes the thing of that name."""
@@ -84,8 +84,11 @@ class OntologyFile:
 
         Of several things with that label it is the last one: editors write rules at the end.
         """
-        labels = [*re.finditer(rf"label[^<>]*>\s*{re.escape(name)}\s*<", self._text)]
-        return self._line(labels[-1]) if labels else self.line_of(name)
+        return self._line(self._labels.get(name.strip())) or self.line_of(name)
+
+    @cached_property
+    def _labels(self) -> dict[str, re.Match[str]]:
+        return {found[1]: found for found in re.finditer(r"label[^<>]*>\s*([^<]*?)\s*<", self._text)}
 
     @cached_property
     def _text(self) -> str:
@@ -124,8 +127,11 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         KnowledgeError: empty, not XML, not OWL in RDF/XML, or with external entities or entities that expand too far;
             with the line where it is known.
     """
-    if content is None:
-        content = read_bytes(path, MAX_BYTES)
+    return _parsed(path, read_bytes(path, MAX_BYTES) if content is None else content)
+
+
+@lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
+def _parsed(path: Path, content: bytes) -> OntologyFile:
     if not content.strip():
         raise KnowledgeError("the file is empty", file=path, remedy=_SAVE_AS)
     try:
@@ -182,7 +188,6 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
     return root
 
 
-@lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
 def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     graph = Graph()

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
-from itertools import product
+from itertools import chain, product
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any, Final
@@ -127,7 +127,7 @@ def regions_of(ontology: Ontology) -> Regions:
 
 def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
     """Every literal in the knowledge base, with what has it."""
-    for subject, _, value in (*ontology.content.triples, *ontology.model.triples()):
+    for subject, _, value in (*ontology.content.triples, *chain.from_iterable(ontology.model.own.values())):
         if isinstance(value, Lit):
             yield local_name(subject), value
     for line in ontology.content.structure:

@@ -12,7 +12,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import MROS, SWRLB, TOMASYS, XSD, Lit
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.rules import Atom, Named, Place, Rule, Variable, full_name, naming, write_rule
-from suave_des.knowledge.rules.files import fatal_problems, rule_from_text
+from suave_des.knowledge.rules.files import fatal_problems, looked_up
 from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
 from tests.helpers.owl_text import rule as rule_in_owl
 
@@ -44,10 +44,9 @@ def told(text: str, tmp_path: Path) -> str:
 
 
 def test_every_construct_is_read():
-    parsed = parse_rules(EVERYTHING)
-    assert parsed.errors == ()
-    low, quoted, disabled, foreign = parsed.rules
-    assert (low.name, low.enabled, low.place) == ("LowBattery", True, Place(4, 1))
+    (low, quoted, disabled, foreign), errors = parse_rules(EVERYTHING)
+    assert errors == ()
+    assert (low.name, low.enabled, low.line) == ("LowBattery", True, 4)
     assert low.body[1] == Atom("", "hasQAvalue", (Variable("fg"), Variable("q")))
     assert low.body[2] == Atom("", MROS + "requiredBy", (Variable("fg"), Named(full("suave:fd_spiral_low"))))
     assert low.body[4].arguments[1] == Lit("-2.5", XSD + "decimal")
@@ -87,7 +86,7 @@ def full(name: str) -> str:
     ],
 )
 def test_mistakes_are_reported_with_line_and_column(text, place, problem, caplog):
-    (error,) = parse_rules(text).errors
+    _, (error,) = parse_rules(text)
     assert not caplog.records  # of rdflib
     assert error.place == place
     assert problem in str(error)
@@ -113,16 +112,16 @@ def test_mistakes_are_reported_with_line_and_column(text, place, problem, caplog
     ],
 )
 def test_what_swrl_does_not_have_or_writes_differently(text, column, problem):
-    errors = parse_rules(text).errors
+    _, errors = parse_rules(text)
     if column:
         assert str(errors[0]).startswith(f"line 1, column {column}: ") and problem in str(errors[0])
     assert len(errors) == (column > 0)
 
 
 def test_after_a_mistake_the_other_rules_are_read():
-    parsed = parse_rules(f"Bad: A(?x -> B(?x)\n{RULE}Worse: )\n    ^ more\n\n{RULE}")
-    assert [rule.name for rule in parsed.rules] == ["LowBattery", "LowBattery"]
-    assert [error.place for error in parsed.errors] == ["line 1, column 11", "line 3, column 8"]
+    rules, errors = parse_rules(f"Bad: A(?x -> B(?x)\n{RULE}Worse: )\n    ^ more\n\n{RULE}")
+    assert [rule.name for rule in rules] == ["LowBattery", "LowBattery"]
+    assert [error.place for error in errors] == ["line 1, column 11", "line 3, column 8"]
 
 
 @pytest.mark.parametrize(
@@ -265,11 +264,11 @@ def test_mutated_texts_give_rules_or_rule_errors(kb, count):
             else:
                 begin = draw.randrange(len(text) + 1)
                 text[at:at] = text[begin : begin + draw.randint(1, 30)]
-        parsed = parse_rules("".join(text), "fuzz.swrl")
-        outcomes["syntax"] += len(parsed.errors)
-        for rule in parsed.rules:
+        rules, errors = parse_rules("".join(text), Path("fuzz.swrl"))
+        outcomes["syntax"] += len(errors)
+        for rule in rules:
             try:
-                fatal_problems(rule_from_text(rule, kb.vocabulary, Path("fuzz.swrl")), kb.vocabulary)
+                fatal_problems(looked_up(rule, kb.vocabulary), kb.vocabulary)
                 outcomes["rule"] += 1
             except RuleError:
                 outcomes["meaning"] += 1

@@ -372,9 +372,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
     """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
     reason, axioms, numbers = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
     involved = [ontology.rules[number] for number in numbers]
-    rules = sorted(
-        f"{each.name} ({', '.join(filter(None, (each.file.name, ontology.place_of(each))))})" for each in involved
-    )
+    rules = sorted(f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})" for each in involved)
     facts = [
         str(fact)
         for triple in assertions

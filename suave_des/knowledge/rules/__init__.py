@@ -8,10 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
-
-from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.rdf import ESCAPES, OWL, PREFIXES, SWRL, SWRLB, XSD, Lit, RdfTriple, local_name, namespace
@@ -98,49 +97,33 @@ class Atom:
         return (term.name for term in self.arguments if isinstance(term, Variable))
 
 
-@dataclass(frozen=True, slots=True)
-class ParsedRule:
-    """A rule as text, before its names are looked up.
-
-    Attributes:
-        body: atoms that must hold.
-        head: atoms that then hold.
-        enabled: whether it is enabled.
-        place: where it begins.
-    """
-
-    name: str
-    body: tuple[Atom, ...]
-    head: tuple[Atom, ...]
-    enabled: bool = True
-    place: Place = field(default=Place(1, 1), compare=False)
-
-
 @dataclass(frozen=True)
 class Rule:
     """One SWRL rule.
 
     Attributes:
         name: its rdfs:label, else the last part of its IRI, else its number among the unnamed of the file.
-        text: the rule in the human-readable syntax, body -> head.
-        file: the ontology file, or the file of rules as text.
-        enabled: false when swrla:isRuleEnabled says so; Pellet itself ignores that mark.
-        node: its node in the graph.
-        triples: its RDF.
-        body: atoms that must hold; those of a file of rules as text have their places.
+        body: atoms that must hold; those of a rule as text have their places.
         head: atoms that then hold.
-        place: "line 12" in a file of rules as text; None for a rule of an ontology.
+        enabled: false when swrla:isRuleEnabled says so; Pellet itself ignores that mark.
+        file: the ontology file, or the file of rules as text.
+        line: of the file, where the rule begins; None where the file does not show it.
+        triples: its RDF, as an ontology has it; none of a rule as text.
     """
 
     name: str
-    text: str
-    file: Path
-    enabled: bool
-    node: Node = field(repr=False)
-    triples: tuple[RdfTriple, ...] = field(repr=False)
-    body: tuple[Atom, ...] = field(repr=False)
-    head: tuple[Atom, ...] = field(repr=False)
-    place: str | None = field(default=None, repr=False)
+    body: tuple[Atom, ...]
+    head: tuple[Atom, ...]
+    enabled: bool = True
+    file: Path = Path()
+    line: int | None = None
+    triples: tuple[RdfTriple, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def text(self) -> str:
+        """The rule on one line in the human-readable syntax, without its name: body -> head."""
+        sides = (" ^ ".join(map(write_atom, side)) for side in (self.body, self.head))
+        return " -> ".join(sides).strip()
 
     @property
     def atoms(self) -> tuple[Atom, ...]:
@@ -250,11 +233,6 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
     if len(line) <= 110:
         return line + "\n"
     return f"{start}\n    " + "\n    ^ ".join(sides[0]) + "\n    -> " + "\n    ^ ".join(sides[1]) + "\n"
-
-
-def rule_text(body: Sequence[Atom], head: Sequence[Atom]) -> str:
-    """Write a rule without its name on one line: body -> head."""
-    return f"{' ^ '.join(map(write_atom, body))} -> {' ^ '.join(map(write_atom, head))}".strip()
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:

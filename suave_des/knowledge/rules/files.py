@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 from typing import Final
 
@@ -20,8 +21,8 @@ from suave_des.knowledge import rdf
 from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import Lit, local_name
-from suave_des.knowledge.rules import Atom, AtomKind, Named, ParsedRule, Place, Rule, RuleError, Term, Variable
-from suave_des.knowledge.rules.parser import ParsedRules, parse_rule, parse_rules
+from suave_des.knowledge.rules import Atom, AtomKind, Named, Place, Rule, RuleError, Term, Variable
+from suave_des.knowledge.rules.parser import parse_rules
 
 # The names that rules may use, and checks of one rule for mistakes that Pellet drops in silence, or that none can use.
 # Which mistakes Pellet ignores was found by giving it each of them (owlready2 0.51's Pellet).
@@ -127,19 +128,10 @@ def about_rule(
     place: Place | None = None,
     remedy: str | None = None,
     level: Level = Level.ERROR,
-    begins: str | None = None,
 ) -> Finding:
-    """Make a finding about a rule, with the line where it begins, or where an atom of it is.
-
-    Args:
-        rule: the rule.
-        message, remedy, level: of the finding.
-        place: of the atom or argument.
-        begins: where an ontology has the rule, as "line 12".
-    """
-    begins = rule.place or begins
-    line = place.line if place and rule.place else int(begins.removeprefix("line ")) if begins else None
-    return Finding(level, message, str(rule.file), line, rule.name, place.column if place else None, remedy)
+    """Make a finding about a rule, at the place of an atom or an argument of it, or at the line where it begins."""
+    line, column = place or (rule.line, None)
+    return Finding(level, message, str(rule.file), line, rule.name, column, remedy)
 
 
 def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[Finding]:
@@ -160,7 +152,7 @@ def check_rule(rule: Rule, vocabulary: Vocabulary) -> Rule:
         RuleError: it cannot; with line and column.
     """
     for each in fatal_problems(rule, vocabulary):
-        place = f"line {each.line}, column {each.column}" if each.column else rule.place
+        place = f"line {each.line}, column {each.column}" if each.column else f"line {rule.line}"
         raise RuleError(f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy)
     return rule
 
@@ -283,12 +275,13 @@ def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
 
 def _variable_problems(rule: Rule) -> Iterator[Problem]:
     """Find unbound variables, and variables that stand for both an individual and a value."""
-    individuals: dict[str, Place] = {}
-    values: dict[str, Place] = {}
+    individuals: dict[str, Place | None] = {}
+    values: dict[str, Place | None] = {}
     for atom, number, name in _uses(rule.atoms):
-        (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number) or Place(0, 0))
+        (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
-        yield max(individuals[name], values[name]), f"?{name} stands for an individual and for a value", None
+        place = max(filter(None, (individuals[name], values[name])), default=None)
+        yield place, f"?{name} stands for an individual and for a value", None
     bound = {
         name for atom in rule.body if atom.kind in ("class", "object", "data", "same") for name in atom.variables()
     }
@@ -326,12 +319,14 @@ class RulesFile:
     Attributes:
         path: where it is.
         text: all of it.
-        parsed: its rules, before their names are looked up, and its errors.
+        parsed: its rules, before their names are looked up.
+        errors: one for each rule that cannot be read.
     """
 
     path: Path
     text: str
-    parsed: ParsedRules
+    parsed: tuple[Rule, ...]
+    errors: tuple[RuleError, ...]
 
     @classmethod
     def read(cls, path: Path) -> RulesFile:
@@ -344,66 +339,28 @@ class RulesFile:
         if text.lstrip().startswith("<?xml"):
             raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
         text = text.replace("\r\n", "\n").replace("\r", "\n")
-        return cls(path, text, parse_rules(text, path))
-
-    def looked_up(self, vocabulary: Vocabulary) -> Iterator[tuple[str, Rule | RuleError]]:
-        """Look up the names in its rules: each rule by its name, or why it cannot be read."""
-        for parsed in self.parsed.rules:
-            try:
-                yield parsed.name, rule_from_text(parsed, vocabulary, self.path)
-            except RuleError as error:
-                yield parsed.name, error
-
-    def checked(self, vocabulary: Vocabulary) -> Iterator[tuple[str, Rule | RuleError]]:
-        """Look up and check its rules: each rule by its name, or why it cannot be used.
-
-        Raises:
-            RuleError: the text of a rule cannot be parsed; with line and column.
-        """
-        if self.parsed.errors:
-            raise self.parsed.errors[0]
-        for name, rule in self.looked_up(vocabulary):
-            try:
-                yield name, check_rule(rule, vocabulary) if isinstance(rule, Rule) and rule.enabled else rule
-            except RuleError as error:
-                yield name, error
+        return cls(path, text, *parse_rules(text, path))
 
     def rules(self, vocabulary: Vocabulary) -> tuple[Rule, ...]:
-        """Look up and check its rules.
+        """Look up the names in its rules, and check those that are enabled.
 
         Raises:
             RuleError: a rule cannot be read or used; with line and column.
         """
-        found = tuple(rule for _, rule in self.checked(vocabulary))
-        for rule in found:
-            if isinstance(rule, RuleError):
-                raise rule
-        return tuple(rule for rule in found if isinstance(rule, Rule))
+        for error in self.errors:
+            raise error
+        found = (looked_up(rule, vocabulary) for rule in self.parsed)
+        return tuple(check_rule(rule, vocabulary) if rule.enabled else rule for rule in found)
 
 
-def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
-    """Parse, look up and check one rule, as it is given on a command line.
-
-    Args:
-        text: "name: body -> head".
-        vocabulary: of the ontologies.
-        file: the name of the text in messages.
-
-    Raises:
-        RuleError: it is not one rule, or cannot be used.
-    """
-    return check_rule(rule_from_text(parse_rule(text, file), vocabulary, file), vocabulary)
-
-
-def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Rule:
-    """Look up all names of a rule.
+def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
+    """Look up all names of a rule that was parsed.
 
     Raises:
         RuleError: a name is unknown or ambiguous; with line and column.
     """
-    body, head = (tuple(_resolved(atom, vocabulary, file) for atom in side) for side in (parsed.body, parsed.head))
-    text, place = swrl.rule_text(body, head), f"line {parsed.place.line}"
-    return with_triples(Rule(parsed.name, text, file, parsed.enabled, BNode(), (), body, head, place))
+    body, head = (tuple(_resolved(atom, vocabulary, rule.file) for atom in side) for side in (rule.body, rule.head))
+    return replace(rule, body=body, head=head)
 
 
 def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
@@ -476,24 +433,19 @@ WITHOUT_NAME: Final = "without a name"
 VARIABLE_IRIS: Final = ("urn:swrl:var#", "urn:swrl#")
 
 
+@lru_cache(maxsize=4)  # as many as there are files in the cache of those: their rules are read again and again
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
-    return _read_rules(file.path, file.graph)
-
-
-@lru_cache(maxsize=4)  # as many as there are graphs in the cache of those: their rules are read again and again
-def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
-    rules, unnamed = list[Rule](), 0
-    found = [(node, _sides(graph, node)) for node in graph.subjects(RDF.type, IMP)]
-    texts = [(swrl.rule_text(*sides), node, sides) for node, sides in found]
-    for text, node, (body, head) in sorted(texts, key=lambda each: (each[0], str(each[1]))):
+    graph, rules, numbers = file.graph, list[Rule](), count(1)
+    found = [(node, Rule("", *_sides(graph, node))) for node in graph.subjects(RDF.type, IMP)]
+    for node, rule in sorted(found, key=lambda each: (each[1].text, str(each[0]))):
         label = graph.value(node, RDFS.label)
         name = str(label) if label is not None else local_name(str(node))
         if label is None and isinstance(node, BNode):
-            unnamed += 1
-            name = f"rule {unnamed} {WITHOUT_NAME}"
+            name = f"rule {next(numbers)} {WITHOUT_NAME}"
         enabled = str(graph.value(node, ENABLED)).strip().lower() not in ("false", "0")
-        rules.append(Rule(name, text, path, enabled, node, tuple(_closure(graph, node)), body, head))
+        line, triples = file.line_of_rule(name), tuple(_closure(graph, node))
+        rules.append(replace(rule, name=name, enabled=enabled, file=file.path, line=line, triples=triples))
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
 
 
@@ -559,15 +511,18 @@ def _read_term(graph: Graph, term: Node) -> Term:
     return Named(str(term))
 
 
-def with_triples(rule: Rule) -> Rule:
-    """Add the RDF of a rule that was read from text."""
-    triples: list[rdf.RdfTriple] = [(rule.node, RDF.type, IMP), (rule.node, RDFS.label, Literal(rule.name))]
+def triples_of(rule: Rule) -> Sequence[rdf.RdfTriple]:
+    """The RDF of a rule, which begins with its node: as an ontology has it, or as one would."""
+    if rule.triples:
+        return rule.triples
+    node = BNode()
+    triples: list[rdf.RdfTriple] = [(node, RDF.type, IMP), (node, RDFS.label, Literal(rule.name))]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
         triples.append((_write_term(Variable(variable)), RDF.type, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
-        triples.append((rule.node, URIRef(rdf.SWRL + side), _write_list(nodes, rdf.SWRL + "AtomList", triples)))
-    return replace(rule, triples=tuple(triples))
+        triples.append((node, URIRef(rdf.SWRL + side), _write_list(nodes, rdf.SWRL + "AtomList", triples)))
+    return triples
 
 
 def _write_term(term: Term) -> Node:

@@ -17,14 +17,13 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.errors import nearest, shown
 from suave_des.knowledge.rdf import PREFIXES, XSD, Lit, is_well_formed, local_name
-from suave_des.knowledge.rules import Atom, Named, ParsedRule, Place, RuleError, Term, Variable
+from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term, Variable
 
 if TYPE_CHECKING:
     from lark import Lark, Token
@@ -58,18 +57,11 @@ _BLANK: Final = re.compile(r"(?:\s|#[^\n]*)*")
 _lock: Final = threading.Lock()
 
 
-@dataclass(frozen=True)
-class ParsedRules:
-    """The rules of a text, and an error for each that could not be read."""
-
-    rules: tuple[ParsedRule, ...]
-    errors: tuple[RuleError, ...]
-
-
-def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
+def parse_rules(text: str, file: Path | None = None) -> tuple[tuple[Rule, ...], tuple[RuleError, ...]]:
     """Parse all rules of a text; after an error, parsing continues with the next rule that begins a line.
 
-    parse_rules("Low: hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)").rules[0].name  # "Low"
+    Returns:
+        the rules, in which names are not looked up yet, and an error for each that could not be read.
     """
     from lark import TextSlice, UnexpectedInput
 
@@ -93,21 +85,21 @@ def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
             line_end = text.find("\n", at)
             header = _HEADER.search(text, line_end + 1) if line_end >= 0 else None
             start = header.start() if header else None
-        return ParsedRules(tuple(builder.rules), tuple(errors))
+        return tuple(builder.rules), tuple(errors)
 
 
-def parse_rule(text: str, file: Path | str | None = None) -> ParsedRule:
+def parse_rule(text: str, file: Path | None = None) -> Rule:
     """Parse one rule, as it is given on a command line.
 
     Raises:
         RuleError: there is none, there are several, or it cannot be read.
     """
-    parsed = parse_rules(text, file)
-    if parsed.errors:
-        raise parsed.errors[0]
-    if len(parsed.rules) != 1:
-        raise RuleError(f"{len(parsed.rules)} rules instead of one", file=file, remedy='write "name: body -> head"')
-    return parsed.rules[0]
+    rules, errors = parse_rules(text, file)
+    if errors:
+        raise errors[0]
+    if len(rules) != 1:
+        raise RuleError(f"{len(rules)} rules instead of one", file=file, remedy='write "name: body -> head"')
+    return rules[0]
 
 
 @lru_cache(maxsize=1)
@@ -118,7 +110,7 @@ def _parser() -> tuple[Lark, _Builder]:
     return Lark.open("grammar.lark", rel_to=__file__, parser="lalr", lexer="contextual", transformer=builder), builder
 
 
-def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> RuleError:
+def _error(text: str, at: int, accepted: set[str], file: Path | None) -> RuleError:
     """Describe the token that was found, and those that were expected."""
     words = text[:at].split()[-1:]
     if words and accepted <= {"_COLON", "_LPAR"} and words[0].lower() in ("and", "or", "not"):
@@ -139,9 +131,9 @@ def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> R
 class _Builder:
     """Builds rules while lark parses: each method gets the parts of what it is named after in the grammar."""
 
-    def begin(self, file: Path | str | None) -> None:
+    def begin(self, file: Path | None) -> None:
         """Forget what was collected."""
-        self.rules: list[ParsedRule] = []
+        self.rules: list[Rule] = []
         self.failed_at = 0
         self._file = file
         self._prefixes = dict(PREFIXES)
@@ -157,7 +149,8 @@ class _Builder:
         """Collect a rule."""
         (place, name), body, head = parts[-3:]
         enabled = len(parts) == 3
-        self.rules.append(ParsedRule(name, body, head, enabled, place if enabled else self._place(parts[0])))
+        begins = place if enabled else self._place(parts[0])
+        self.rules.append(Rule(name, body, head, enabled, self._file or Path(), begins.line))
 
     def rule_name(self, parts: Sequence[Token]) -> tuple[Place, str]:
         """A word, or a text that is not blank."""
