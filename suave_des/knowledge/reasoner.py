@@ -87,20 +87,15 @@ class Regions:
 
         Floats keep the order of the decimals that they denote, though not always their difference.
         """
-        floats = self._bounds
-        place = bisect_left(floats, value, 1)
-        if self.reasons or floats[place] == value:
+        place = bisect_left(self.bounds, value, 1)
+        if self.reasons or self.bounds[place] == value:
             return value, value
-        return floats[place - 1], floats[place]
+        return self.bounds[place - 1], self.bounds[place]
 
     @cached_property
-    def thresholds_as_floats(self) -> tuple[float, ...]:
-        """The thresholds, as measured values are: floats."""
-        return tuple(map(float, self.thresholds))
-
-    @cached_property
-    def _bounds(self) -> tuple[float, ...]:
-        return -inf, *self.thresholds_as_floats, inf
+    def bounds(self) -> tuple[float, ...]:
+        """The bounds of the gaps between thresholds, as measured values are: floats."""
+        return -inf, *map(float, self.thresholds), inf
 
     def key(self, state: KnowledgeState) -> Key:
         """Return what the rules can distinguish of a state: states with equal keys entail the same."""
@@ -118,11 +113,9 @@ def regions_of(ontology: Ontology) -> Regions:
     literals = list(_literals(ontology))
     numbers = {Decimal(value.text.strip()) for _, value in literals if _NUMBER.fullmatch(value.text)}
     thresholds = sorted(number for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT)
-    binary = dict.fromkeys(where for where, value in literals if value.datatype in _BINARY)
+    binary = [where for where, value in literals if value.datatype in _BINARY]
     reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
-    pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
-    carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])  # properties with a measured value
-    return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology, carriers)])))
+    return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology)])))
 
 
 def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
@@ -137,8 +130,10 @@ def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
         yield from ((f"rule {rule.name}", term) for term in terms if isinstance(term, Lit))
 
 
-def _reasons(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
-    """Why rules may distinguish values within a region, given the properties that have a measured value."""
+def _reasons(ontology: Ontology) -> Iterator[str]:
+    """Why rules may distinguish values within a region, whatever the numbers."""
+    pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
+    carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])  # properties with a measured value
     for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
@@ -148,7 +143,7 @@ def _reasons(ontology: Ontology, carriers: Collection[str]) -> Iterator[str]:
         measured = {name for name, predicate in rule.read_values() if predicate in carriers}
         for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
             yield f"rule {rule.name} copies the value ?{name} to its head"
-    for name in sorted({*carriers} - {HAS_VALUE}):
+    for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
     for subject, predicate, value in ontology.content.triples:
         if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
@@ -169,26 +164,6 @@ DEFAULT_PERFORMANCE: Final = Decimal("0.001")
 _PERFORMANCE: Final = local_name(rdf.PERFORMANCE)
 #: Statuses that trigger adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
 _TRIGGERS: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
-
-
-def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
-    """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
-
-    Args:
-        inference: what the reasoner added to the state that was analyzed.
-        improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current function
-            design expects (the exemplar's revision 2023 does so in code).
-
-    Raises:
-        KnowledgeError: an objective requires a value of a quality attribute type without comparison operator.
-    """
-    decisions = []
-    exceeded = dict(_exceeded(ontology, inference.state)) if improve_exceeded else {}
-    for objective in inference.state.objectives:
-        trigger = _trigger(objective, inference) or exceeded.get(objective.function)
-        if trigger is not None:
-            decisions.append(_decide(ontology, inference, objective.function, trigger))
-    return Plan(tuple(decisions))
 
 
 def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, str]]:
@@ -385,9 +360,9 @@ class Reasoner:
         self._known: dict[Hashable, frozenset[Fact]] = {}
         self._disk: SharedEntries | None = None
         if name == "cached":
+            digest = cache_digest(base, terms)
             self.regions = regions_of(base)
-            files = private_cache("inferences") if folder is None else folder / "inferences"
-            self._disk = SharedEntries(files, cache_digest(base, terms))
+            self._disk = SharedEntries((folder / "inferences") if folder else private_cache("inferences"), digest)
             for kept, found in self._disk.read():
                 self._known[kept] = frozenset(_read_fact(*fact) for fact in found)
 
@@ -428,14 +403,23 @@ class Reasoner:
         return any(isinstance(fact.value, Decimal) and fact.value in inside for fact in facts)
 
     def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
-        """Choose function designs for the objectives to adapt.
+        """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
         Args:
             inference: what was inferred of a state.
             improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current
                 function design expects (the exemplar's revision 2023 does so in code).
+
+        Raises:
+            KnowledgeError: an objective requires a value of a quality attribute type without comparison operator.
         """
-        return plan(self.base, inference, improve_exceeded=improve_exceeded)
+        decisions = []
+        exceeded = dict(_exceeded(self.base, inference.state)) if improve_exceeded else {}
+        for objective in inference.state.objectives:
+            trigger = _trigger(objective, inference) or exceeded.get(objective.function)
+            if trigger is not None:
+                decisions.append(_decide(self.base, inference, objective.function, trigger))
+        return Plan(tuple(decisions))
 
     def analyze_and_plan(
         self, state: KnowledgeState, facts: tuple[Triple, ...] = (), *, improve_exceeded: bool = False
@@ -447,7 +431,7 @@ class Reasoner:
     @property
     def thresholds(self) -> tuple[float, ...] | None:
         """The numbers with which rules compare measured values; None if rules may do more than compare."""
-        return self.regions.thresholds_as_floats if self.regions is not None and self.regions.is_sound else None
+        return self.regions.bounds[1:-1] if self.regions is not None and self.regions.is_sound else None
 
     def distinguished(self, measured: Collection[float]) -> Hashable:
         """What the rules can distinguish in measured values: the bounds of their regions, or the values themselves."""

@@ -6,7 +6,7 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoner import Reasoner, plan
+from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 
@@ -22,8 +22,8 @@ STORY = [
 ]
 
 
-def decisions(base: Ontology, reasoner: Reasoner) -> list[dict[str, str | None]]:
-    plans = [plan(base, reasoner.analyze(state)) for state in STORY]
+def decisions(reasoner: Reasoner) -> list[dict[str, str | None]]:
+    plans = [reasoner.plan(reasoner.analyze(state)) for state in STORY]
     return [{d.function: d.design for d in one.decisions} for one in plans]
 
 
@@ -33,8 +33,8 @@ def test_the_exemplars_three_files_decide_as_the_shipped_two(kb, pellet, shipped
     base = Ontology.load(list(files.values()))
     assert set(base.files) == set(files.values())
     assert len(base.rules) == len(kb.rules)
-    found = decisions(base, Reasoner(base, "pellet"))
-    assert found == decisions(kb, pellet)
+    found = decisions(Reasoner(base, "pellet"))
+    assert found == decisions(pellet)
     assert found[4] == {MOTION: "fd_recover_thrusters"}
     assert found[6] == {MOTION: "fd_all_thrusters", SEARCH: "fd_spiral_low"}
 

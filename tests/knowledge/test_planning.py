@@ -8,21 +8,21 @@ import pytest
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import QA_OPERATOR, Lit
-from suave_des.knowledge.reasoner import Reasoner, plan
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import individual
 
 
-def decide(kb: Ontology, reasoner: Reasoner, state: KnowledgeState, **options: bool) -> dict[str, Decision]:
-    decisions = plan(kb, reasoner.analyze(state), **options).decisions
+def decide(reasoner: Reasoner, state: KnowledgeState, **options: bool) -> dict[str, Decision]:
+    decisions = reasoner.plan(reasoner.analyze(state), **options).decisions
     assert [d.function for d in decisions] == sorted(d.function for d in decisions)
     return {decision.function: decision for decision in decisions}
 
 
 def decide_with(file: Path, state: KnowledgeState) -> Decision:
     base = Ontology.load([file])
-    return decide(base, Reasoner(base, "pellet"), state)[SEARCH]
+    return decide(Reasoner(base, "pellet"), state)[SEARCH]
 
 
 @pytest.mark.parametrize(
@@ -30,12 +30,12 @@ def decide_with(file: Path, state: KnowledgeState) -> Decision:
     [(None, "fd_spiral_high"), (3.25, "fd_spiral_high"), (2.25, "fd_spiral_medium"), (1.0, None)],
 )
 def test_an_ungrounded_search_gets_the_highest_altitude_that_visibility_allows(kb, pellet, visibility, design):
-    decision = decide(kb, pellet, searching(None, visibility, status="UNGROUNDED"))[SEARCH]
+    decision = decide(pellet, searching(None, visibility, status="UNGROUNDED"))[SEARCH]
     assert decision.design == design
 
 
 def test_each_design_left_out_has_its_numbers(kb, pellet):
-    decision = decide(kb, pellet, searching("fd_spiral_high", 1.8))[SEARCH]
+    decision = decide(pellet, searching("fd_spiral_high", 1.8))[SEARCH]
     assert decision.design == "fd_spiral_low"
     assert [(rejection.design, rejection.reason) for rejection in decision.rejected] == [
         ("fd_spiral_high", "water_visibility 1.80 measured < 3.25 expected"),
@@ -45,46 +45,46 @@ def test_each_design_left_out_has_its_numbers(kb, pellet):
 
 
 def test_numbers_that_look_alike_are_shown_with_more_digits(kb, pellet):
-    decision = decide(kb, pellet, searching("fd_spiral_medium", "2.2499999"))[SEARCH]
+    decision = decide(pellet, searching("fd_spiral_medium", "2.2499999"))[SEARCH]
     assert "water_visibility 2.2499999 measured < 2.25 expected" in [r.reason for r in decision.rejected]
 
 
 def test_with_no_design_left_the_present_one_is_kept_and_it_is_said(kb, pellet):
-    decision = decide(kb, pellet, searching("fd_spiral_low", 1.0))[SEARCH]
+    decision = decide(pellet, searching("fd_spiral_low", 1.0))[SEARCH]
     assert decision.design is None
     assert decision.reason == "o_status IN_ERROR_NFR: no function design is left, fd_spiral_low is kept"
     assert len(decision.rejected) == 3
 
 
 def test_an_objective_is_adapted_when_exceeded_or_always_to_be_improved(kb, pellet):
-    exceeded = decide(kb, pellet, searching("fd_spiral_low", 3.5), improve_exceeded=True)
+    exceeded = decide(pellet, searching("fd_spiral_low", 3.5), improve_exceeded=True)
     assert exceeded[SEARCH].design == "fd_spiral_high"
     assert exceeded[SEARCH].reason.startswith("water_visibility 3.50 exceeds what fd_spiral_low expects")
-    always = decide(kb, pellet, searching("fd_spiral_low", 3.5, always_improve=True))
+    always = decide(pellet, searching("fd_spiral_low", 3.5, always_improve=True))
     assert always[SEARCH].design == "fd_spiral_high"
-    assert decide(kb, pellet, searching("fd_spiral_low", 1.25), improve_exceeded=True) == {}
+    assert decide(pellet, searching("fd_spiral_low", 1.25), improve_exceeded=True) == {}
 
 
 @pytest.mark.parametrize("status", ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_NFR", "UPDATABLE"])
 def test_statuses_that_call_for_adaptation(kb, pellet, status):
     design = "fd_spiral_low" if status == "UPDATABLE" else None  # as older models have it
-    assert SEARCH in decide(kb, pellet, searching(design, 3.5, status=status))
+    assert SEARCH in decide(pellet, searching(design, 3.5, status=status))
 
 
 def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb, pellet):
     failed = {"c_thruster_1": "FALSE"}
     state = searching("fd_spiral_high", 3.5, motion="fd_all_thrusters", components=failed)
-    decision = decide(kb, pellet, state)
+    decision = decide(pellet, state)
     assert set(decision) == {MOTION}
     assert decision[MOTION].design == "fd_recover_thrusters"
     assert decision[MOTION].rejected[0].reason == "not realisable"
 
     recovering = searching("fd_spiral_high", 3.5, motion="fd_recover_thrusters", components=failed)
-    assert decide(kb, pellet, recovering) == {}
+    assert decide(pellet, recovering) == {}
 
     recovered = {"c_thruster_1": "RECOVERED"}
     state = searching("fd_spiral_high", 3.5, motion="fd_recover_thrusters", components=recovered)
-    decision = decide(kb, pellet, state)
+    decision = decide(pellet, state)
     assert decision[MOTION].design == "fd_all_thrusters"
     assert decision[MOTION].reason.startswith("updatable")
     assert decision[SEARCH].design == "fd_spiral_high"
@@ -92,7 +92,7 @@ def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb, pe
     # With a second thruster failed, the recovery of the first makes nothing realisable.
     both = {"c_thruster_1": "RECOVERED", "c_thruster_2": "FALSE"}
     state = searching("fd_spiral_high", 3.5, motion="fd_recover_thrusters", components=both)
-    assert decide(kb, pellet, state)[MOTION].design == "fd_recover_thrusters"
+    assert decide(pellet, state)[MOTION].design == "fd_recover_thrusters"
 
 
 def test_a_design_in_the_error_log_is_left_out(suave_copy):
@@ -132,7 +132,7 @@ def test_a_value_is_bad_if_any_operator_of_its_attribute_says_so(suave_copy):
         facts = [each for each in base.content.triples if not (each[0] == QA_OPERATOR and "Functional" in str(each[2]))]
         current = next(each for each in facts if each[1] == QA_OPERATOR and each[0].endswith("#current"))
         base = base.with_triples([*facts, (*current[:2], Lit(">", current[2].datatype))])
-        return decide(base, Reasoner(base, "pellet"), state)[SEARCH]
+        return decide(Reasoner(base, "pellet"), state)[SEARCH]
 
     decision = decided(added + required, searching(None, None, status="UNGROUNDED"))
     assert decision.design == "fd_spiral_medium"
@@ -184,7 +184,7 @@ def test_the_operator_of_the_attribute_decides_what_is_bad(suave_copy, operator,
 
     def chosen(current: float) -> str | None:
         state = KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": current})
-        return decide(base, reasoner, state)[SEARCH].design
+        return decide(reasoner, state)[SEARCH].design
 
     assert [value for value in (0.4, 0.5, 0.6) if chosen(value) == "fd_spiral_high"] == allowed
 
@@ -203,7 +203,7 @@ def test_overridden_values_decide_and_show_in_the_hash(kb):
     base = Ontology.load(values=values)
     assert base.expected("fd_spiral_high")["water_visibility"] == 2
     state = searching(None, 2.0, status="UNGROUNDED")
-    assert decide(base, Reasoner(base, "pellet"), state)[SEARCH].design == "fd_spiral_high"
+    assert decide(Reasoner(base, "pellet"), state)[SEARCH].design == "fd_spiral_high"
     assert base.content_hash != kb.content_hash
 
 
