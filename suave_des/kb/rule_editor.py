@@ -17,26 +17,22 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
-from rdflib import BNode, Literal, URIRef
-from rdflib.namespace import RDF
-from rdflib.term import Node
 
 from suave_des.errors import InputError, KnowledgeError, nearest
 from suave_des.files import write_files
 from suave_des.kb.states import read_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
-from suave_des.knowledge.rdf import RDF as RDF_NS
-from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
+from suave_des.knowledge.rdf import RDF, RDF_TYPE, RDFS, SWRL, SWRLA, XSD, Lit, Triple, local_name
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
-_PREFIXES: Final = {"rdf": RDF_NS, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
+_PREFIXES: Final = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
 _DECLARED: Final = " ".join(f'xmlns:{prefix}="{iri}"' for prefix, iri in _PREFIXES.items())
-_TYPE, _VARIABLE = f"{{{RDF_NS}}}type", URIRef(SWRL + "Variable")
-_NODE_ID: Final = f"{{{RDF_NS}}}nodeID"
+_TYPE, _VARIABLE, _BUILTIN = f"{{{RDF}}}type", SWRL + "Variable", SWRL + "Builtin"
+_NODE_ID: Final = f"{{{RDF}}}nodeID"
 _Span = tuple[int, int]
 
 
@@ -96,7 +92,7 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
     for start, end in sorted(spans, reverse=True):
         changed, marks = _MARK.subn(rb"\g<1>" + word, content[start:end])
         if not marks and (tag := _TAG.match(changed)):
-            declared = f'<swrla:isRuleEnabled xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF_NS}"'
+            declared = f'<swrla:isRuleEnabled xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF}"'
             mark = _property_xml(ENABLED, _truth(enabled), {}).replace("<swrla:isRuleEnabled", declared, 1)
             changed = changed[: tag.end()] + mark.encode() + changed[tag.end() :]
         content = content[:start] + changed + content[end:]
@@ -157,14 +153,14 @@ def _spans(content: bytes) -> list[_Span]:
 
 
 def _is_rule(element: etree._Element) -> bool:
-    types = (child.get(f"{{{RDF_NS}}}resource") for child in element.iterfind(_TYPE))
+    types = (child.get(f"{{{RDF}}}resource") for child in element.iterfind(_TYPE))
     return element.tag == f"{{{SWRL}}}Imp" or SWRL + "Imp" in types
 
 
 def _name(element: etree._Element) -> str | None:
     """The label of a rule, or the last part of its IRI; None where it has neither."""
     label = element.findtext(f"{{{RDFS}}}label", element.get(f"{{{RDFS}}}label"))
-    iri = element.get(f"{{{RDF_NS}}}about") or element.get(f"{{{RDF_NS}}}ID")
+    iri = element.get(f"{{{RDF}}}about") or element.get(f"{{{RDF}}}ID")
     return local_name(iri) if label is None and iri else label
 
 
@@ -173,41 +169,40 @@ def _rule_xml(rule: Rule) -> str:
     triples = triples_of(rule)
     start = triples[0][0]
     declared = {triple[0]: _VARIABLE for triple in triples if triple[2] == _VARIABLE}
-    builtins = {URIRef(atom.predicate): URIRef(SWRL + "Builtin") for atom in rule.body if atom.kind == "builtin"}
-    of: dict[Node, list[RdfTriple]] = {start: []}
+    builtins = {atom.predicate: _BUILTIN for atom in rule.body if atom.kind == "builtin"}
+    of: dict[str, list[Triple]] = {start: []}
     if not rule.enabled:
         of[start].append((start, ENABLED, _truth(False)))
     for triple in triples:
         of.setdefault(triple[0], []).append(triple)
     for name, kind in (*declared.items(), *builtins.items()):
-        of[name] = [(name, RDF.type, kind)]
+        of[name] = [(name, RDF_TYPE, kind)]
     order = [start]
     for node in order:  # a list nests as deep as it is long, which is too deep for a recursion
-        order += [value for _, predicate, value in of[node] if value in of and predicate != RDF.type]
-    texts: dict[Node, str] = {}
+        order += [str(value) for _, predicate, value in of[node] if value in of and predicate != RDF_TYPE]
+    texts: dict[str, str] = {}
     for node in reversed(order):
         texts[node] = "".join(_property_xml(predicate, value, texts) for _, predicate, value in of[node])
     inside = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", texts[start])
     return f"    <rdf:Description {_DECLARED}>{inside}\n    </rdf:Description>\n"
 
 
-def _property_xml(predicate: Node, value: Node, texts: dict[Node, str]) -> str:
+def _property_xml(predicate: str, value: str | Lit, texts: dict[str, str]) -> str:
     """The element of a property; `texts` are the contents of the nodes that are written inside."""
-    text = str(predicate)
-    name = next(f"{prefix}:{text[len(iri) :]}" for prefix, iri in _PREFIXES.items() if text.startswith(iri))
-    if value in texts and not isinstance(value, BNode):
-        return f"<{name}><rdf:Description rdf:about={quoteattr(str(value))}>{texts[value]}</rdf:Description></{name}>"
-    if value in texts:
-        return f"<{name}><rdf:Description>{texts[value]}</rdf:Description></{name}>"
-    if not isinstance(value, Literal):
-        return f"<{name} rdf:resource={quoteattr(str(value))}/>"
-    kind = f' xml:lang="{value.language}"' if value.language else ""
-    kind = f" rdf:datatype={quoteattr(str(value.datatype))}" if value.datatype else kind
-    return f"<{name}{kind}>{escape(value)}</{name}>"
+    name = next(f"{prefix}:{predicate[len(iri) :]}" for prefix, iri in _PREFIXES.items() if predicate.startswith(iri))
+    if isinstance(value, Lit):
+        in_language = value.datatype.startswith("@")
+        kind = f' xml:lang="{value.datatype[1:]}"' if in_language else f" rdf:datatype={quoteattr(value.datatype)}"
+        kind = "" if predicate == RDFS + "label" else kind
+        return f"<{name}{kind}>{escape(value.text)}</{name}>"
+    if value not in texts:
+        return f"<{name} rdf:resource={quoteattr(value)}/>"
+    about = "" if value.startswith("_:") else f" rdf:about={quoteattr(value)}"
+    return f"<{name}><rdf:Description{about}>{texts[value]}</rdf:Description></{name}>"
 
 
-def _truth(value: bool) -> Literal:
-    return Literal(str(value).lower(), datatype=URIRef(XSD + "boolean"))
+def _truth(value: bool) -> Lit:
+    return Lit(str(value).lower(), XSD + "boolean")
 
 
 def _replace(file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]) -> None:
@@ -234,8 +229,7 @@ def _statement(rule: Rule) -> tuple[object, ...]:
 def _others(file: OntologyFile) -> int:
     """Number of statements besides rules and the declarations of variables and built-ins."""
     inside = {triple for rule in rules_of(file) for triple in rule.triples}
-    others = (triple for triple in file.graph if triple not in inside)
-    return sum(triple[2] not in (_VARIABLE, URIRef(SWRL + "Builtin")) for triple in others)
+    return sum(triple not in inside and triple[2] not in (_VARIABLE, _BUILTIN) for triple in file.triples)
 
 
 def _cannot(path: Path) -> KnowledgeError:

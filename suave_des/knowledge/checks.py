@@ -16,8 +16,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from rdflib import URIRef
-
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
 from suave_des.knowledge import rdf
@@ -261,8 +259,8 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
 def attributes_declared_twice(material: Material) -> Iterator[Finding]:
     """Find the quality attribute types that several files declare: what each of them says of one holds."""
     for name, iri in material.base.model.attributes.items():
-        declared = (URIRef(iri), URIRef(rdf.RDF_TYPE), URIRef(rdf.TOMASYS + "QualityAttributeType"))
-        files = [each for each in material.base.sources if declared in each.graph]
+        declared = iri, rdf.RDF_TYPE, rdf.TOMASYS + "QualityAttributeType"
+        files = [each for each in material.base.sources if declared in each.about(iri)]
         for each in files[:-1]:
             problem = f"declares the quality attribute type {name}, and so does {relative_path(files[-1].path)}"
             place = (str(each.path), each.line_of(name))

@@ -16,11 +16,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
-from rdflib import BNode, URIRef
-from rdflib.namespace import OWL as OWL_TERMS
-from rdflib.namespace import RDF
-from rdflib.term import Node
-
 from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts, place_of, supplies
@@ -134,19 +129,19 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
         if source.path.parent != shipped and supplies(source, rdf.MROS)
         for rule in rules_of(source)
     }
-    for number, source in enumerate(sorted(sources, key=lambda source: source.content)):
+    for source in sorted(sources, key=lambda source: source.content):
         found = rules_of(source)
         rules += [rule for rule in found if source.path.parent != shipped or rule.name not in given_mros]
         # Triples about the ontology itself (imports, versions) are no part of its content.
-        ontologies = set(source.graph.subjects(RDF.type, OWL_TERMS.Ontology))
-        for triple in sorted(set(source.graph).difference(*(rule.triples for rule in found))):
+        ontologies = {s for s, p, o in source.triples if p == rdf.RDF_TYPE and o == rdf.OWL + "Ontology"}
+        inside = {triple for rule in found for triple in rule.triples}
+        for subject, predicate, value in (triple for triple in source.triples if triple not in inside):
             # Protégé declares the built-ins, about which Pellet logs a warning.
-            if str(triple[1]) in _ANNOTATIONS or triple[0] in ontologies or triple[2] == URIRef(rdf.SWRL + "Builtin"):
+            if predicate in _ANNOTATIONS or subject in ontologies or value == rdf.SWRL + "Builtin":
                 continue
-            if any(isinstance(term, BNode) for term in triple):
-                structure.append(rdf.n_triple_with_nodes(triple, f"f{number}", {}))
+            if subject.startswith("_:") or (isinstance(value, str) and value.startswith("_:")):
+                structure.append(rdf.n_triple((subject, predicate, value)))
                 continue
-            subject, predicate, value = str(triple[0]), str(triple[1]), rdf.term_of(triple[2])
             if predicate == rdf.HAS_VALUE and local_name(subject) in values:
                 value = Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal")
             triples[subject, predicate, value] = None
@@ -175,12 +170,12 @@ def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
 
 def _rule_lines(rule: Rule, number: int) -> list[str]:
     """A rule's N-Triples, with an IRI for the rule and numbered blank nodes."""
-    triples = triples_of(rule)
-    renamed: dict[Node, str] = {triples[0][0]: f"<{RULE_IRI}{number}>"}
-    for term in (term for triple in triples for term in (triple[0], triple[2]) if isinstance(term, BNode)):
-        renamed.setdefault(term, f"_:r{number}n{len(renamed)}")
-    kept = (triple for triple in triples if str(triple[1]) not in _ANNOTATIONS)
-    return [rdf.n_triple_with_nodes(triple, f"r{number}", renamed) for triple in kept]
+    triples = [triple for triple in triples_of(rule) if triple[1] not in _ANNOTATIONS]
+    renamed: dict[str | Lit, str] = {triples[0][0]: f"{RULE_IRI}{number}"}
+    for term in (term for subject, _, value in triples for term in (subject, value)):
+        if isinstance(term, str) and term.startswith("_:"):
+            renamed.setdefault(term, f"_:r{number}n{len(renamed)}")
+    return [rdf.n_triple((renamed.get(s, s), p, renamed.get(o, o))) for s, p, o in triples]
 
 
 # The model.

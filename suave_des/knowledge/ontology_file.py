@@ -10,8 +10,9 @@ among the files beside the importing one, and among the shipped ones.
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -21,15 +22,14 @@ from xml.sax import SAXParseException
 
 import rdflib
 from lxml import etree
-from rdflib import Graph, Literal, URIRef
-from rdflib.collection import Collection
+from rdflib import BNode, Graph, Literal, URIRef
 from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF as RDF_TERMS
-from rdflib.namespace import RDFS as RDFS_TERMS
+from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.files import read_bytes
-from suave_des.knowledge.rdf import MROS, OWL, RDF, TOMASYS, XSD, local_name, without_log
+from suave_des.knowledge.rdf import MROS, OWL, RDF, RDFS, TOMASYS, XSD, Lit, Triple, local_name, term_of, without_log
 from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20
@@ -62,7 +62,8 @@ class OntologyFile:
         iris: the IRIs of the ontology (empty for an anonymous one), without a trailing '#'.
         base: xml:base of the document, if it has one.
         imports: (imported IRI, line) in the order of the file.
-        graph: all its triples.
+        graph: all that it states, for SPARQL and SHACL.
+        triples: the same; blank nodes of different files have different names.
     """
 
     path: Path
@@ -71,6 +72,32 @@ class OntologyFile:
     base: str | None
     imports: tuple[tuple[str, int], ...]
     graph: Graph = field(repr=False)
+    triples: tuple[Triple, ...] = field(repr=False)
+
+    @cached_property
+    def _statements(self) -> dict[str, list[Triple]]:
+        statements: dict[str, list[Triple]] = {}
+        for triple in self.triples:
+            statements.setdefault(triple[0], []).append(triple)
+        return statements
+
+    def about(self, subject: str | Lit | None) -> Sequence[Triple]:
+        """The triples with a subject."""
+        return self._statements.get(str(subject), ())
+
+    def value(self, subject: str | Lit | None, predicate: str) -> str | Lit | None:
+        """A value of a property; None if there is none."""
+        return next((triple[2] for triple in self.about(subject) if triple[1] == predicate), None)
+
+    def items(self, node: str | Lit | None) -> Iterator[str | Lit]:
+        """The items of a list; one that leads back into itself ends there."""
+        seen = {node}
+        while (first := self.value(node, RDF + "first")) is not None:
+            yield first
+            node = self.value(node, RDF + "rest")
+            if node in seen:
+                return
+            seen.add(node)
 
     def line_of(self, name: str) -> int | None:
         """The first line that describes the thing of that name."""
@@ -159,6 +186,7 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
         base=None if base is None else str(base),
         imports=tuple(sorted(imports.items(), key=lambda item: (item[1], item[0]))),
         graph=graph,
+        triples=tuple(_converted(graph, hashlib.sha256(content).hexdigest()[:8])),
     )
 
 
@@ -216,15 +244,23 @@ def _parse_rdf(path: Path, text: str) -> Graph:
     return graph
 
 
+def _converted(graph: Graph, scope: str) -> Iterator[Triple]:
+    """The triples of a graph; the scope begins the names of blank nodes, which tools for N-Triples can read."""
+    names: dict[Node, str] = {}
+    for triple in graph:
+        for term in triple:
+            if isinstance(term, BNode):
+                names.setdefault(term, f"_:f{scope}n{len(names)}")
+        subject, predicate, value = triple
+        yield names.get(subject, str(subject)), str(predicate), names.get(value) or term_of(value)
+
+
 def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]:
     """The texts that data properties can have as values, by property, where the range lists them (owl:oneOf)."""
-    found: dict[str, frozenset[str]] = {}
-    for file in files:
-        for name, kind in file.graph.subject_objects(RDFS_TERMS.range):
-            values = file.graph.value(kind, OWL_TERMS.oneOf)
-            if values is not None:
-                found[str(name)] = frozenset(map(str, Collection(file.graph, values)))
-    return found
+    ranges = ((file, *triple) for file in files for triple in file.triples if triple[1] == RDFS + "range")
+    lists = ((file, name, file.value(kind, OWL + "oneOf")) for file, name, _, kind in ranges)
+    texts = ((name, [each[0] for each in file.items(start) if isinstance(each, Lit)]) for file, name, start in lists)
+    return {name: frozenset(found) for name, found in texts if found}
 
 
 def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
 from typing import Final, NamedTuple, TypeVar
 
-from rdflib import BNode, Literal, URIRef
+from rdflib import Literal, URIRef
 from rdflib.term import Node
 
 from suave_des.knowledge.state import Fact, Value
@@ -96,10 +96,8 @@ class Lit(NamedTuple):
     datatype: str
 
 
-#: Subject IRI, predicate IRI, and an IRI or a literal.
+#: Subject IRI, predicate IRI, and an IRI or a literal; a blank node stands as "_:" with its name.
 Triple = tuple[str, str, str | Lit]
-#: A triple of rdflib, perhaps with blank nodes.
-RdfTriple = tuple[Node, Node, Node]
 
 _T = TypeVar("_T")
 _Term = TypeVar("_Term", Lit, str | Lit)
@@ -198,7 +196,7 @@ def for_pellet(value: Lit) -> Lit:
 
 def _written(value: str | Lit) -> str:
     if isinstance(value, str):
-        return f"<{value}>"
+        return value if value.startswith("_:") else f"<{value}>"
     value = for_pellet(value)
     text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(ESCAPES))
     return f'"{text}"{value.datatype}' if value.datatype.startswith("@") else f'"{text}"^^<{value.datatype}>'
@@ -206,25 +204,7 @@ def _written(value: str | Lit) -> str:
 
 def n_triple(triple: Triple) -> str:
     """Write one line of N-Triples."""
-    return f"<{triple[0]}> <{triple[1]}> {_written(triple[2])} .\n"
-
-
-def n_triple_with_nodes(triple: RdfTriple, scope: str, renamed: Mapping[Node, str]) -> str:
-    """Write one line of N-Triples with blank nodes.
-
-    Args:
-        scope: begins the names of blank nodes, so that those of different files differ.
-        renamed: names that some nodes get instead.
-    """
-
-    def write(term: Node) -> str:
-        if term in renamed:
-            return renamed[term]
-        if isinstance(term, BNode):
-            return f"_:{scope}x" + "".join(char for char in str(term) if char.isascii() and char.isalnum())
-        return _written(term_of(term))
-
-    return f"{write(triple[0])} {write(triple[1])} {write(triple[2])} .\n"
+    return f"{_written(triple[0])} <{triple[1]}> {_written(triple[2])} .\n"
 
 
 class Names:

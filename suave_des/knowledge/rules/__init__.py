@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.rdf import ESCAPES, OWL, PREFIXES, SWRL, SWRLB, XSD, Lit, RdfTriple, local_name, namespace
+from suave_des.knowledge.rdf import ESCAPES, OWL, PREFIXES, SWRL, SWRLB, XSD, Lit, Triple, local_name, namespace
 
 
 class RuleError(KnowledgeError):
@@ -117,7 +117,7 @@ class Rule:
     enabled: bool = True
     file: Path = Path()
     line: int | None = None
-    triples: tuple[RdfTriple, ...] = field(default=(), repr=False)
+    triples: tuple[Triple, ...] = field(default=(), repr=False)
 
     @cached_property
     def text(self) -> str:

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import count
 from pathlib import Path
 from typing import Final
-
-from rdflib import BNode, Graph, Literal, URIRef
-from rdflib.namespace import RDF, RDFS
-from rdflib.term import Node
 
 from suave_des.errors import Finding, InputError, KnowledgeError, Level, nearest, with_article
 from suave_des.files import decode, read_bytes
@@ -416,9 +411,9 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
     return "data" if isinstance(arguments[1], Lit) else "object"
 
 
-IMP: Final = URIRef(rdf.SWRL + "Imp")
-_VARIABLE: Final = URIRef(rdf.SWRL + "Variable")
-ENABLED: Final = URIRef(rdf.SWRLA + "isRuleEnabled")
+_IMP: Final = rdf.SWRL + "Imp"
+_VARIABLE: Final = rdf.SWRL + "Variable"
+ENABLED: Final = rdf.SWRLA + "isRuleEnabled"
 _PREDICATE_OF: Final = {
     "object": "propertyPredicate",
     "data": "propertyPredicate",
@@ -426,6 +421,7 @@ _PREDICATE_OF: Final = {
     "range": "dataRange",
     "builtin": "builtin",
 }
+_NAMES: Final[Mapping[str, str]] = {"same": swrl.SAME, "different": swrl.DIFFERENT}
 _CLASS_OF: Final = {kind: name for name, kind in swrl.KINDS.items()}
 #: Ends the names that rules without one get.
 WITHOUT_NAME: Final = "without a name"
@@ -436,49 +432,46 @@ VARIABLE_IRIS: Final = ("urn:swrl:var#", "urn:swrl#")
 @lru_cache(maxsize=4)  # as many as there are files in the cache of those: their rules are read again and again
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
-    graph, rules, numbers = file.graph, list[Rule](), count(1)
-    found = [(node, Rule("", *_sides(graph, node))) for node in graph.subjects(RDF.type, IMP)]
-    for node, rule in sorted(found, key=lambda each: (each[1].text, str(each[0]))):
-        label = graph.value(node, RDFS.label)
-        name = str(label) if label is not None else local_name(str(node))
-        if label is None and isinstance(node, BNode):
+    rules, numbers = list[Rule](), count(1)
+    nodes = [subject for subject, predicate, kind in file.triples if predicate == rdf.RDF_TYPE and kind == _IMP]
+    found = [(node, Rule("", *_sides(file, node))) for node in nodes]
+    for node, rule in sorted(found, key=lambda each: (each[1].text, each[0])):
+        label, mark = file.value(node, rdf.RDFS + "label"), file.value(node, ENABLED)
+        name = label.text if isinstance(label, Lit) else local_name(node)
+        if label is None and node.startswith("_:"):
             name = f"rule {next(numbers)} {WITHOUT_NAME}"
-        enabled = str(graph.value(node, ENABLED)).strip().lower() not in ("false", "0")
-        line, triples = file.line_of_rule(name), tuple(_closure(graph, node))
+        enabled = not isinstance(mark, Lit) or mark.text.strip().lower() not in ("false", "0")
+        line, triples = file.line_of_rule(name), tuple(_closure(file, node))
         rules.append(replace(rule, name=name, enabled=enabled, file=file.path, line=line, triples=triples))
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
 
 
-def _closure(graph: Graph, start: Node) -> Iterator[rdf.RdfTriple]:
+def _closure(file: OntologyFile, start: str) -> Iterator[rdf.Triple]:
     """The triples of a rule: its own, and those of its lists and atoms, in a fixed order."""
     waiting, seen = [start], {start}
     while waiting:
-        node = waiting.pop()
-        for _, predicate, value in sorted(graph.triples((node, None, None)), key=lambda triple: str(triple[1])):
-            yield node, predicate, value
-            if value not in seen and (isinstance(value, BNode) or _is_part_of_rule(graph, value)):
+        for triple in sorted(file.about(waiting.pop()), key=lambda triple: triple[1]):
+            yield triple
+            value = triple[2]
+            if (
+                isinstance(value, str)
+                and value not in seen
+                and (value.startswith("_:") or _is_part_of_rule(file, value))
+            ):
                 seen.add(value)
                 waiting.append(value)
 
 
-def _is_part_of_rule(graph: Graph, node: Node) -> bool:
+def _is_part_of_rule(file: OntologyFile, node: str) -> bool:
     """Whether a named node is a list or an atom of a rule, as older editors write them."""
-    kinds = map(str, graph.objects(node, RDF.type)) if isinstance(node, URIRef) else ()
+    kinds = (str(value) for _, predicate, value in file.about(node) if predicate == rdf.RDF_TYPE)
     return any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
 
 
-def _items(graph: Graph, start: Node | None) -> Iterator[Node]:
-    """Items of a list; one that leads back into itself ends there."""
-    if start is not None:
-        with suppress(ValueError):
-            yield from graph.items(start)
-
-
-def _sides(graph: Graph, rule: Node) -> tuple[tuple[Atom, ...], tuple[Atom, ...]]:
+def _sides(file: OntologyFile, rule: str) -> tuple[tuple[Atom, ...], tuple[Atom, ...]]:
     """Body and head, with short names for variables."""
     body, head = (
-        [_read_atom(graph, atom) for atom in _items(graph, graph.value(rule, URIRef(rdf.SWRL + side)))]
-        for side in ("body", "head")
+        [_read_atom(file, atom) for atom in file.items(file.value(rule, rdf.SWRL + side))] for side in ("body", "head")
     )
     names = swrl.distinct_variables((*body, *head))
 
@@ -489,70 +482,63 @@ def _sides(graph: Graph, rule: Node) -> tuple[tuple[Atom, ...], tuple[Atom, ...]
     return tuple(map(renamed, body)), tuple(map(renamed, head))
 
 
-def _read_atom(graph: Graph, node: Node) -> Atom:
-    kinds = sorted(str(kind) for kind in graph.objects(node, RDF.type))
+def _read_atom(file: OntologyFile, node: str | Lit) -> Atom:
+    kinds = sorted(str(value) for _, predicate, value in file.about(node) if predicate == rdf.RDF_TYPE)
     kind: AtomKind = next((swrl.KINDS[name] for name in kinds if name in swrl.KINDS), "")
-    predicates = (graph.value(node, URIRef(rdf.SWRL + name)) for name in dict.fromkeys(_PREDICATE_OF.values()))
-    predicate = next((term for term in predicates if term is not None), None)
-    arguments = [graph.value(node, URIRef(rdf.SWRL + name)) for name in ("argument1", "argument2")]
+    predicates = (file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values()))
+    name = next((str(term) for term in predicates if term is not None), _NAMES.get(kind, ""))
+    arguments = [file.value(node, rdf.SWRL + name) for name in ("argument1", "argument2")]
     if kind == "builtin":
-        arguments = [*_items(graph, graph.value(node, URIRef(rdf.SWRL + "arguments")))]
-    name = {"same": swrl.SAME, "different": swrl.DIFFERENT}.get(kind, "") if predicate is None else str(predicate)
-    name = swrl.EXPRESSION if isinstance(predicate, BNode) else name
-    return Atom(kind, name, tuple(_read_term(graph, term) for term in arguments if term is not None))
+        arguments = [*file.items(file.value(node, rdf.SWRL + "arguments"))]
+    terms = tuple(_read_term(file, term) for term in arguments if term is not None)
+    return Atom(kind, swrl.EXPRESSION if name.startswith("_:") else name, terms)
 
 
-def _read_term(graph: Graph, term: Node) -> Term:
-    value = rdf.term_of(term)
-    if isinstance(value, Lit):
-        return value
-    if (term, RDF.type, _VARIABLE) in graph or str(term).startswith(VARIABLE_IRIS):
-        return Variable(str(term))
-    return Named(str(term))
+def _read_term(file: OntologyFile, term: str | Lit) -> Term:
+    if isinstance(term, Lit):
+        return term
+    is_variable = (term, rdf.RDF_TYPE, _VARIABLE) in file.about(term) or term.startswith(VARIABLE_IRIS)
+    return Variable(term) if is_variable else Named(term)
 
 
-def triples_of(rule: Rule) -> Sequence[rdf.RdfTriple]:
+def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
     """The RDF of a rule, which begins with its node: as an ontology has it, or as one would."""
     if rule.triples:
         return rule.triples
-    node = BNode()
-    triples: list[rdf.RdfTriple] = [(node, RDF.type, IMP), (node, RDFS.label, Literal(rule.name))]
+    label = Lit(rule.name, rdf.XSD + "string")
+    triples: list[rdf.Triple] = [("_:rule", rdf.RDF_TYPE, _IMP), ("_:rule", rdf.RDFS + "label", label)]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
-        triples.append((_write_term(Variable(variable)), RDF.type, _VARIABLE))
+        triples.append((VARIABLE_IRIS[0] + variable, rdf.RDF_TYPE, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
-        triples.append((node, URIRef(rdf.SWRL + side), _write_list(nodes, rdf.SWRL + "AtomList", triples)))
+        triples.append(("_:rule", rdf.SWRL + side, _write_list(nodes, rdf.SWRL + "AtomList", triples)))
     return triples
 
 
-def _write_term(term: Term) -> Node:
-    if isinstance(term, Variable):
-        return URIRef(VARIABLE_IRIS[0] + term.name)
-    if isinstance(term, Named):
-        return URIRef(term.iri)
-    if term.datatype.startswith("@"):
-        return Literal(term.text, lang=term.datatype[1:])
-    return Literal(term.text, datatype=URIRef(term.datatype), normalize=False)
+def _write_term(term: Term) -> str | Lit:
+    if isinstance(term, Lit):
+        return term
+    return term.iri if isinstance(term, Named) else VARIABLE_IRIS[0] + term.name
 
 
-def _write_atom(atom: Atom, triples: list[rdf.RdfTriple]) -> Node:
-    node = BNode()
-    triples.append((node, RDF.type, URIRef(_CLASS_OF[atom.kind])))
+def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
+    node = f"_:atom{len(triples)}"
+    triples.append((node, rdf.RDF_TYPE, _CLASS_OF[atom.kind]))
     if atom.kind in _PREDICATE_OF:
-        triples.append((node, URIRef(rdf.SWRL + _PREDICATE_OF[atom.kind]), URIRef(atom.predicate)))
+        triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], atom.predicate))
     if atom.kind == "builtin":
-        arguments = _write_list([_write_term(term) for term in atom.arguments], str(RDF.List), triples)
-        triples.append((node, URIRef(rdf.SWRL + "arguments"), arguments))
+        arguments = _write_list([_write_term(term) for term in atom.arguments], rdf.RDF + "List", triples)
+        triples.append((node, rdf.SWRL + "arguments", arguments))
     else:
         for number, term in enumerate(atom.arguments[:2], start=1):
-            triples.append((node, URIRef(f"{rdf.SWRL}argument{number}"), _write_term(term)))
+            triples.append((node, f"{rdf.SWRL}argument{number}", _write_term(term)))
     return node
 
 
-def _write_list(items: Sequence[Node], kind: str, triples: list[rdf.RdfTriple]) -> Node:
-    rest: Node = RDF.nil
+def _write_list(items: Sequence[str | Lit], kind: str, triples: list[rdf.Triple]) -> str:
+    rest = rdf.RDF + "nil"
     for item in reversed(items):
-        node = BNode()
-        triples += [(node, RDF.type, URIRef(kind)), (node, RDF.first, item), (node, RDF.rest, rest)]
+        node = f"_:list{len(triples)}"
+        triples += [(node, rdf.RDF_TYPE, kind), (node, rdf.RDF + "first", item), (node, rdf.RDF + "rest", rest)]
         rest = node
     return rest
