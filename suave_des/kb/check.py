@@ -60,7 +60,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
             operators=subject.operators,
         )
     except KnowledgeError as error:
-        sources = collect(subject.given)
+        sources = collect(subject.ontologies)
         findings = [*static_findings(subject, sources), *check_shapes(sources)]
         message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
         is_known = has_level(findings, Level.ERROR)
@@ -101,7 +101,7 @@ def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> It
     the rules of 2023, which contradict any other problem once a component recovered, that is in states of its own.
     """
     scale, groups = Scale(numbers_in(base)), interchangeable_components(base)
-    apart = RECOVERED if rules_of_2023(base.content) else None
+    apart = RECOVERED if rules_of_2023(base) else None
     attributes = [
         name for name in base.model.attributes if has_effect(base, name) and (measured is None or name in measured)
     ]

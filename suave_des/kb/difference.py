@@ -22,7 +22,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
 from suave_des.knowledge.reasoner import regions_of
-from suave_des.knowledge.rules import literal_text
+from suave_des.knowledge.rules import write_term
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, Metric, metric_of
 from suave_des.scenario.loader import Replacements, load_scenario
@@ -66,7 +66,7 @@ def _triple(base: Ontology, triple: Triple) -> str:
     if is_fact(triple):
         return str(fact_of(triple, base.names))
     subject, predicate, value = triple
-    shown = literal_text(value) if isinstance(value, Lit) else base.names.short(value)
+    shown = write_term(value) if isinstance(value, Lit) else base.names.short(value)
     if predicate == RDF_TYPE:
         return f"{shown}({base.names.short(subject)})"
     return f"{base.names.short(subject)} {local_name(predicate)} {shown}"
@@ -79,7 +79,7 @@ def _structure(base: Ontology) -> Iterator[str]:
     def text(node: Node, above: frozenset[Node]) -> str:
         if not isinstance(node, rdflib.BNode):
             term = term_of(node)
-            return literal_text(term) if isinstance(term, Lit) else base.names.short(term)
+            return write_term(term) if isinstance(term, Lit) else base.names.short(term)
         if node in above:
             return "[...]"
         parts = sorted(

@@ -44,7 +44,7 @@ from suave_des.knowledge.rdf import (
     local_name,
     value_of,
 )
-from suave_des.knowledge.rules import COMPARISONS, Atom, Rule, Variable, literal_text, write_atom
+from suave_des.knowledge.rules import COMPARISONS, Atom, Rule, Variable, write_atom, write_term
 from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import ContradictionError, KnowledgeState
 
@@ -166,7 +166,7 @@ class RuleQuestions:
     def _is_fixed(self, atom: Atom) -> bool:
         """Whether what an atom asks for is neither in states nor concluded by a rule."""
         content = self._usable.content
-        concluded = content.head_properties() | content.head_classes()
+        concluded = content.concluded
         of_states = {triple[1] for own in self._usable.model.own.values() for triple in own}
         return atom.kind in FACT_KINDS and atom.predicate not in _IN_STATES | concluded | of_states
 
@@ -279,7 +279,7 @@ def _unequal(values: list[str | Lit], wanted: str | Lit) -> str:
         if isinstance(value, Lit) and isinstance(wanted, Lit):
             if value.datatype != wanted.datatype:
                 kinds = f"{local_name(value.datatype)} and {local_name(wanted.datatype)}"
-                return f"; {kinds} never match, even where they look alike: write {literal_text(value)}"
+                return f"; {kinds} never match, even where they look alike: write {write_term(value)}"
             if value.text.strip().lower() == wanted.text.strip().lower():
                 return "; they differ in case or spaces"
     return ""
@@ -296,7 +296,7 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
         return "nothing"
     if isinstance(value, Lit):
         is_plain_number = value.datatype in NUMERIC and str(value_of(value, base.names)) == value.text
-        return value.text if is_plain_number else literal_text(value)
+        return value.text if is_plain_number else write_term(value)
     return base.names.short(value)
 
 

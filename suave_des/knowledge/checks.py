@@ -26,7 +26,6 @@ from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term, Variable, write_atom
 from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile, about_rule, fatal_problems, looked_up
-from suave_des.resources import shipped_folder
 
 
 @dataclass(frozen=True)
@@ -61,11 +60,6 @@ class Subject:
     reaction_thresholds_m: Collection[float] | None = None
     time_limit_s: float = TIME_LIMIT_S
 
-    @property
-    def given(self) -> list[Path]:
-        """The ontologies, or the shipped one."""
-        return list(self.ontologies) or [shipped_folder("ontology") / "suave.owl"]
-
 
 @dataclass(frozen=True, eq=False)
 class Material:
@@ -92,7 +86,7 @@ class Material:
     @cached_property
     def dead(self) -> list[tuple[Rule, Atom]]:
         """The rules that fire in no state, each with an atom of its body that can never hold."""
-        return dead_rules(self.content, self.base.model)
+        return dead_rules(self)
 
     @cached_property
     def for_other_models(self) -> list[Rule]:
@@ -111,7 +105,8 @@ class Material:
 
     def is_own(self, rule: Rule) -> bool:
         """Whether a rule is in a file that the user gave, and not one of TOMASys."""
-        given = {path.resolve() for path in (*self.subject.given, *self.subject.rules)}
+        ontologies = self.subject.ontologies or [self.base.sources[0].path]
+        given = {path.resolve() for path in (*ontologies, *self.subject.rules)}
         return rule.file.resolve() in given and not self.is_of_metamodel(rule)
 
     def about(self, level: Level, name: str, message: str, remedy: str | None = None) -> Finding:
@@ -245,7 +240,7 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
         problem = f"missions measure {name}, but no ontology has a quality attribute type of this name"
         remedy = nearest(name, model.attributes) or "declare a QualityAttributeType of this name"
         yield material.about(Level.WARN, name, problem, remedy)
-    for name in () if rules_of_2023(material.content) else without_operator(material.content, model, measured or ()):
+    for name in () if rules_of_2023(material.base) else without_operator(material.base, measured or ()):
         designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
         problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
         yield material.about(Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <")
@@ -271,24 +266,23 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
     """Note the components whose status nothing reports, and the attributes that designs expect and nothing measures."""
     content, subject = material.content, material.subject
     asserted = {each for each, predicate, _ in content.triples if predicate == rdf.C_STATUS}
-    if subject.reported is not None and rdf.C_STATUS not in content.head_properties():
+    if subject.reported is not None and rdf.C_STATUS not in content.concluded:
         for name, iri in sorted(material.base.model.components.items()):
             if name not in subject.reported and iri not in asserted:
-                problem = (
-                    f"nothing in the simulation reports the status of component {name}, so it has none in missions"
-                )
-                yield material.about(Level.INFO, name, problem, f"reported are {', '.join(subject.reported)}")
-    for name in (
-        sorted(_expected(material.base.model).difference(subject.measured)) if subject.measured is not None else ()
-    ):
+                nothing = f"nothing in the simulation reports the status of component {name}"
+                remedy = f"reported are {', '.join(subject.reported)}"
+                yield material.about(Level.INFO, name, f"{nothing}, so it has none in missions", remedy)
+    expected = _expected(material.base.model)
+    for name in sorted(expected.difference(expected if subject.measured is None else subject.measured)):
         problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
         yield material.about(Level.INFO, name, problem)
 
 
-def without_operator(content: Content, model: Model, measured: Collection[str]) -> list[str]:
+def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
     """Return the quality attributes that missions measure and designs expect, and that cannot be compared."""
-    compared = {subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR}
-    return sorted(name for name in _expected(model).intersection(measured) if model.attributes[name] not in compared)
+    compared = {subject for subject, predicate, _ in base.content.triples if predicate == rdf.QA_OPERATOR}
+    known = base.model.attributes
+    return sorted(name for name in _expected(base.model).intersection(measured) if known[name] not in compared)
 
 
 def _expected(model: Model) -> frozenset[str]:
@@ -312,16 +306,10 @@ def assumed_operators(material: Material) -> Iterator[Finding]:
     return (material.about(Level.INFO, name, words) for name, words in material.base.assumptions.items())
 
 
-def rules_of_2023(content: Content) -> list[tuple[Rule, Atom]]:
+def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of 2023 do."""
-    return [
-        (rule, atom)
-        for rule in content.enabled_rules
-        for atom in rule.head
-        if atom.predicate == rdf.O_STATUS
-        and isinstance(atom.arguments[-1], Lit)
-        and atom.arguments[-1].text == "UPDATABLE"
-    ]
+    heads = [(rule, atom) for rule in base.content.enabled_rules for atom in rule.head]
+    return [(rule, atom) for rule, atom in heads if "UPDATABLE" in swrl.texts_of([atom], rdf.O_STATUS)]
 
 
 def check_revision(base: Ontology, measured: Collection[str], revision: str) -> None:
@@ -338,8 +326,8 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
     Raises:
         KnowledgeError: with the file and line of the rule.
     """
-    missing = without_operator(base.content, base.model, measured)
-    for rule, atom in rules_of_2023(base.content) if missing else ():
+    missing = without_operator(base, measured)
+    for rule, atom in rules_of_2023(base) if missing else ():
         raise KnowledgeError(
             f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
             f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator",
@@ -370,12 +358,10 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
 def shared_names(material: Material) -> Iterator[Finding]:
     """Find rules of one name, other than those of TOMASys and mros, and those that replace another one."""
     rules = material.content.rules
-    names, own = (
-        Counter(rule.name for rule in rules),
-        {each.name for each in rules if not material.is_of_metamodel(each)},
-    )
+    names = Counter(rule.name for rule in rules)
+    own = {rule.name for rule in rules if not material.is_of_metamodel(rule) and not rule.name.endswith(WITHOUT_NAME)}
     for rule in rules:
-        if names[rule.name] > 1 and rule.name in own and not rule.name.endswith(WITHOUT_NAME):
+        if names[rule.name] > 1 and rule.name in own:
             yield material.suspicious(rule, None, f"{names[rule.name]} rules have this name", "rename one")
     for old, new in material.content.replaced:
         if (old.text, old.enabled) != (new.text, new.enabled):
@@ -393,13 +379,14 @@ def for_other_models(material: Material) -> Iterator[Finding]:
         yield Finding(Level.INFO, message, str(file))
 
 
-def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
+def dead_rules(material: Material) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that fire in no state, each with an atom of its body that can never hold.
 
     An atom cannot hold if no ontology asserts its class or property, no state adds it and no rule that can fire
     concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not every
     dead rule is returned.
     """
+    content, model = material.content, material.base.model
     leads = tuple(rdf.RDFS + name for name in ("subClassOf", "subPropertyOf", "domain", "range"))
     both_ways = tuple(rdf.OWL + name for name in ("equivalentClass", "equivalentProperty", "inverseOf"))
     related = [(one, name, str(other)) for one, name, other in content.triples]
@@ -425,31 +412,21 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
 
 
-def unmeasured_rules(
-    content: Content, model: Model, measured: Collection[str] | None = None
-) -> list[tuple[Rule, Atom, str, str | None]]:
+def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str | None]]:
     """Find the enabled rules that need a value of a quality attribute of which nothing has one.
 
     A grounding has the measured values (hasQAvalue) of those attributes that its function design has an estimate of.
     Other values are in the ontologies, or measured.
 
-    Args:
-        content: the ontologies and rules.
-        model: what is in them.
-        measured: quality attributes that missions measure; None: any.
-
-    Returns:
+    Yields:
         each rule with the atom that names the attribute, what is wrong, and what would be right.
     """
-    if rdf.IS_QA_TYPE in content.head_properties():
-        return []
-    elsewhere = rdf.HAS_QA_VALUE in content.head_properties() or any(
-        p == rdf.HAS_QA_VALUE for _, p, _ in content.triples
-    )
+    content, model, measured = material.content, material.base.model, material.subject.measured
+    stated = {predicate for _, predicate, _ in content.triples}
+    elsewhere = rdf.HAS_QA_VALUE in content.concluded | stated
     estimated = frozenset().union(*model.estimated.values())
     valued = {local_name(str(value)) for _, predicate, value in content.triples if predicate == rdf.IS_QA_TYPE}
-    found: list[tuple[Rule, Atom, str, str | None]] = []
-    for rule in content.enabled_rules:
+    for rule in content.enabled_rules if rdf.IS_QA_TYPE not in content.concluded else ():
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
         for atom in rule.body:
             if atom.predicate != rdf.IS_QA_TYPE or len(atom.arguments) != 2 or not isinstance(atom.arguments[1], Named):
@@ -458,25 +435,20 @@ def unmeasured_rules(
             is_measured = measured is None or name in measured
             if atom.arguments[0] not in held:
                 if not is_measured and name not in valued:
-                    found.append(
-                        (rule, atom, f"missions do not measure {name}, and no ontology has a value of it", None)
-                    )
+                    yield rule, atom, f"missions do not measure {name}, and no ontology has a value of it", None
             elif name in model.attributes and not elsewhere:
                 if name not in estimated:
                     problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
-                    found.append((rule, atom, problem, f"add a hasQAestimation of type {name} to a design"))
+                    yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
                 elif not is_measured:
-                    problem = f"missions do not measure {name}, so no grounding has a value of it"
-                    found.append((rule, atom, problem, None))
-    return found
+                    yield rule, atom, f"missions do not measure {name}, so no grounding has a value of it", None
 
 
 def never_fires(material: Material) -> Iterator[Finding]:
     """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
     told = list(material.for_other_models)
     dead = [(rule, atom, f"{write_atom(atom)} holds in no state", None) for rule, atom in material.dead]
-    unmeasured = unmeasured_rules(material.content, material.base.model, material.subject.measured)
-    for rule, atom, problem, remedy in (*dead, *unmeasured):
+    for rule, atom, problem, remedy in (*dead, *unmeasured_rules(material)):
         if rule not in told:
             told.append(rule)
             yield material.suspicious(rule, atom.place(), f"can never fire: {problem}", remedy)

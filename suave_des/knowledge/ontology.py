@@ -73,13 +73,10 @@ class Content:
         """The enabled rules."""
         return tuple(rule for rule in self.rules if rule.enabled)
 
-    def head_properties(self) -> frozenset[str]:
-        """Properties that an enabled rule can assert."""
-        return frozenset(name for name, kind in _concluded(self.enabled_rules) if kind != "Class")
-
-    def head_classes(self) -> frozenset[str]:
-        """Classes that an enabled rule can assert membership in."""
-        return frozenset(name for name, kind in _concluded(self.enabled_rules) if kind == "Class")
+    @property
+    def concluded(self) -> frozenset[str]:
+        """The properties and classes that an enabled rule can assert."""
+        return frozenset(name for name, _ in _concluded(self.enabled_rules))
 
     def decision_terms(self) -> Terms:
         """Terms on which decisions depend, and terms that rules assert, with super-properties and inverses."""
@@ -87,8 +84,9 @@ class Content:
         related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
         edges = [(s, o) for s, p, o in related if p in (rdf.RDFS + "subPropertyOf", *both_ways)]
         edges += [(o, s) for s, p, o in related if p in both_ways]
-        wanted = rdf.reached((*self.head_properties(), *rdf.DECISION_PROPERTIES), edges)
-        return Terms(_named(wanted), tuple(sorted(self.head_classes())))
+        heads = sorted(_concluded(self.enabled_rules))
+        wanted = {*rdf.DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
+        return Terms(_named(rdf.reached(wanted, edges)), tuple(name for name, kind in heads if kind == "Class"))
 
     def all_terms(self) -> Terms:
         """Every property and class: some axiom can conclude any of them."""
@@ -229,29 +227,8 @@ class Model:
         """The IRIs of all objectives, groundings and measurements that states may have."""
         return frozenset((*self.objectives.values(), *self.groundings.values(), *self.measurements.values()))
 
-    def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
-        """Return the triples that assert a state, for every reasoner in the same order.
-
-        A component or a quality attribute that the ontology does not have can match no rule, and is left out:
-        monitors may report more than an ontology describes.
-
-        Raises:
-            KnowledgeError: a function or a function design is not in the ontology.
-        """
-        functions = (*(each.function for each in state.objectives), *(name for name, _ in state.groundings))
-        designs = (design for _, design in state.groundings)
-        for what, names, known in (("function", functions, self.functions), ("function design", designs, self.designs)):
-            for name in names:
-                if name not in known:
-                    remedy = f"known: {', '.join(sorted(known)) or 'none'}"
-                    raise KnowledgeError(f"the knowledge base has no {what} {name}", remedy=remedy)
-        present = {self.objectives[objective.function] for objective in state.objectives}
-        present |= {self.groundings[design] for _, design in state.groundings}
-        present |= {self.measurements[name] for name, _ in state.measurements if name in self.attributes}
-        absent = self.in_states - present
-        return tuple(triple for triple in self._triples(state) if triple[2] not in absent)
-
-    def _triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
+    def triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
+        """What a state asserts of its objectives, groundings, components and measurements."""
         for objective in state.objectives:
             iri = self.objectives[objective.function]
             yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "Objective"), *self.own[iri])
@@ -385,7 +362,7 @@ def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
         shown, datatype = value if isinstance(value, Lit) else (value, "")
-        if predicate == rdf.HAS_VALUE and (rdf.number_in(value) is None or datatype not in rdf.EXACT):
+        if predicate == rdf.HAS_VALUE and not (datatype in rdf.EXACT and rdf.is_well_formed(Lit(shown, datatype))):
             but = f" but an xsd:{local_name(datatype)}" if datatype not in (*rdf.EXACT, "") else ""
             yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
         if predicate == rdf.QA_OPERATOR and shown not in OPERATORS:
@@ -461,7 +438,7 @@ class Ontology:
                 disable.
             RuleError: a rule as text cannot be read or used.
         """
-        sources = collect([Path(path) for path in ontologies] or [shipped_folder("ontology") / "suave.owl"])
+        sources = collect([Path(path) for path in ontologies])
         files = [RulesFile.read(Path(path)) for path in rules]
         base = cls.merged(sources, values or {}, operators or {})
         base = base.with_files(files, [file.rules(base.vocabulary) for file in files], disabled_rules)
@@ -611,16 +588,28 @@ class Ontology:
         return {name: dict(sorted(expected.items())) for name, expected in found.items()}
 
     def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
-        """Return the triples that assert a state.
+        """Return the triples that assert a state, for every reasoner in the same order.
+
+        A component or a quality attribute that the ontology does not have can match no rule, and is left out:
+        monitors may report more than an ontology describes.
 
         Raises:
             KnowledgeError: a function or a function design is not in the ontology.
         """
-        return self.model.assertions(state)
+        functions = {*(each.function for each in state.objectives), *(name for name, _ in state.groundings)}
+        designs = {design for _, design in state.groundings}
+        model = self.model
+        for what, names, known in (("", functions, model.functions), (" design", designs, model.designs)):
+            for name in sorted(names.difference(known)):
+                remedy = f"known: {', '.join(sorted(known)) or 'none'}"
+                raise KnowledgeError(f"the knowledge base has no function{what} {name}", remedy=remedy)
+        triples = tuple(model.triples(state))
+        absent = model.in_states.difference(subject for subject, _, _ in triples)
+        return tuple(triple for triple in triples if triple[2] not in absent)
 
-    def asserted(self, state: KnowledgeState) -> frozenset[Fact]:
-        """The facts of the ontologies and of a state."""
-        return self.facts.union(rdf.facts_of(self.assertions(state), self.names))
+    def asserted(self, state: KnowledgeState, facts: Sequence[rdf.Triple] = ()) -> frozenset[Fact]:
+        """The facts of the ontologies and of a state, and further ones."""
+        return self.facts.union(rdf.facts_of((*self.assertions(state), *facts), self.names))
 
     def unsolved(self, functions: Iterable[str]) -> Iterator[tuple[str, str, str]]:
         """Yield those functions that are not there or have no design: name, what is wrong, what would be right."""

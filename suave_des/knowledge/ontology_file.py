@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urldefrag, urljoin
@@ -22,7 +23,7 @@ from xml.sax import SAXParseException
 
 import rdflib
 from lxml import etree
-from rdflib import BNode, Graph, Literal, URIRef
+from rdflib import BNode, Graph, URIRef
 from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF as RDF_TERMS
 from rdflib.term import Node
@@ -218,6 +219,8 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
 
 def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
+    # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
+    text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
     graph = Graph()
     before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write the ill-formed 1e3 as 1000
     try:
@@ -232,15 +235,9 @@ def _parse_rdf(path: Path, text: str) -> Graph:
         raise KnowledgeError(problem, file=path, place=place, remedy=_SAVE_AS) from error
     finally:
         rdflib.NORMALIZE_LITERALS = before
-    for subject, predicate, value in list(graph):
-        if isinstance(value, Literal) and value.datatype is not None and value.datatype.startswith("xsd:"):
-            # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
-            datatype = URIRef(XSD + value.datatype.removeprefix("xsd:"))
-            graph.remove((subject, predicate, value))
-            graph.add((subject, predicate, Literal(str(value), datatype=datatype, normalize=False)))
-        for term in (subject, predicate, value):
-            if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
-                raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
+    for term in chain.from_iterable(graph):
+        if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
+            raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
     return graph
 
 
@@ -264,14 +261,14 @@ def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]
 
 
 def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
-    """Read the given files and all that they import, directly or not, each once.
+    """Read the given files, or the shipped suave.owl, and all that they import, directly or not, each once.
 
     Raises:
         KnowledgeError: a file cannot be used, two different files supply one ontology, or an import does not
             resolve.
     """
     files: list[OntologyFile] = []
-    for path in given:
+    for path in given or [shipped_folder("ontology") / "suave.owl"]:
         _add(files, read_ontology(path))
     for file in files:  # grows meanwhile, by imports of imports
         for iri, line in file.imports:

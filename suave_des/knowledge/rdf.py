@@ -153,14 +153,6 @@ def is_well_formed(value: Lit) -> bool:
         return not Literal(value.text, datatype=URIRef(value.datatype)).ill_typed
 
 
-def number_in(value: object) -> Decimal | None:
-    """Return the number that a literal is; None for other values, and for those that are not finite."""
-    if not isinstance(value, Lit) or value.datatype not in NUMERIC or not is_well_formed(value):
-        return None
-    number = Decimal(value.text.strip())
-    return number if number.is_finite() else None
-
-
 def canonical(value: _Term) -> _Term:
     """Return the same form for all numbers that Pellet treats as equal; other values are unchanged.
 

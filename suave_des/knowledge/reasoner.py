@@ -31,7 +31,7 @@ from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, Triple, facts_of, local_name, reached
-from suave_des.knowledge.rules import COMPARISONS, EXPRESSION
+from suave_des.knowledge.rules import COMPARISONS, EXPRESSION, Variable
 from suave_des.knowledge.state import (
     MAX_EXPONENT,
     NO_GROUNDING,
@@ -140,7 +140,8 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
                 yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
             if atom.kind == "range" or atom.predicate == EXPRESSION:
                 yield f"rule {rule.name} asks for a datatype or a class expression"
-        measured = {name for name, predicate in rule.read_values() if predicate in carriers}
+        read = [atom.arguments[1] for atom in rule.body if atom.predicate in carriers and len(atom.arguments) == 2]
+        measured = {term.name for term in read if isinstance(term, Variable)}
         for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
             yield f"rule {rule.name} copies the value ?{name} to its head"
     for name in sorted(carriers - {HAS_VALUE}):
@@ -378,21 +379,19 @@ class Reasoner:
         key: Hashable = state if self.regions is None else repr(self.regions.key(state))
         if facts:  # whose numbers the regions do not know
             key = state, facts
+        asserted_in = partial(self.base.asserted, facts=facts)
         inferred = self._known.get(key)
-        if inferred is not None and not facts:
-            return Inference(state, self.base.asserted, inferred)
-        assertions = (*self.base.assertions(state), *facts)
-        asserted = self.base.facts.union(facts_of(assertions, self.base.names))
         if inferred is not None:
-            return Inference(state, lambda _: asserted, inferred)
-        inferred = frozenset(facts_of(self._backend(state, assertions), self.base.names)) - asserted
+            return Inference(state, asserted_in, inferred)
+        entailed = self._backend(state, (*self.base.assertions(state), *facts))
+        inferred = frozenset(facts_of(entailed, self.base.names)) - asserted_in(state)
         if facts or not self._mentions_measured(state, inferred):
             self._known[key] = inferred
             if len(self._known) > CACHED_STATES:
                 del self._known[next(iter(self._known))]
             if self._disk is not None and not facts:
                 self._disk.add(str(key), sorted(map(_written, inferred)))
-        return Inference(state, lambda _: asserted, inferred)
+        return Inference(state, asserted_in, inferred)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
         """Whether a measured value is among the inferred ones, so that it would be wrong for another state."""

@@ -36,7 +36,7 @@ def found(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -
 
 def findings_of(subject: Subject) -> tuple[Finding, ...]:
     """What `kb check` finds without a reasoner."""
-    sources = collect(subject.given)
+    sources = collect(subject.ontologies)
     return ordered([*static_findings(subject, sources), *check_shapes(sources)])
 
 

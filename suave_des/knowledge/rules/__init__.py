@@ -130,12 +130,6 @@ class Rule:
         """Body and head."""
         return (*self.body, *self.head)
 
-    def read_values(self) -> Iterator[tuple[str, str]]:
-        """(variable, data property) of each atom of the body that reads a value."""
-        for atom in self.body:
-            if atom.kind == "data" and len(atom.arguments) == 2 and isinstance(atom.arguments[1], Variable):
-                yield atom.arguments[1].name, atom.predicate
-
 
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
     """Texts that atoms mention as values of a property."""
@@ -238,10 +232,11 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
 def write_atom(atom: Atom, named: Naming = local_name) -> str:
     """Write one atom."""
     predicate = named(atom.predicate) if atom.predicate else "nothing"
-    return f"{predicate}({', '.join(_term(term, named) for term in atom.arguments)})"
+    return f"{predicate}({', '.join(write_term(term, named) for term in atom.arguments)})"
 
 
-def _term(term: Term, named: Naming) -> str:
+def write_term(term: Term, named: Naming = local_name) -> str:
+    """Write one argument of an atom."""
     if isinstance(term, Variable):
         return f"?{term.name}"
     if isinstance(term, Named):
@@ -272,8 +267,3 @@ def distinct_variables(atoms: Iterable[Atom]) -> dict[str, str]:
         chosen[variable] = name
         taken.add(name)
     return chosen
-
-
-def literal_text(value: Lit) -> str:
-    """Write a literal as in a rule."""
-    return _term(value, local_name)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import count
 from pathlib import Path
 from typing import Final
@@ -40,22 +40,17 @@ class Vocabulary:
     Attributes:
         kinds: what each IRI is declared as or used as: class, object property, data property, annotation property,
             datatype, individual.
-        by_name: IRIs by their last part.
         ranges: datatypes that the values of a data property can have, where that is one datatype or a choice of them.
         enumerations: the values that a data property can have, where its range lists them.
     """
 
     kinds: Mapping[str, frozenset[str]]
-    by_name: Mapping[str, tuple[str, ...]]
     ranges: Mapping[str, frozenset[str]]
-    enumerations: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    enumerations: Mapping[str, frozenset[str]]
 
     @classmethod
     def of(
-        cls,
-        triples: Collection[rdf.Triple],
-        individuals: Iterable[str] = (),
-        enumerations: Mapping[str, frozenset[str]] | None = None,
+        cls, triples: Iterable[rdf.Triple], individuals: Iterable[str], enumerations: Mapping[str, frozenset[str]]
     ) -> Vocabulary:
         """Collect the names in triples.
 
@@ -66,7 +61,6 @@ class Vocabulary:
         """
         kinds: dict[str, set[str]] = defaultdict(set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}})
         ranges: dict[str, set[str]] = defaultdict(set)
-        by_name: dict[str, list[str]] = defaultdict(list)
         for subject, predicate, value in triples:
             if predicate == rdf.RDF_TYPE and isinstance(value, str):
                 if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
@@ -79,16 +73,18 @@ class Vocabulary:
                 ranges[subject].add(value)
         for iri in individuals:
             kinds[iri].add("individual")
-        for iri in sorted(kinds):
-            by_name[local_name(iri)].append(iri)
-        return cls(
-            {iri: frozenset(found) for iri, found in kinds.items()},
-            {name: tuple(found) for name, found in by_name.items()},
-            # All ranges of a property hold at once; which values several of them leave is not worked out.
-            {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
-            | dict.fromkeys(enumerations or (), frozenset((rdf.XSD + "string",))),
-            enumerations or {},
-        )
+        # All ranges of a property hold at once; which values several of them leave is not worked out.
+        single = {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
+        texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
+        return cls({iri: frozenset(found) for iri, found in kinds.items()}, single | texts, enumerations)
+
+    @cached_property
+    def by_name(self) -> Mapping[str, tuple[str, ...]]:
+        """IRIs by their last part, sorted."""
+        by_name: dict[str, tuple[str, ...]] = {}
+        for iri in sorted(self.kinds):
+            by_name[local_name(iri)] = (*by_name.get(local_name(iri), ()), iri)
+        return by_name
 
     def candidates(self, name: str) -> tuple[str, ...]:
         """IRIs that a bare name can mean: those of TOMASys and mros take precedence over others."""
@@ -178,20 +174,21 @@ def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iter
             return
     if atom.kind == "builtin":
         yield from _builtin_problems(atom, name, is_head=is_head)
-    elif atom.kind == "" or not atom.predicate:
-        yield atom.place(), "an atom without a kind that SWRL knows, or without a name", None
     elif (wrong := _predicate_problem(atom, name, vocabulary)) is not None:
         yield wrong
+        return
     elif len(atom.arguments) != (wanted := _ARGUMENTS[atom.kind]):
         words = "one argument" if wanted == 1 else "two arguments"
         yield atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None
-    else:
-        for number, term in enumerate(atom.arguments):
-            yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
+        return
+    for number, term in enumerate(atom.arguments):
+        yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
 
 
 def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem | None:
     """Check that a class, property or datatype is declared, and used as declared."""
+    if atom.kind == "" or not atom.predicate:
+        return atom.place(), "an atom without a kind that SWRL knows, or without a name", None
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
     if atom.kind == "range":
         is_known = atom.predicate.startswith(rdf.XSD) or "datatype" in declared
@@ -215,7 +212,7 @@ def _argument_problems(
     """Check that an argument is an individual or a value, as required, and possible for that property."""
     name, place, takes_value = local_name(atom.predicate), atom.place(number), atom.takes_value(number)
     if isinstance(term, Lit) and not takes_value:
-        yield place, f"{name}: {swrl.literal_text(term)} is a value, but an individual is needed", None
+        yield place, f"{name}: {swrl.write_term(term)} is a value, but an individual is needed", None
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:
@@ -230,10 +227,10 @@ def _argument_problems(
         whole = term.datatype == rdf.XSD + "integer" and rdf.XSD + "decimal" in ranges  # matches no decimal, but is one
         if term.datatype not in ranges and not (whole and is_head):
             wanted = " or ".join(sorted(map(local_name, ranges)))
-            problem = f"{swrl.literal_text(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
+            problem = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
             yield place, problem, f"write {term.text}.0" if whole else f"a value of {wanted}"
         elif term.text not in values:
-            problem = f"{swrl.literal_text(term)} is not among the values of {name}: it {consequence}"
+            problem = f"{swrl.write_term(term)} is not among the values of {name}: it {consequence}"
             yield place, problem, nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
 
 
@@ -251,13 +248,6 @@ def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Probl
         wanted = str(least) if least == most else f"{least} or more" if most == 99 else f"{least} to {most}"
         remedy = "arguments are separated by commas, and decimals have a point"
         yield atom.place(), f"{name} takes {wanted} arguments, not {len(atom.arguments)}", remedy
-    for number, term in enumerate(atom.arguments):
-        if isinstance(term, Named):
-            yield (
-                atom.place(number),
-                f"{name}: {local_name(term.iri)} is an individual where a value is needed",
-                None,
-            )
 
 
 def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:

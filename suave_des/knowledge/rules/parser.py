@@ -138,19 +138,15 @@ class _Builder:
         self._file = file
         self._prefixes = dict(PREFIXES)
 
-    def start(self, _: Sequence[object]) -> None:
-        """Everything is collected already."""
-
     def prefix(self, parts: Sequence[Token]) -> None:
         """Declare a prefix."""
         self._prefixes[parts[1]] = self._iri(parts[2], "a prefix needs an IRI in angle brackets")
 
     def rule(self, parts: Sequence[Any]) -> None:
         """Collect a rule."""
-        (place, name), body, head = parts[-3:]
-        enabled = len(parts) == 3
-        begins = place if enabled else self._place(parts[0])
-        self.rules.append(Rule(name, body, head, enabled, self._file or Path(), begins.line))
+        disabled, (place, name), body, head = parts  # no body: a rule that always holds
+        begins = self._place(disabled) if disabled else place
+        self.rules.append(Rule(name, body or (), head, not disabled, self._file or Path(), begins.line))
 
     def rule_name(self, parts: Sequence[Token]) -> tuple[Place, str]:
         """A word, or a text that is not blank."""
@@ -159,10 +155,6 @@ class _Builder:
         if not name.strip():
             raise self._wrong(token, "a rule's name is blank", 'write "a name": body -> head')
         return self._place(token), name
-
-    def body(self, parts: Sequence[tuple[Atom, ...]]) -> tuple[Atom, ...]:
-        """All atoms; none for a rule that always holds."""
-        return parts[0] if parts else ()
 
     def atoms(self, parts: Sequence[Atom]) -> tuple[Atom, ...]:
         """One side of a rule."""
