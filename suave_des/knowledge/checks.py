@@ -91,13 +91,8 @@ class Material:
     @cached_property
     def for_other_models(self) -> list[Rule]:
         """The rules of TOMASys and mros, which have rules for any model, that need what this model does not have."""
-        kinds = self.base.vocabulary.kinds
-        return [
-            rule
-            for rule, _ in self.dead
-            if self.is_of_metamodel(rule)
-            and all(each.kind == "builtin" or kinds.get(each.predicate) for each in rule.atoms)
-        ]
+        known, rules = self.base.vocabulary.kinds, [rule for rule, _ in self.dead if self.is_of_metamodel(rule)]
+        return [rule for rule in rules if all(each.kind == "builtin" or each.predicate in known for each in rule.atoms)]
 
     def is_of_metamodel(self, rule: Rule) -> bool:
         """Whether a rule is one of TOMASys or mros."""
@@ -205,10 +200,8 @@ def undefined_names(material: Material) -> Iterator[Finding]:
             remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
             problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
             is_attribute = predicate == rdf.IS_QA_TYPE and meant == ("individual",)
-            otherwise = (
-                "declare a QualityAttributeType of this name" if is_attribute else "declare it, or correct the name"
-            )
-            yield material.about(Level.ERROR, local_name(subject), problem, remedy or otherwise)
+            declare = "a QualityAttributeType of this name" if is_attribute else "it, or correct the name"
+            yield material.about(Level.ERROR, local_name(subject), problem, remedy or f"declare {declare}")
 
 
 def functions_without_design(material: Material) -> Iterator[Finding]:
@@ -538,9 +531,8 @@ def two_values(material: Material) -> Iterator[Finding]:
 
 
 def _same(one: Term, other: Term) -> bool:
-    return one == other or (
-        isinstance(one, Lit) and isinstance(other, Lit) and rdf.canonical(one) == rdf.canonical(other)
-    )
+    first, second = (rdf.canonical(each) if isinstance(each, Lit) else each for each in (one, other))
+    return first == second
 
 
 _FD_REALISABILITY: Final = rdf.TOMASYS + "fd_realisability"

@@ -12,7 +12,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
@@ -28,21 +27,19 @@ from suave_des.resources import shipped_folder
 # The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all libraries in use
 # write and read without loss.
 
-_DECLARED: Final = frozenset(rdf.OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Class"))
+_DECLARED: Final = rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty Class")
 _CLASSES: Final = frozenset((rdf.OWL + "Class", rdf.RDFS + "Class"))
-_PROPERTIES: Final = frozenset(
-    rdf.OWL + kind
-    for kind in (
-        *("ObjectProperty", "DatatypeProperty", "FunctionalProperty", "InverseFunctionalProperty"),
-        *("TransitiveProperty", "SymmetricProperty", "AsymmetricProperty", "ReflexiveProperty", "IrreflexiveProperty"),
-    )
+_PROPERTIES: Final = rdf.terms(
+    rdf.OWL,
+    "ObjectProperty DatatypeProperty FunctionalProperty InverseFunctionalProperty TransitiveProperty "
+    "SymmetricProperty AsymmetricProperty ReflexiveProperty IrreflexiveProperty",
 )
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
 RULE_IRI: Final = "urn:suave-des:rule:"
 #: Annotations, which mean nothing for inference.
-_ANNOTATIONS: Final = frozenset(
-    (rdf.RDFS + "label", rdf.RDFS + "comment", rdf.RDFS + "seeAlso", rdf.RDFS + "isDefinedBy", rdf.OWL + "versionInfo")
-) | {rdf.SWRLA + "isRuleEnabled"}
+_ANNOTATIONS: Final = rdf.terms(rdf.RDFS, "label comment seeAlso isDefinedBy") | {
+    *(rdf.OWL + "versionInfo", rdf.SWRLA + "isRuleEnabled")
+}
 
 
 class Terms(NamedTuple):
@@ -530,12 +527,6 @@ class Ontology:
     def with_facts(self, facts: Iterable[rdf.Triple]) -> Ontology:
         """Return the same ontology with further facts about individuals."""
         return replace(self, content=replace(self.content, triples=(*self.content.triples, *facts)))
-
-    def with_triples(self, triples: Iterable[rdf.Triple]) -> Ontology:
-        """Return the ontology with different triples, in which the model is found again."""
-        whole = replace(self.content, triples=(*triples, *chain.from_iterable(self.model.own.values())))
-        model, content = build_model(whole, self.sources)
-        return replace(self, content=content, model=model, names=rdf.Names(whole.triples), stated=whole.triples)
 
     @property
     def assumptions(self) -> dict[str, str]:

@@ -90,6 +90,10 @@ class OntologyFile:
         """A value of a property; None if there is none."""
         return next((triple[2] for triple in self.about(subject) if triple[1] == predicate), None)
 
+    def kinds(self, subject: str | Lit) -> list[str]:
+        """The classes of a subject, sorted."""
+        return sorted(str(value) for _, predicate, value in self.about(subject) if predicate == RDF + "type")
+
     def items(self, node: str | Lit | None) -> Iterator[str | Lit]:
         """The items of a list; one that leads back into itself ends there."""
         seen = {node}

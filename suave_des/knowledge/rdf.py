@@ -59,14 +59,17 @@ QA_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
 C_STATUS: Final = TOMASYS + "c_status"
 O_STATUS: Final = TOMASYS + "o_status"
 
+
+def terms(namespace: str, names: str) -> frozenset[str]:
+    """Return the IRIs of names in a namespace, which are given with spaces between them."""
+    return frozenset(namespace + name for name in names.split())
+
+
 #: What the planner and the loop read, whether or not a rule can conclude it.
-DECISION_PROPERTIES: Final = tuple(
-    TOMASYS + name
-    for name in (
-        *("fd_error_log", "fd_realisability", "fg_status", "hasNFR", "hasQAestimation", "hasQAvalue", "hasValue"),
-        *("isQAtype", "o_always_improve", "o_status", "o_updatable", "qa_comparison_operator"),
-        *("solvesF", "solvesO", "typeF", "typeFD"),
-    )
+DECISION_PROPERTIES: Final = terms(
+    TOMASYS,
+    "fd_error_log fd_realisability fg_status hasNFR hasQAestimation hasQAvalue hasValue isQAtype o_always_improve "
+    "o_status o_updatable qa_comparison_operator solvesF solvesO typeF typeFD",
 )
 
 #: The quality attribute that the planner maximises.
@@ -101,13 +104,13 @@ Triple = tuple[str, str, str | Lit]
 
 _T = TypeVar("_T")
 _Term = TypeVar("_Term", Lit, str | Lit)
-_WHOLE: Final = (
-    *("integer", "int", "long", "short", "byte"),
-    *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
-    *("unsignedInt", "unsignedLong", "unsignedShort", "unsignedByte"),
+_WHOLE: Final = terms(
+    XSD,
+    "integer int long short byte nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger "
+    "unsignedInt unsignedLong unsignedShort unsignedByte",
 )
 #: Datatypes of exact numbers.
-EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
+EXACT: Final = _WHOLE | {XSD + "decimal"}
 #: Datatypes of numbers.
 NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
@@ -115,7 +118,7 @@ _WHOLE_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,400}")
 _FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
 #: How values of a datatype are written; rdflib, which takes more for them, knows the other datatypes of XML Schema.
 _LEXICAL: Final = (
-    dict.fromkeys((XSD + name for name in _WHOLE), re.compile(r"[+-]?[0-9]+"))
+    dict.fromkeys(_WHOLE, re.compile(r"[+-]?[0-9]+"))
     | dict.fromkeys((XSD + "double", XSD + "float"), re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
     | {XSD + "boolean": re.compile(r"true|false|0|1"), XSD + "decimal": _DECIMAL}
 )

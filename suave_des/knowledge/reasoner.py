@@ -22,7 +22,7 @@ from importlib.metadata import version
 from itertools import chain, product
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from suave_des import knowledge
 from suave_des.caches import SharedEntries, private_cache
@@ -48,13 +48,11 @@ from suave_des.knowledge.state import (
     objective_name,
 )
 
-#: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
-Key = tuple[Any, ...]
 _SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
-_BINARY: Final = frozenset((XSD + "float", XSD + "double"))
+_BINARY: Final = rdf.terms(XSD, "float double")
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
-_SIZELESS: Final = frozenset(XSD + name for name in ("decimal", "string", "boolean", "anyURI", "dateTime", "date"))
-_SIZES: Final = frozenset(XSD + name for name in ("minInclusive", "minExclusive", "maxInclusive", "maxExclusive"))
+_SIZELESS: Final = rdf.terms(XSD, "decimal string boolean anyURI dateTime date")
+_SIZES: Final = rdf.terms(XSD, "minInclusive minExclusive maxInclusive maxExclusive")
 _LITERAL: Final = re.compile(r'"((?:[^"\\]|\\.)*)"(?:\^\^<([^>]*)>)?')
 _XSD_TERM: Final = re.compile(rf"(?<!\^)<({re.escape(XSD)}[^>]*)>")
 _NUMBER: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?\s*")
@@ -97,8 +95,11 @@ class Regions:
         """The bounds of the gaps between thresholds, as measured values are: floats."""
         return -inf, *map(float, self.thresholds), inf
 
-    def key(self, state: KnowledgeState) -> Key:
-        """Return what the rules can distinguish of a state: states with equal keys entail the same."""
+    def key(self, state: KnowledgeState) -> tuple[object, ...]:
+        """Return what the rules can distinguish of a state: states with equal keys entail the same.
+
+        It is objectives, groundings, components and measurements, the last as regions or as exact values.
+        """
         measured: tuple[object, ...] = state.measurements
         regions = tuple((name, self.region(value)) for name, value in state.measurements)
         # Of two values in one gap between thresholds rules can tell which is the greater.

@@ -1,5 +1,6 @@
 """The loop's semantics: which objectives are adapted, which designs are left out and why, which one is chosen."""
 
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
@@ -131,8 +132,8 @@ def test_a_value_is_bad_if_any_operator_of_its_attribute_says_so(suave_copy):
         base = Ontology.load([suave_copy(text)])
         facts = [each for each in base.content.triples if not (each[0] == QA_OPERATOR and "Functional" in str(each[2]))]
         current = next(each for each in facts if each[1] == QA_OPERATOR and each[0].endswith("#current"))
-        base = base.with_triples([*facts, (*current[:2], Lit(">", current[2].datatype))])
-        return decide(Reasoner(base, "pellet"), state)[SEARCH]
+        content = replace(base.content, triples=(*facts, (*current[:2], Lit(">", current[2].datatype))))
+        return decide(Reasoner(replace(base, content=content), "pellet"), state)[SEARCH]
 
     decision = decided(added + required, searching(None, None, status="UNGROUNDED"))
     assert decision.design == "fd_spiral_medium"

