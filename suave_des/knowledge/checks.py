@@ -302,7 +302,8 @@ def assumed_operators(material: Material) -> Iterator[Finding]:
 def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of 2023 do."""
     heads = [(rule, atom) for rule in base.content.enabled_rules for atom in rule.head]
-    return [(rule, atom) for rule, atom in heads if "UPDATABLE" in swrl.texts_of([atom], rdf.O_STATUS)]
+    updatable = Lit("UPDATABLE", rdf.XSD + "string")
+    return [(rule, atom) for rule, atom in heads if atom.predicate == rdf.O_STATUS and updatable in atom.arguments]
 
 
 def check_revision(base: Ontology, measured: Collection[str], revision: str) -> None:
