@@ -86,15 +86,13 @@ def _outcomes(
                 future.add_done_callback(ended.put)
             if not under_way:
                 break
-            try:
+            with suppress(Empty):  # of one that is lost, Dask need not tell
                 future = ended.get(timeout=_LOOK_S)
-            except Empty:  # of one that is lost, Dask need not tell
-                continue
-            chunk = under_way.pop(future)
-            try:
-                yield future.result()
-            except KilledWorker:
-                suspects.extend(chunk)
+                chunk = under_way.pop(future)
+                try:
+                    yield future.result()
+                except KilledWorker:
+                    suspects.extend(chunk)
         else:
             raise ConnectionError
         for key in suspects:
