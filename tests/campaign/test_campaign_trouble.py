@@ -145,7 +145,7 @@ def test_overwriting_replaces_results_and_leaves_other_files(tmp_path):
     run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
     assert len(rows_of(tmp_path / "out")) == 2
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv"),
+        *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv")
     ]
 
 
@@ -184,12 +184,11 @@ def screen(monkeypatch: pytest.MonkeyPatch) -> Screen:
     return screen
 
 
-def shown_on(screen: Screen, label: str = "seams2023", *, quiet: bool = False) -> str:
+def shown_on(screen: Screen, label: str = "seams2023") -> str:
     """Show a campaign that goes on for a while; return what was written."""
-    with redirect_stderr(screen), display.shown(label, quiet=quiet) as show:
+    with redirect_stderr(screen), display.shown(label) as show:
         for done in range(41):
-            if show is not None:
-                show(Progress(done, int(done > 6), 80))
+            show(Progress(done, int(done > 6), 80))
     return screen.getvalue()
 
 
@@ -219,7 +218,3 @@ class TestLines:
         first, *_, last = shown_on(screen, "my\x1b[2Kfile.yaml").splitlines()
         assert first.startswith("suave-des: my?[2Kfile.yaml: ")
         assert re.match(r"suave-des: my\?\[2Kfile.yaml: 40 of 80 missions, 1 failed(,|$)", last)
-
-    def test_quiet_means_nothing(self, screen: Screen) -> None:
-        screen.is_terminal = True
-        assert shown_on(screen, quiet=True) == ""

@@ -118,12 +118,6 @@ class Cluster:
         return process
 
 
-def kill(process: subprocess.Popen[bytes]) -> None:
-    """End a process as the system does when memory is short."""
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-
-
 MINE = "my_managers.careful:Careful"
 
 
@@ -204,7 +198,7 @@ def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(cluster, use
 
     def kill_one(progress: Progress) -> None:
         if not seen:
-            kill(cluster.workers.pop(0))
+            cluster.workers.pop(0).kill()
             cluster.add_worker()
         seen.append(progress.done)
 
@@ -274,7 +268,8 @@ def test_a_scheduler_that_is_lost_in_the_middle(small_cluster, scenario, tmp_pat
 
     def kill_scheduler(progress: Progress) -> None:
         if not stopped_s:
-            kill(small_cluster.scheduler)
+            small_cluster.scheduler.kill()
+            small_cluster.scheduler.wait()
             stopped_s.append(time.monotonic())
 
     asked = (scenario, ["none", "random"], 200, 1)

@@ -105,7 +105,7 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario, undisturbed_l
     resume_campaign(out)
     assert (out / "runs.csv").read_bytes() == undisturbed_long
     assert sorted(path.name for path in out.iterdir()) == [
-        *("campaign.sqlite", "manifest.json", "runs.csv", "summary.csv"),
+        *("campaign.sqlite", "manifest.json", "runs.csv", "summary.csv")
     ]
 
 

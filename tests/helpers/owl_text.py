@@ -47,10 +47,7 @@ def iri(name: str) -> str:
 
 def individual(name: str, kind: str, *statements: tuple[str, str]) -> str:
     """An individual; a value that starts with a digit is a decimal, true/false a boolean, ":x" an individual."""
-    lines = [
-        f'<owl:NamedIndividual rdf:about="{iri(name)}">',
-        f'<rdf:type rdf:resource="{TOMASYS}{kind}"/>',
-    ]
+    lines = [f'<owl:NamedIndividual rdf:about="{iri(name)}">', f'<rdf:type rdf:resource="{TOMASYS}{kind}"/>']
     for property_name, value in statements:
         tag = property_name if ":" in property_name else f"tomasys:{property_name}"
         if value.startswith(":"):

@@ -8,14 +8,7 @@ from pathlib import Path
 import pandas
 import pytest
 
-from suave_des.kb.difference import (
-    METRICS,
-    compare_axioms,
-    compare_decisions,
-    compare_missions,
-    firing_states,
-    paired,
-)
+from suave_des.kb.difference import METRICS, compare_axioms, compare_decisions, compare_missions, firing_states, paired
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.space import Outcome, Situation, States
 from suave_des.knowledge.ontology import Ontology

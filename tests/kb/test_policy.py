@@ -12,14 +12,7 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.policy import Policy, function_table, make_policy
-from suave_des.kb.space import (
-    PolicySpace,
-    Scale,
-    Situation,
-    States,
-    component_reports,
-    kind_of,
-)
+from suave_des.kb.space import PolicySpace, Scale, Situation, States, component_reports, kind_of
 from suave_des.kb.states import ManagingSettings
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"

@@ -60,8 +60,7 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(suave_c
 
 
 @pytest.mark.parametrize(
-    "iri",
-    ["http://metacontrol.org/tomasys", "http://metacontrol.org/tomasys#", MROS_IMPORT, "http://ros/mros#"],
+    "iri", ["http://metacontrol.org/tomasys", "http://metacontrol.org/tomasys#", MROS_IMPORT, "http://ros/mros#"]
 )
 def test_known_iris_resolve_to_the_shipped_files(suave_copy, shipped, iri):
     path = suave_copy(replace={IMPORT: iri})

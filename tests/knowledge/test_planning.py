@@ -170,10 +170,7 @@ def test_a_required_value_without_operator_is_an_error(suave_copy):
         decide_with(path, searching(None, 2.5, status="UNGROUNDED"))
 
 
-@pytest.mark.parametrize(
-    ("operator", "allowed"),
-    [("<", [0.5, 0.6]), ("<=", [0.6]), (">", [0.4, 0.5]), (">=", [0.4])],
-)
+@pytest.mark.parametrize(("operator", "allowed"), [("<", [0.5, 0.6]), ("<=", [0.6]), (">", [0.4, 0.5]), (">=", [0.4])])
 def test_the_operator_of_the_attribute_decides_what_is_bad(suave_copy, operator, allowed):
     path = suave_copy(
         individual("current", "QualityAttributeType", ("qa_comparison_operator", operator))

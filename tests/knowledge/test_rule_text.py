@@ -145,11 +145,7 @@ def test_after_a_mistake_the_other_rules_are_read():
         ("isQAtype(?q, turbidity) -> Role(?q)", 17, "declare it: an individual turbidity of QualityAttributeType"),
         ("c_status(?c, FALSE) -> Role(?c)", 17, 'FALSE is not defined (declare it, or write "FALSE" for a text'),
         ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (declare it"),
-        (
-            "hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)",
-            23,
-            "not 3 (arguments are separated by",
-        ),
+        ("hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)", 23, "not 3 (arguments are separated by"),
     ],
 )
 def test_rules_that_pellet_would_ignore_are_refused(rule, column, words, tmp_path):

@@ -7,7 +7,6 @@ from importlib.resources import files
 import pytest
 
 from suave_des import run_mission
-from suave_des.campaign.campaign import run_campaign
 from suave_des.pages.replay import mission_on_page
 from suave_des.records.mission_folder import read_mission
 from suave_des.resources import shipped_folder
@@ -17,13 +16,6 @@ from suave_des.resources import shipped_folder
 def mission(tmp_path_factory):
     folder = tmp_path_factory.mktemp("missions") / "bt"
     run_mission("seams2023", "bt", 2, 1, folder)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("campaigns") / "two"
-    run_campaign("seams2023", ["none", "bt"], runs=2, out=folder)
     return folder
 
 

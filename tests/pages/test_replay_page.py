@@ -7,16 +7,10 @@ from suave_des.records.mission_folder import record_of
 from suave_des.results.mission import adaptations
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
-from tests.helpers.browser import DESKTOP, PHONE, chromium, opened
+from tests.helpers.browser import DESKTOP, PHONE, opened
 
 SEED = 1
 FAILURE_S = 36.0  # when metacontrol has seen the thruster's failure of seams2023
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")

@@ -3,26 +3,12 @@
 import pandas
 import pytest
 
-from suave_des.campaign.campaign import run_campaign
 from suave_des.pages.report import LIMIT_BYTES, report_page
 from suave_des.results.style import line, looks
-from tests.helpers.browser import DESKTOP, PHONE, chromium, opened
+from tests.helpers.browser import DESKTOP, PHONE, opened
 
 pytest.importorskip("plotly")
 MARKUP = "<b>mine</b>$x$</script><img/src=x/onerror=alert(1)>"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("results") / "campaign"
-    run_campaign("seams2023", ["none", "bt"], runs=8, out=folder)
-    return folder
 
 
 @pytest.fixture(scope="module")

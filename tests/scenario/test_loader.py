@@ -87,10 +87,7 @@ def test_a_derived_scenario_is_called_after_its_file_unless_it_says_otherwise(wr
 
 
 def test_null_removes_a_signal_a_value_and_the_battery(write):
-    write(
-        "base.yaml",
-        "base: paper_table_values\nbattery: {}\nsignals: {chlorophyll: {kind: constant, value: 1}}\n",
-    )
+    write("base.yaml", "base: paper_table_values\nbattery: {}\nsignals: {chlorophyll: {kind: constant, value: 1}}\n")
     path = write(
         "mine.yaml",
         "base: base.yaml\nbattery: null\nsignals: {chlorophyll: null}\n"

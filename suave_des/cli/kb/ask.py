@@ -12,15 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.console import counted, errors
-from suave_des.cli.kb.options import (
-    At,
-    KnowledgeOptions,
-    MaxFailed,
-    ReasonerOptions,
-    TimeLimitS,
-    shown,
-    state_at,
-)
+from suave_des.cli.kb.options import At, KnowledgeOptions, MaxFailed, ReasonerOptions, TimeLimitS, shown, state_at
 from suave_des.errors import InputError
 from suave_des.files import csv_text, write_files
 from suave_des.interrupts import ends_at_once
