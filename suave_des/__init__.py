@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 if _TYPE_CHECKING:
     from suave_des.api import RecordedMission, resume_campaign, run_campaign, run_mission
-    from suave_des.campaign.training import train
+    from suave_des.campaign.campaign import train
     from suave_des.campaign.variation import read_ensemble
     from suave_des.errors import InputError, MissionError, SuaveDesError
     from suave_des.estimates import mean_of
@@ -45,7 +45,7 @@ _HOMES = {
     name: module
     for module, names in {
         "api": ("RecordedMission", "resume_campaign", "run_campaign", "run_mission"),
-        "campaign.training": ("train",),
+        "campaign.campaign": ("train",),
         "campaign.variation": ("read_ensemble",),
         "errors": ("InputError", "MissionError", "SuaveDesError"),
         "estimates": ("mean_of",),

@@ -1,14 +1,16 @@
-"""Campaigns, for programs: many missions of one scenario under several managers, saved as they finish."""
+"""Campaigns, for programs: many missions of one scenario under several managers, saved as they finish; and training."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
+from suave_des.arguments import plain_arguments
 from suave_des.campaign.inputs import (
     check_campaign,
+    check_inputs,
     check_same,
     check_trusted,
     deciding,
@@ -21,10 +23,19 @@ from suave_des.campaign.inputs import (
 from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
-from suave_des.campaign.spec import CampaignSpec, read_campaign_file
+from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range, read_campaign_file
 from suave_des.campaign.workers import LocalWorkers, in_process
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
-from suave_des.files import check_output_folder, make_output_folder, remove_parts, remove_results
+from suave_des.files import (
+    check_output_file,
+    check_output_folder,
+    make_output_folder,
+    remove_parts,
+    remove_results,
+    write_files,
+)
+from suave_des.learned import Learned
+from suave_des.metrics.result import MissionMetrics
 from suave_des.records.store import (
     FILES,
     STORE_FILE,
@@ -36,7 +47,7 @@ from suave_des.records.store import (
     is_left_over,
 )
 from suave_des.registry import ManagerLike, name_of
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 
 __all__ = ["CampaignInterrupted", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
 _MORE_MANAGERS = "for other managers, run a campaign with the same seed into another folder: compare pairs their runs"
@@ -297,3 +308,60 @@ def _work(
         if told:
             store.note("remarks", told)
     return stopped, told
+
+
+# Training: missions in one process, in the order of their runs, and a file at the end.
+
+TRAINING_SEED = 0
+"""Not that of campaigns, so that a campaign has missions that training has not seen."""
+
+
+@plain_arguments
+def train(
+    scenario: str | Path,
+    manager: str,
+    missions: int,
+    out: str | Path,
+    *,
+    seed: int = TRAINING_SEED,
+    overwrite: bool = False,
+    on_mission: Callable[[MissionMetrics], None] = lambda metrics: None,
+    **replacements: Unpack[Replacements],
+) -> Learned:
+    """Train a manager, and write the training result.
+
+    Example:
+        train("seams2023", "learner:Learner", 500, "policy.json")
+
+    Args:
+        scenario: path of a scenario file, or name of a shipped one.
+        manager: name, or module:Class; it keeps what it learns in the dict that its hook `recall` is given.
+        missions: how many: runs 1 to that.
+        out: file to write.
+        seed: of everything that is random.
+        overwrite: whether the file may exist.
+        on_mission: called with the metrics of each mission.
+        replacements: as of load_scenario.
+
+    Raises:
+        InputError: something given cannot be used, or nothing was learned; nothing is written then.
+        MissionError: the manager raised; nothing is written then.
+    """
+    from suave_des.simulation.simulator import Simulator  # with the compiler, which campaigns load in their workers
+
+    check_output_file(Path(out), overwrite=overwrite)
+    check_range("missions", missions, 1, RUNS_LIMIT)
+    check_range("seed", seed, 0, SEED_LIMIT)
+    loaded = load_scenario(scenario, **replacements)
+    inputs = check_inputs([loaded], [manager], {})
+    learned: dict[str, Any] = {}
+    simulator = Simulator(loaded, training={manager: learned})
+    for run in range(1, missions + 1):
+        on_mission(simulator.run(manager, run, seed).metrics)
+    if not learned:
+        remedy = "keep what it learns in the dict that the hook recall is given"
+        raise InputError(f"manager {manager} has learned nothing", remedy=remedy)
+    read = dict(sorted({**loaded.inputs, **inputs}.items()))
+    result = Learned(manager, loaded.scenario.name, seed, missions, read, learned)
+    write_files(Path(out).parent, {Path(out).name: result.text()})
+    return result

@@ -275,7 +275,7 @@ def train(
 
     A campaign uses the resulting file with --manager-option learned=FILE, and does not change it.
     """
-    from suave_des.campaign.training import train as trained
+    from suave_des.campaign.campaign import train as trained
 
     found: list[MissionMetrics] = []
     options = files.with_options(manager_option, [manager])

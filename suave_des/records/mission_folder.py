@@ -276,9 +276,6 @@ def read_knowledge(path: Path) -> tuple[KnowledgeRecord, ...]:
         return tuple(_record(line["t_s"], line, line["measurements"]) for line in lines)
 
 
-_EMPTY: Mapping[str, Any] = {"scenario": {}}
-
-
 def read_missions(path: Path) -> Iterator[RecordedMission]:
     """Read knowledge_states.jsonl, mission by mission.
 
@@ -286,7 +283,7 @@ def read_missions(path: Path) -> Iterator[RecordedMission]:
         InputError: it cannot be read, or a line of it is damaged.
     """
     with _lines(path, "campaign") as lines:
-        scenario = next(lines, _EMPTY)["scenario"]
+        scenario: Any = next(lines, {"scenario": {}})["scenario"]
         for content in lines:
             at_point = json.loads(json.dumps(scenario))
             for key_path, value in content["swept"].items():

@@ -169,7 +169,7 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
             raise line_error(path, 1, f"has no column {column!r}", remedy)
     rows, lines, averages = [], [], []
     for line, row in numbered:
-        if layout is not _OWN and _first_word(row) in _AVERAGES:
+        if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
             averages.append(line)
         elif layout[DISTANCE] not in row:  # else it is the header again, as in files that were put together
             if len(row) != len(header):
@@ -186,10 +186,6 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
 def is_foreign(content: Content) -> bool:
     """Return whether a file has none of the columns that name a manager."""
     return not {layout["manager"] for layout in _LAYOUTS} & set(content[0])
-
-
-def _first_word(cells: Sequence[str]) -> str:
-    return next((word for cell in cells for word in cell.split()), "").rstrip(":").lower()
 
 
 class _Cells:

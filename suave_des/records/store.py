@@ -318,23 +318,21 @@ class Store:
 
 def has_campaign(folder: Path) -> bool:
     """Return whether a campaign was begun in a folder; damaged and busy ones count."""
-    if not (folder / STORE_FILE).is_file():
-        return False
-    try:
-        with closing(_read_only(folder / STORE_FILE)) as db:
-            return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
-    except Exception:  # there is no end to what a file from elsewhere leads to
-        return True
+    return (folder / STORE_FILE).is_file() and _looked_up(folder, "SELECT count(*) FROM sqlite_master") != 0
 
 
 def stored_identity(folder: Path) -> str | None:
     """Return the identity of the campaign whose missions are kept in a folder; None where it cannot be read."""
-    path = folder / STORE_FILE
+    found = _looked_up(folder, "SELECT json_extract(value, '$') FROM about WHERE name = 'identity'")
+    return None if found is None else str(found)
+
+
+def _looked_up(folder: Path, query: str) -> Any:
+    """Return the one value that a query finds in a folder's store; None where it cannot be read."""
     try:
-        with closing(_read_only(path)) as db:
-            (kept,) = db.execute("SELECT value FROM about WHERE name = 'identity'").fetchone()
-        return str(json.loads(kept))
-    except Exception:
+        with closing(_read_only(folder / STORE_FILE)) as db:
+            return db.execute(query).fetchone()[0]
+    except Exception:  # there is no end to what a file from elsewhere leads to
         return None
 
 

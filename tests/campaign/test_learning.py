@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from suave_des import InputError, NoManager, Simulator, load_scenario, run_campaign, run_mission
-from suave_des.campaign.training import train
+from suave_des.campaign.campaign import train
 from tests.helpers import AWKWARD, OUTSIDE
 from tests.helpers.command import command_here, suave_des_command
 
