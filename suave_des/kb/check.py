@@ -15,13 +15,8 @@ from rdflib.term import Node
 
 from suave_des.caches import SharedEntries, private_cache
 from suave_des.errors import Finding, InputError, KnowledgeError, Level, has_level, ordered
-from suave_des.kb.space import (
-    Scale,
-    component_statuses,
-    has_effect,
-    interchangeable_components,
-    numbers_in,
-)
+from suave_des.kb.space import PolicySpace
+from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.checks import Subject, check_revision, findings_in, rules_of_2023, static_findings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, place_of
@@ -100,22 +95,19 @@ def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> It
     have an effect and, if those are given, are measured count, and one component of those that are treated alike. With
     the rules of 2023, which contradict any other problem once a component recovered, that is in states of its own.
     """
-    scale, groups = Scale(numbers_in(base)), interchangeable_components(base)
-    apart = RECOVERED if rules_of_2023(base) else None
-    attributes = [
-        name for name in base.model.attributes if has_effect(base, name) and (measured is None or name in measured)
-    ]
+    settings = ManagingSettings(measured=tuple(base.model.attributes if measured is None else measured))
+    space, apart = PolicySpace.of(base, settings), RECOVERED if rules_of_2023(base) else None
     designs = {function: found for function in base.functions if (found := base.designs(function))}
     for number in range(max(map(len, designs.values()), default=0)):
         groundings = {function: found[number % len(found)] for function, found in designs.items()}
-        for status in component_statuses(base):
-            for place in range(len(scale) if attributes and status != apart else 1):
-                value = scale.value(place)
+        for status in space.statuses:
+            for place in range(len(space.scale) if space.attributes and status != apart else 1):
+                value = space.scale.value(place)
                 yield KnowledgeState.of(
                     map(ObjectiveState, groundings),
                     groundings=groundings,
-                    components={group[0]: status for group in groups},
-                    measurements={} if value is None else dict.fromkeys(attributes, value),
+                    components={group[0]: status for group in space.alike},
+                    measurements={} if value is None else dict.fromkeys(space.attributes, value),
                 )
 
 

@@ -36,12 +36,16 @@ class Goal:
         atom: number of an atom of its body, in the order in which they are tried; -1 for the rule itself.
         outcome: "fires", "does not fire", "holds", "fails", or, of a comparison, "less", "equal" or "greater".
         text: the atom.
+        holds, fails: it is covered where one conjunction of atoms holds, which an empty one always does, and another
+            one fails; None: no other one.
     """
 
     rule: str
     atom: int
     outcome: str
     text: str = field(default="", compare=False)
+    holds: Body = field(default=(), compare=False, repr=False)
+    fails: Body | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
         """As a list of what is not covered has it."""
@@ -51,38 +55,30 @@ class Goal:
         return f"{self.rule}: {self.text} {words}"
 
 
-class _Question(NamedTuple):
-    """When a goal is covered: where one conjunction of atoms holds (an empty one always does), and another fails."""
-
-    goal: Goal
-    holds: Body
-    fails: Body | None = None
-
-
-def _questions(rules: Iterable[Rule]) -> Iterator[_Question]:
+def _goals(rules: Iterable[Rule]) -> Iterator[Goal]:
     for rule in rules:
         atoms = tuple(rule.body[number] for number in testable_order(rule.body))
-        yield _Question(Goal(rule.name, -1, FIRES), atoms)
-        yield _Question(Goal(rule.name, -1, FIRES_NOT), (), atoms)
+        yield Goal(rule.name, -1, FIRES, holds=atoms)
+        yield Goal(rule.name, -1, FIRES_NOT, fails=atoms)
         for number, atom in enumerate(atoms):
             before, text = atoms[:number], write_atom(atom)
             if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
                 for order, (sign, _) in ORDERS.items():
                     compared = replace(atom, predicate=COMPARISON_OF[sign])
-                    yield _Question(Goal(rule.name, number, order, text), (*before, compared))
+                    yield Goal(rule.name, number, order, text, (*before, compared))
             else:
-                yield _Question(Goal(rule.name, number, HOLDS, text), (*before, atom))
-                yield _Question(Goal(rule.name, number, FAILS, text), before, (*before, atom))
+                yield Goal(rule.name, number, HOLDS, text, (*before, atom))
+                yield Goal(rule.name, number, FAILS, text, before, (*before, atom))
 
 
-def _covering(knowledge: KnowledgeBase, questions: Sequence[_Question]) -> Callable[[Situation], frozenset[Goal]]:
+def _covering(knowledge: KnowledgeBase, goals: Sequence[Goal]) -> Callable[[Situation], frozenset[Goal]]:
     """Make a function that finds the goals that a situation covers."""
-    bodies = (body for each in questions for body in (each.holds, each.fails) if body)
+    bodies = (body for goal in goals for body in (goal.holds, goal.fails) if body)
     probes = Probes(knowledge.base, knowledge.limit, bodies)
 
     def covered(situation: Situation) -> frozenset[Goal]:
         holding = {(), *(probes.holding(situation) or ())}
-        return frozenset(goal for goal, holds, fails in questions if holds in holding and fails not in holding)
+        return frozenset(goal for goal in goals if goal.holds in holding and goal.fails not in holding)
 
     return covered
 
@@ -147,19 +143,18 @@ def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], 
         InputError: there would be too many states.
         KnowledgeError: the reasoner takes too long.
     """
-    questions = list(_questions(rule for rule in knowledge.base.content.enabled_rules if rule.body))
-    covering = _covering(knowledge, questions)
+    goals = list(_goals(rule for rule in knowledge.base.content.enabled_rules if rule.body))
+    covering = _covering(knowledge, goals)
     covered = Counter(goal for each in dict.fromkeys(situations) for goal in covering(each))
-    left = [each for each in questions if each.goal not in covered]
+    left = [goal for goal in goals if goal not in covered]
     found: dict[frozenset[Goal], KnowledgeState] = {}  # one state for each different set of goals
     if left:
         covering = _covering(knowledge, left)
         for state in States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space):
             found.setdefault(covering(Situation(state)), state)
-    candidates = {state: goals for goals, state in found.items() if goals}
+    candidates = {state: reached for reached, state in found.items() if reached}
     proposed = tuple((state, tuple(sorted(candidates[state]))) for state in small_cover(candidates))
-    goals = tuple(sorted({each.goal for each in questions}))
-    return Coverage(goals, covered, frozenset[Goal]().union(*candidates.values()), proposed)
+    return Coverage(tuple(sorted({*goals})), covered, frozenset[Goal]().union(*candidates.values()), proposed)
 
 
 def small_cover(candidates: Mapping[KnowledgeState, frozenset[Goal]]) -> list[KnowledgeState]:

@@ -17,7 +17,7 @@ from rdflib.term import Node
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate
 from suave_des.kb.matching import Probes
-from suave_des.kb.space import Decide, PolicySpace, Situation, States, compare
+from suave_des.kb.space import Decide, PolicySpace, Situation, States, add_decisions, compare
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
@@ -144,47 +144,41 @@ class PolicyDifference:
     def _ranges(self, cells: pandas.DataFrame) -> Iterator[str]:
         """The ranges of measured values, neighbours joined, and the number of states in each."""
         names, scale = list(self.space.attributes), self.space.scale
-        found: Any = cells.assign(all=0).groupby(["all", *names], as_index=False)["states"].sum()
-        found = found.assign(**{f"{name}_last": found[name] for name in names})
-        for name in reversed(names):
-            last = f"{name}_last"
-            others = [each for each in found if each not in (name, last, "states")]
-            found = found.sort_values([*others, name])
-            is_next = (found[others] == found[others].shift()).all(axis=1) & (found[name] == found[last].shift() + 1)
-            ends = {**dict.fromkeys(found, "first"), last: "last", "states": "sum"}
-            found = found.groupby((~is_next).cumsum()).agg(ends)
-        for row in found.sort_values(["all", *names]).to_dict("records"):
-            spans = {name: (row[name], row[f"{name}_last"]) for name in names}
+        boxes = Counter[tuple[tuple[int, int], ...]]()  # number of states by first and last place of each attribute
+        for *places, number in cells[[*names, "states"]].itertuples(index=False):
+            boxes[tuple((place, place) for place in places)] += number
+        for at in reversed(range(len(names))):
+            joined: dict[Any, tuple[int, int]] = {}  # first place and number of states by all other ends
+            for box, number in sorted(boxes.items(), key=lambda each: each[0][at]):
+                first, last = box[at]
+                first, before = joined.pop((box[:at], first - 1, box[at + 1 :]), (first, 0))
+                joined[box[:at], last, box[at + 1 :]] = first, before + number
+            boxes = Counter({(*a, (first, last), *b): number for (a, last, b), (first, number) in joined.items()})
+        for box, number in sorted(boxes.items()):
             words = [
                 f"{name} {scale.text(*span)}" if len(names) > 1 else scale.text(*span)
-                for name, span in spans.items()
+                for name, span in zip(names, box, strict=True)
                 if span != (0, len(scale) - 1)
             ]
-            yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(row['states'], 'state')}"
+            yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(number, 'state')}"
 
 
 def compare_decisions(states: States, one: Decide, other: Decide, no_proof: tuple[str, ...]) -> PolicyDifference:
     """Compare what two knowledge bases decide in all of some states; see PolicyDifference."""
-    import pandas
-
-    reported, cells = 0, []
+    decided, reported = [], 0
+    numbers = dict(states.reports)
     for situation, before, after in compare(one, other, map(Situation, states)):
-        state = situation.state
-        then = [outcome.choices(state, states.functions) for outcome in (before, after)]
-        if then[0] != then[1]:
-            statuses = ("; ".join(outcome.statuses) for outcome in (before, after))
-            cells.append((*states.row(state), *statuses, *then[0], *then[1], state))
+        if any(before.choice(each.function) != after.choice(each.function) for each in situation.state.objectives):
+            decided.append((situation.state, before, after))
         elif before.statuses != after.statuses:
-            reported += states.numbers[state.components]
-    columns = [f"{name}_then_{side}" for side in "ab" for name in states.functions]
-    return PolicyDifference(
-        compared=sum(states.numbers[state.components] for state in states),
-        cells=pandas.DataFrame(cells, columns=[*states.columns(), "statuses_a", "statuses_b", *columns, "state"]),
-        reported=reported,
-        space=states.space,
-        functions=states.functions,
-        no_proof=no_proof,
-    )
+            reported += numbers[situation.state.components]
+    differing = [state for state, _, _ in decided]
+    cells = states.frame(differing)
+    add_decisions(cells, states, [before for _, before, _ in decided], "_a")
+    add_decisions(cells, states, [after for _, _, after in decided], "_b")
+    cells["state"] = differing
+    compared = len(states.measured) * len(states.tasks) * sum(numbers.values())
+    return PolicyDifference(compared, cells, reported, states.space, states.functions, no_proof)
 
 
 class PairedDifference(NamedTuple):

@@ -1,27 +1,530 @@
-"""Explain why a fact follows, and why a function design is chosen or not."""
+"""Explain why a fact follows, why a rule does not fire, and why a function design is chosen or not.
+
+All facts in a derivation are Pellet's, and so is what its built-ins say of their values. Where a fact follows in
+several ways, the first one is shown, by the rule's name and then by the bindings. Pellet's own tracing picks another
+one each time, and is asked only where neither a rule nor a single fact suffices.
+
+Of a rule that does not fire, what makes it useless in every state comes first: it is switched off, or is dropped by
+Pellet. Else the answer is the first atom that fails, for the binding that comes nearest, with the value found and the
+value needed.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.kb.matching import (
+    FACT_KINDS,
+    Binding,
+    Bound,
+    Facts,
+    Probes,
+    bound,
+    matched,
+    matches,
+    nearest_match,
+    shown_bindings,
+    stated,
+    unified,
+    with_bindings,
+)
+from suave_des.kb.space import Situation
 from suave_des.kb.states import FactReader
-from suave_des.kb.tracing import Derivation, Tracer
-from suave_des.kb.why_not import RuleQuestions
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, facts_of, local_name, value_of
+from suave_des.knowledge.ontology import Content, Ontology, Terms
+from suave_des.knowledge.pellet import TimeLimit
+from suave_des.knowledge.pellet.in_process import (
+    InProcessPellet,
+    Trace,
+    entailed,
+    one_at_a_time,
+    trace_contradiction,
+)
+from suave_des.knowledge.rdf import (
+    C_STATUS,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    NUMERIC,
+    O_STATUS,
+    OWL,
+    RDF_TYPE,
+    TOMASYS,
+    Lit,
+    Triple,
+    canonical,
+    fact_of,
+    facts_of,
+    is_fact,
+    local_name,
+    n_triple,
+    value_of,
+)
 from suave_des.knowledge.reasoner import performance
+from suave_des.knowledge.rules import COMPARISONS, Atom, AtomKind, Rule, Variable, write_atom, write_term
+from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import (
+    ContradictionError,
     Decision,
     Fact,
+    KnowledgeState,
     Reasoning,
     objective_name,
     value_text,
 )
+
+_IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """How a fact follows.
+
+    Attributes:
+        fact: what follows.
+        source: "state" or "ontology" where it is asserted, "rule", or "axioms" where it follows from the schema.
+        rule: the rule's name.
+        bindings: value of each of the rule's variables, by variable.
+        axioms: the axioms of the schema that were used.
+        premises: the facts of the rule's body, instantiated.
+    """
+
+    fact: Fact
+    source: str
+    rule: str | None = None
+    bindings: Bound = ()
+    axioms: tuple[str, ...] = ()
+    premises: tuple[Derivation, ...] = ()
+
+    def __str__(self) -> str:
+        """As a tree of lines."""
+        return "\n".join(self.lines())
+
+    def lines(self, indent: str = "") -> Iterator[str]:
+        """The fact and how it follows, and below it, indented, the facts that it follows from."""
+        how = {
+            "rule": f"by rule {self.rule}{with_bindings(self.bindings)}",
+            "axioms": f"by the schema: {'; '.join(self.axioms)}" if self.axioms else "by the schema",
+            "state": "given in the state",
+            "ontology": "asserted in the ontology",
+        }[self.source]
+        yield f"{indent}{self.fact}  [{how}]"
+        for premise in self.premises:
+            yield from premise.lines(indent + "  ")
+
+    def rules(self) -> frozenset[str]:
+        """Names of all rules in it."""
+        own = frozenset[str]() if self.rule is None else frozenset({self.rule})
+        return own.union(*(premise.rules() for premise in self.premises))
+
+
+@dataclass(frozen=True, eq=False)
+class Tracer:
+    """Derives the facts of one state.
+
+    Attributes:
+        state: whose facts are derived.
+        pellet: made by `pellet_for`, for who asks about many states; None: one of its own.
+    """
+
+    base: Ontology
+    state: KnowledgeState
+    pellet: InProcessPellet | None = field(default=None, repr=False)
+    _steps: dict[object, frozenset[Triple]] = field(default_factory=dict, repr=False)
+    _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def asserted(self) -> frozenset[Triple]:
+        """What ontologies and state assert."""
+        return frozenset((*self.base.assertions(self.state), *self.base.content.triples))
+
+    @cached_property
+    def entailed(self) -> frozenset[Triple]:
+        """All that follows in the state.
+
+        Raises:
+            KnowledgeError: the state contradicts itself.
+        """
+        return (self.pellet or pellet_for(self.base)).infer(self.base.assertions(self.state)) | self.asserted
+
+    @cached_property
+    def known(self) -> tuple[Triple, ...]:
+        """All that follows and that rules mention, in canonical form and in a fixed order."""
+        return tuple(sorted({canonical_triple(triple) for triple in self.entailed if is_fact(triple)}, key=str))
+
+    @cached_property
+    def _facts(self) -> Facts:
+        return Facts(self.known)
+
+    @cached_property
+    def _leaves(self) -> dict[Triple, Triple]:
+        """What is asserted, by its canonical form."""
+        return {canonical_triple(triple): triple for triple in sorted(filter(is_fact, self.asserted), key=str)}
+
+    @cached_property
+    def _schema(self) -> Content:
+        """The ontologies without facts about individuals; all rules keep their numbers."""
+        content = self.base.content
+        return replace(content, triples=tuple(each for each in content.triples if not is_fact(each)))
+
+    def derive(self, triple: Triple) -> Derivation:
+        """Derive a triple that is entailed."""
+        with one_at_a_time:
+            found = self._derive(canonical_triple(triple), frozenset())
+            if found is None:  # the axioms that Pellet says that it follows from, without the steps between
+                trace = self._trace(triple, self.asserted, self.base.content.enabled_rules)
+                found = Derivation(self._fact(triple), "axioms", axioms=self._axioms(trace))
+            return found
+
+    def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
+        """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
+        with one_at_a_time:
+            for binding in matches(rule, self._facts):
+                concluded = [triple for atom in rule.head if (triple := stated(atom, binding)) is not None]
+                if all(
+                    canonical_triple(triple) in self._facts for triple in concluded
+                ):  # what is the same, Pellet knows
+                    facts = tuple(map(self._fact, sorted(concluded, key=str)))
+                    yield shown_bindings(binding, self.base.names), facts
+
+    def _derive(self, triple: Triple, above: frozenset[Triple]) -> Derivation | None:
+        """The first tree for a triple that does not depend on itself or on what is above it; None if there is none."""
+        if triple in self._leaves:
+            is_of_state = self._leaves[triple] in self.base.assertions(self.state)
+            return Derivation(self._fact(self._leaves[triple]), "state" if is_of_state else "ontology")
+        if triple not in self._found:
+            inside = above | {triple}
+            derivation = next(self._by_rules(triple, inside), None) or next(self._by_schema(triple, inside), None)
+            if derivation is None:
+                return None
+            self._found[triple] = derivation
+        return self._found[triple]
+
+    def _by_rules(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
+        for rule in self.base.content.enabled_rules:
+            starts = (matched(atom, triple, {}) for atom in rule.head)
+            for start in (each for each in starts if each is not None):
+                for binding in matches(rule, self._facts, start):
+                    said = (stated(atom, binding) for atom in rule.body)
+                    body = dict.fromkeys(canonical_triple(each) for each in said if each is not None)
+                    if above.isdisjoint(body):
+                        premises = tuple(found for each in body if (found := self._derive(each, above)) is not None)
+                        if len(premises) == len(body):
+                            bindings = shown_bindings(binding, self.base.names)
+                            yield Derivation(self._fact(triple), "rule", rule.name, bindings, premises=premises)
+
+    def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
+        """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
+        kind: AtomKind = "class" if triple[1] == RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
+        asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
+        for other in self.known:
+            about_same = {triple[0], triple[2]} & {other[0], other[2]}
+            if about_same and other not in above and triple in self._concluded(other, asked):
+                premise = self._derive(other, above)
+                if premise is not None:
+                    axioms = self._axioms(self._trace(triple, [other]))
+                    yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
+
+    def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
+        """What Pellet says of the property or class of an atom, from a fact and the schema alone."""
+        key = fact, asked
+        if key not in self._steps:
+            self._steps[key] = frozenset(map(canonical_triple, entailed(self._text([fact], ()), [asked])))
+        return self._steps[key]
+
+    def _text(self, facts: Iterable[Triple], rules: Sequence[Rule]) -> str:
+        content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
+        return content.n_triples(rules)
+
+    def _trace(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> Trace:
+        """What Pellet says that a triple follows from."""
+        return trace_contradiction(self._text(facts, rules) + _denial(triple))
+
+    def _axioms(self, trace: Trace) -> tuple[str, ...]:
+        """The axioms of the schema in a trace: domains, subclasses and the like."""
+        schema = (each for each in trace.axioms if not each.startswith(("rule(", "prop(", "type(")))
+        return tuple(_IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema)
+
+    def _fact(self, triple: Triple) -> Fact:
+        return fact_of(triple, self.base.names)
+
+
+def pellet_for(base: Ontology) -> InProcessPellet:
+    """Load an ontology into Pellet, to read all its terms and those that its rules mention."""
+    terms = base.content.all_terms()
+    atoms = [atom for rule in base.content.enabled_rules for atom in rule.atoms]
+    properties = {atom.predicate for atom in atoms if atom.kind in ("object", "data")}
+    classes = {atom.predicate for atom in atoms if atom.kind == "class"}
+    return InProcessPellet(
+        base, Terms(tuple(sorted(properties.union(terms.properties))), tuple(sorted(classes.union(terms.classes))))
+    )
+
+
+def canonical_triple(triple: Triple) -> Triple:
+    """The triple that stands for all that say the same with another form of its value."""
+    return (*triple[:2], canonical(triple[2]))
+
+
+def _denial(triple: Triple) -> str:
+    """Say in OWL that a triple does not hold, as N-Triples."""
+    subject, predicate, value = triple
+    denied, restriction = "urn:denied", "urn:restriction"
+    triples: list[Triple] = [
+        (denied, OWL + "complementOf", value if predicate == RDF_TYPE else restriction),
+        (denied, RDF_TYPE, OWL + "Class"),
+        (subject, RDF_TYPE, denied),
+    ]
+    if predicate != RDF_TYPE:
+        triples += [
+            (restriction, RDF_TYPE, OWL + "Restriction"),
+            (restriction, OWL + "onProperty", predicate),
+            (restriction, OWL + "hasValue", value),
+        ]
+    return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(n_triple, triples)))
+
+
+_WORDS: Final = {
+    "<": "less than",
+    "<=": "at most",
+    ">": "greater than",
+    ">=": "at least",
+    "=": "equal to",
+    "!=": "different from",
+}
+#: What a state asserts, and how to give it where it is missing.
+_GIVEN_BY_STATES: Final[Mapping[str, str]] = {
+    TOMASYS + "FunctionGrounding": "; ground a function: --at FUNCTION=DESIGN",
+    TOMASYS + "typeFD": "; ground a function: --at FUNCTION=DESIGN",
+    TOMASYS + "solvesO": "; ground a function: --at FUNCTION=DESIGN",
+    C_STATUS: "; report a component: --at COMPONENT=FALSE",
+    HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
+    TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
+}
+#: All that states assert.
+_IN_STATES: Final = frozenset(
+    {*_GIVEN_BY_STATES, HAS_VALUE, IS_QA_TYPE, O_STATUS}
+    | {TOMASYS + name for name in ("QAvalue", "typeF", "o_always_improve")}
+)
+
+
+class WhyNot(NamedTuple):
+    """Why a rule does not fire, or that it does.
+
+    Attributes:
+        rule: its name.
+        answer: in one line, without the name.
+        fires: whether its whole body holds.
+        failing: number of the atoms that do not hold there; 0 where the answer is not about atoms.
+    """
+
+    rule: str
+    answer: str
+    fires: bool = False
+    failing: int = 0
+
+    def __str__(self) -> str:
+        """As `kb why-not` prints it."""
+        return f"{self.rule}: {self.answer}"
+
+
+@dataclass(frozen=True)
+class RuleQuestions:
+    """Answers for the rules of one knowledge base.
+
+    Attributes:
+        base: ontologies and rules.
+
+    Example:
+        >>> questions = RuleQuestions(knowledge.base)
+        >>> print(questions.why_not("compError", knowledge.state()))
+        compError: c_status(?c, "FALSE") does not hold: nothing has a c_status; ...
+    """
+
+    base: Ontology
+    _facts: dict[KnowledgeState, Facts | str] = field(default_factory=dict, repr=False)
+
+    def why_not(self, name: str, state: KnowledgeState) -> WhyNot:
+        """Say why a rule does not fire in a state.
+
+        Raises:
+            InputError: there is no rule of that name.
+        """
+        answers = [self.of(rule, state) for rule in self.base.rules if rule.name == name]
+        if not answers:
+            known = sorted({rule.name for rule in self.base.rules})
+            raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, known))
+        return next((each for each in answers if each.fires), answers[0])
+
+    def of(self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})) -> WhyNot:
+        """Say why a rule, which may have the name of another one, does not fire in a state.
+
+        Args:
+            start: what variables must stand for.
+        """
+        if not rule.enabled:
+            return WhyNot(
+                rule.name, f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
+            )
+        for problem in fatal_problems(rule, self.base.vocabulary):
+            remedy = f"; {problem.remedy}" if problem.remedy else ""
+            return WhyNot(rule.name, f"never fires: {problem.message}{remedy}")
+        facts = self._known(state)
+        if isinstance(facts, str):
+            return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
+        binding, failing = nearest_match(rule, facts, start)
+        identities = [number for number, atom in enumerate(rule.body) if atom.kind in ("same", "different")]
+        # What is the same and what is different, Pellet alone knows.
+        if not failing and identities and not Probes(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)):
+            failing = (identities[0],)
+        if not failing:
+            bindings = with_bindings(shown_bindings(binding, self.base.names))
+            said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
+            return WhyNot(rule.name, f"it fires{bindings}, and concludes {said}", fires=True)
+        # What no state can bring comes first.
+        first = rule.body[min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))]
+        reason = describe_failure(self._usable, first, binding, facts)
+        others = len(failing) - 1
+        more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
+        chain = self._concluder(rule, first, binding, facts)
+        answer = f"{write_atom(first)} does not hold: {reason}{more}{chain}"
+        return WhyNot(rule.name, answer, failing=len(failing))
+
+    def missing(self, triple: Triple, state: KnowledgeState) -> list[WhyNot]:
+        """Say why no rule concludes a fact, of each that could; those that lack least first."""
+        starts = (
+            (rule, next((start for head in rule.head if (start := matched(head, triple, {})) is not None), None))
+            for rule in self.base.content.enabled_rules
+        )
+        found = [self.of(rule, state, start) for rule, start in starts if start is not None]
+        return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
+
+    def _is_fixed(self, atom: Atom) -> bool:
+        """Whether what an atom asks for is neither in states nor concluded by a rule."""
+        content = self._usable.content
+        of_states = {triple[1] for own in self._usable.model.own.values() for triple in own}
+        return atom.kind in FACT_KINDS and atom.predicate not in _IN_STATES | content.concluded | of_states
+
+    @cached_property
+    def _usable(self) -> Ontology:
+        """The knowledge base without the rules that Pellet would drop."""
+        known = self.base.vocabulary
+        return self.base.with_rules(
+            each for each in self.base.rules if not (each.enabled and fatal_problems(each, known))
+        )
+
+    def _known(self, state: KnowledgeState) -> Facts | str:
+        """All that follows in a state, or what contradicts what in it."""
+        if state not in self._facts:
+            try:
+                tracer = Tracer(self._usable, state)
+                self._facts[state] = Facts(tracer.known)
+            except ContradictionError as error:
+                self._facts[state] = error.problem.removeprefix("contradiction: ")
+        return self._facts[state]
+
+    def _concluded(self, atom: Atom, binding: Binding) -> str:
+        fact = stated(atom, binding)
+        return write_atom(atom) if fact is None else str(fact_of(fact, self.base.names))
+
+    def _concluder(self, rule: Rule, atom: Atom, binding: Binding, facts: Facts) -> str:
+        """The rule that comes nearest to concluding what is missing, and why it does not."""
+        if atom.kind not in FACT_KINDS:
+            return ""
+        wanted = [bound(term, binding) for term in atom.arguments]
+        found = []
+        for other in self._usable.content.enabled_rules:
+            for head in other.head if other is not rule else ():
+                start = unified(head.arguments, wanted, {})
+                if (head.kind, head.predicate) != (atom.kind, atom.predicate) or start is None:
+                    continue
+                nearest_one, failing = nearest_match(other, facts, start)
+                if failing:
+                    first = other.body[failing[0]]
+                    reason = describe_failure(self._usable, first, nearest_one, facts)
+                    found.append((len(failing), other.name, f"its {write_atom(first)} fails: {reason}"))
+        return "".join(f"; {name} would conclude it, but {why}" for _, name, why in sorted(found)[:1])
+
+
+def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
+    """Describe why an atom does not hold.
+
+    Args:
+        atom: of the body of a rule.
+        binding: what variables stand for.
+        facts: all that follows.
+    """
+    if atom.kind in FACT_KINDS:
+        subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
+        who, name = base.names.short(subject) if isinstance(subject, str) else "", local_name(atom.predicate)
+        given = _GIVEN_BY_STATES.get(atom.predicate, "")
+        if atom.kind == "class":
+            return f"{who} is not known to be a {name}{given}" if who else f"there is no {name}{given}"
+        values = facts.values(subject, atom.predicate)
+        if not values:
+            return f"{f'{who} has no' if who else 'nothing has a'} {name}{given}"
+        if wanted is not None:
+            of = f" of {who}" if who else ""
+            return f"found {name} {_list(base, values)}{of}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
+        if who:
+            return f"{who} has {name} {_list(base, values)}, but not as the other atoms need it"
+        return f"no {name} connects what the other atoms need"
+    if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
+        return _compared(base, atom, binding)
+    if atom.kind == "different":
+        return "OWL does not assume that different names mean different individuals: assert it"
+    if atom.kind == "same":
+        return "these individuals are not known to be the same"
+    texts = [f"?{name} = {_show(base, binding[name])}" for name in atom.variables() if name in binding]
+    return f"it is false for {', '.join(texts) or 'these values'}"
+
+
+def _compared(base: Ontology, atom: Atom, binding: Binding) -> str:
+    sides = [bound(term, binding) for term in atom.arguments]
+    texts = [
+        _show(base, value) + (f" (?{term.name})" if isinstance(term, Variable) else "")
+        for term, value in zip(atom.arguments, sides, strict=True)
+    ]
+    words = _WORDS[COMPARISONS[atom.predicate]]
+    kinds = [value.datatype for value in sides if isinstance(value, Lit)]
+    numbers = [kind in NUMERIC for kind in kinds]
+    if len(kinds) == 2 and numbers[0] != numbers[1]:
+        text = texts[numbers.index(False)]
+        return (
+            f"{text} is text, and never compares with the number {texts[numbers.index(True)]}; write it without quotes"
+        )
+    return f"found {texts[0]}, needed {words} {texts[1]}"
+
+
+def _unequal(values: list[str | Lit], wanted: str | Lit) -> str:
+    """Why values that look alike are not equal."""
+    for value in values:
+        if isinstance(value, Lit) and isinstance(wanted, Lit):
+            if value.datatype != wanted.datatype:
+                kinds = f"{local_name(value.datatype)} and {local_name(wanted.datatype)}"
+                return f"; {kinds} never match, even where they look alike: write {write_term(value)}"
+            if value.text.strip().lower() == wanted.text.strip().lower():
+                return "; they differ in case or spaces"
+    return ""
+
+
+def _show(base: Ontology, value: str | Lit | None) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, Lit):
+        is_plain_number = value.datatype in NUMERIC and str(value_of(value, base.names)) == value.text
+        return value.text if is_plain_number else write_term(value)
+    return base.names.short(value)
+
+
+def _list(base: Ontology, values: list[str | Lit], most: int = 3) -> str:
+    texts = sorted({_show(base, value) for value in values})
+    return ", ".join(texts[:most]) + (f" and {len(texts) - most} more" if len(texts) > most else "")
+
 
 #: Rules that are named for a fact that does not follow.
 NEAREST: Final = 3
@@ -126,8 +629,6 @@ def explain(base: Ontology, question: str, reasoning: Reasoning, pellet: InProce
     """Answer a question about a state; see KnowledgeBase.explain.
 
     Args:
-        base: the ontologies and rules.
-        question: a fact, "why DESIGN?", "why not DESIGN?", or nothing.
         reasoning: what is inferred of all terms and planned in the state.
         pellet: with the ontologies, made by `pellet_for`.
     """
@@ -161,7 +662,7 @@ class _Explainer:
         """How a fact follows that is written as an atom."""
         reader = FactReader(self.base)
         triple = reader.triple(text)
-        if (*triple[:2], canonical(triple[2])) in self.tracer.known:
+        if canonical_triple(triple) in self.tracer.known:
             return self.tracer.derive(triple)
         fact = reader.fact(text)  # a value that the property cannot have is refused
         values = [value for s, p, value in self.tracer.known if (s, p) == triple[:2]]

@@ -10,12 +10,11 @@ from typing import Any
 
 from suave_des.arguments import plain_arguments
 from suave_des.kb.difference import PolicyDifference, compare_decisions
-from suave_des.kb.explain import Explanation, explain
+from suave_des.kb.explain import Explanation, explain, pellet_for
 from suave_des.kb.policy import Policy, make_policy
 from suave_des.kb.query import QueryResult, answer, graph_of
 from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
 from suave_des.kb.states import ManagingSettings, StateBuilder
-from suave_des.kb.tracing import pellet_for
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet
@@ -224,7 +223,9 @@ class KnowledgeBase:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        return make_policy(self.base, self.settings, self.outcome, max_failed, space, on_count)
+        states = States.of(self.base, self.settings, max_failed, space or self.space)
+        decided = decide_all(self.base, states, self.outcome, on_count)
+        return make_policy(self.base, self.settings, states, max_failed, decided, self.outcome)
 
     @cached_property
     def space(self) -> PolicySpace:
@@ -256,12 +257,13 @@ class KnowledgeBase:
         """Answer a query in SPARQL.
 
         Args:
-            text: the query; see `suave_des.kb.query.answer`.
+            text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs, owl, xsd and swrl
+                need no declaration.
             state: adds what it asserts; None: the ontologies alone.
             inferred: adds what Pellet infers.
 
         Raises:
-            InputError: it is not a query.
+            InputError: it is not a query, or would read something else than the knowledge base.
             KnowledgeError: the state contradicts itself, or it takes too long.
         """
         graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query")

@@ -16,14 +16,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from functools import cache, cached_property
+from functools import cache, partial
 from typing import Final, NamedTuple, TypeVar
 
 from suave_des.errors import KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import Body, Probes
 from suave_des.kb.rule_tests import RuleTest, passes
-from suave_des.kb.space import Decide, Outcome, PolicySpace, Situation, States, compare, difference
+from suave_des.kb.space import Decide, PolicySpace, Situation, States, compare, difference
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import EXACT, OWL, RDF_TYPE, RDFS, XSD, Lit, memberships
@@ -220,50 +220,38 @@ class MutantResult(NamedTuple):
     state: KnowledgeState | None = None
 
 
-@dataclass(frozen=True)
-class _Mutated:
-    """A mutant, of which Pellet is asked only where the change can make a difference.
+class _Mutants:
+    """Decides with mutants, of which Pellet is asked only where the change can make a difference.
 
-    Attributes:
-        original: the knowledge base without the change.
-        unchanged: what follows and is decided without the change.
-        holding: of the bodies of all mutants' rules, those that hold; None where that proves nothing.
+    Pellet is asked at once what holds for all of them: it takes the longer the more there are.
     """
 
-    mutant: Mutant
-    original: KnowledgeBase
-    unchanged: Decide
-    holding: Callable[[Situation], frozenset[Body] | None]
+    def __init__(self, knowledge: KnowledgeBase, mutants: Sequence[Mutant]) -> None:
+        bodies = dict.fromkeys(body for mutant in mutants for body in mutant.bodies if body)
+        is_sure = is_horn(knowledge.base)
+        holding = Probes(knowledge.base, knowledge.limit, bodies).holding if is_sure else lambda _: None
+        self.knowledge = knowledge
+        self.unchanged, self._holding = cache(knowledge.outcome), cache(holding)
 
-    @cached_property
-    def knowledge(self) -> KnowledgeBase:
-        return self.original.changed(self.mutant.applied(self.original.base))
+    def touches(self, mutant: Mutant, situation: Situation) -> bool:
+        """Whether a change can make a difference in a situation."""
+        holding = self._holding(situation)
+        return holding is None or not mutant.bodies.isdisjoint({(), *holding})
 
-    def touches(self, situation: Situation) -> bool:
-        """Whether the change can make a difference in a situation."""
-        holding = self.holding(situation)
-        return holding is None or not self.mutant.bodies.isdisjoint({(), *holding})
+    def deciding(self, mutant: Mutant) -> Decide:
+        """What follows and is decided with a change, which is loaded where it is first needed."""
+        load = cache(lambda: self.knowledge.changed(mutant.applied(self.knowledge.base)))
+        return lambda situation: (load().outcome if self.touches(mutant, situation) else self.unchanged)(situation)
 
-    def outcome(self, situation: Situation) -> Outcome:
-        """What follows and is decided with the change."""
-        return self.knowledge.outcome(situation) if self.touches(situation) else self.unchanged(situation)
-
-    def killer(self, tests: Iterable[RuleTest]) -> str | None:
+    def killer(self, mutant: Mutant, tests: Iterable[RuleTest]) -> str | None:
         """The test that fails, or why the mutant cannot be used; None if all pass."""
+        decide = self.deciding(mutant)
         try:
-            return next((test.name for test in tests if not passes(test, self.outcome)), None)
+            return next((test.name for test in tests if not passes(test, decide)), None)
         except ReasonerTimeoutError:
             raise
         except KnowledgeError as error:
             return f"it cannot be used: {error.problem}"
-
-
-def _mutated(knowledge: KnowledgeBase, mutants: Sequence[Mutant]) -> list[_Mutated]:
-    """Mutants of one knowledge base, for all of which Pellet is asked at once what holds."""
-    bodies = dict.fromkeys(body for mutant in mutants for body in mutant.bodies if body)
-    holding = Probes(knowledge.base, knowledge.limit, bodies).holding if is_horn(knowledge.base) else lambda _: None
-    unchanged, holding = cache(knowledge.outcome), cache(holding)
-    return [_Mutated(mutant, knowledge, unchanged, holding) for mutant in mutants]
 
 
 def mutate(
@@ -290,10 +278,10 @@ def mutate(
         KnowledgeError: the reasoner takes too long.
     """
     results: dict[Mutant, MutantResult] = {}
-    in_order = sorted(tests, key=lambda test: len(test.situations))
-    for changed in _mutated(knowledge, mutants):
-        if (killer := changed.killer(in_order)) is not None:
-            results[changed.mutant] = MutantResult(changed.mutant, KILLED, killer)
+    in_order, every = sorted(tests, key=lambda test: len(test.situations)), _Mutants(knowledge, mutants)
+    for mutant in mutants:
+        if (killer := every.killer(mutant, in_order)) is not None:
+            results[mutant] = MutantResult(mutant, KILLED, killer)
             on_result()
     left = [mutant for mutant in mutants if mutant not in results]
     if not left:
@@ -304,17 +292,17 @@ def mutate(
         space = space.common(PolicySpace.of(mutant.applied(knowledge.base), knowledge.settings))
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
     situations = [*of_tests, *map(Situation, states)]
-    # Pellet takes the longer the more is asked at once, and the policy has many more states than the tests.
-    for changed in _mutated(knowledge, left):
-        found = next(compare(changed.unchanged, changed.outcome, filter(changed.touches, situations)), None)
+    few = _Mutants(knowledge, left)  # the policy has many more states than the tests
+    for mutant in left:
+        touched = filter(partial(few.touches, mutant), situations)
+        found = next(compare(few.unchanged, few.deciding(mutant), touched), None)
         if found is None:
             reason = f"nothing differs in {len(states)} kinds of states"
-            results[changed.mutant] = MutantResult(changed.mutant, EQUIVALENT, reason)
+            results[mutant] = MutantResult(mutant, EQUIVALENT, reason)
         else:
             situation, before, after = found
             words = ", in a state of a test that does not expect it" if situation in of_tests else ""
-            reason = f"{difference(before, after)}{words}"
-            results[changed.mutant] = MutantResult(changed.mutant, SURVIVED, reason, situation.state)
+            results[mutant] = MutantResult(mutant, SURVIVED, difference(before, after) + words, situation.state)
         on_result()
     return [results[mutant] for mutant in mutants], len(states)
 

@@ -12,13 +12,12 @@ from suave_des.errors import number_of
 from suave_des.kb.space import (
     INCONSISTENT,
     Decide,
-    OnCount,
     Outcome,
     PolicySpace,
     Reports,
     Situation,
     States,
-    decide_all,
+    add_decisions,
     measured_attributes,
 )
 from suave_des.kb.states import ManagingSettings
@@ -97,54 +96,39 @@ class Policy:
 
 
 def make_policy(
-    base: Ontology,
-    settings: ManagingSettings,
-    decide: Decide,
-    max_failed: int,
-    space: PolicySpace | None = None,
-    on_count: OnCount = lambda done, total: None,
+    base: Ontology, settings: ManagingSettings, states: States, max_failed: int, decided: Decide, decide: Decide
 ) -> Policy:
-    """Decide every kind of state; see KnowledgeBase.policy.
+    """Tabulate what is decided in states.
 
     Args:
-        base: the ontologies and rules.
-        settings: measured attributes, and behaviour of the managing subsystem that is not in the rules.
-        decide: concludes what follows and is decided in a situation.
-        max_failed, space, on_count: as of KnowledgeBase.policy.
+        base, settings: ontologies and rules, and what is measured.
+        states: of at most `max_failed` components that report.
+        decided: what is decided in each of them, as decide_all says.
+        decide: concludes anew, for contradictions, which are told with the values of the state.
     """
-    import pandas
+    every = list(states)
+    outcomes = [decided(Situation(state)) for state in every]
+    cases = states.frame(every)
+    add_decisions(cases, states, outcomes)
+    here = range(0, len(every), len(states.tasks))  # states that differ in their task only follow one another
+    groups = (slice(first, first + len(states.tasks)) for first in here)
+    flipping = [each for group in groups for each in _flipping(every[group], outcomes[group])]
+    cases["marks"] = list(map(_marks, outcomes, flipping))
+    cases["problem"] = [
+        decide(Situation(state)).contradiction if outcome.reasoning is None else ""
+        for state, outcome in zip(every, outcomes, strict=True)
+    ]
+    words = {reports.components: _in_words(reports, states.space) for reports in states.reports}
+    cases["state"], cases["reports"] = every, [words[state.components] for state in every]
+    cases["flipping"] = flipping
+    ineffective = (name for name in measured_attributes(base, settings) if name not in states.space.attributes)
+    return Policy(states.space, cases, states.functions, tuple(ineffective), regions_of(base).reasons, max_failed)
 
-    space = space or PolicySpace.of(base, settings)
-    states = States.of(base, settings, max_failed, space)
-    # States are inferred before all cases are made: memory that is full of cases makes each inference slower.
-    decided = decide_all(base, states, decide, on_count)
-    columns = [*states.columns(), "statuses", *(f"{name}_then" for name in states.functions)]
-    columns += ["marks", "problem", "state", "reports", "flipping"]
-    return Policy(
-        space,
-        pandas.DataFrame(_rows(states, decided, decide), columns=columns),
-        states.functions,
-        tuple(name for name in measured_attributes(base, settings) if name not in space.attributes),
-        regions_of(base).reasons,
-        max_failed,
-    )
 
-
-def _rows(states: States, decided: Decide, decide: Decide) -> Iterator[tuple[Any, ...]]:
-    """Rows of a policy's cases."""
-    every = iter(states)
-    for _, reports in itertools.product(states.measured, states.reports):
-        here = list(itertools.islice(every, len(states.tasks)))
-        outcomes, words = [decided(Situation(state)) for state in here], _in_words(reports, states.space)
-        for state, outcome, flipping in zip(here, outcomes, _flipping(here, outcomes), strict=True):
-            marks = [INCONSISTENT]
-            if outcome.reasoning is None:
-                outcome = decide(Situation(state))
-            else:
-                marks = [NONE_LEFT] * bool(outcome.reasoning.plan.without_design) + [FLIP_FLOP] * bool(flipping)
-            statuses, then = "; ".join(outcome.statuses), outcome.choices(state, states.functions)
-            found = "; ".join(marks), outcome.contradiction
-            yield *states.row(state), statuses, *then, *found, state, words, flipping
+def _marks(outcome: Outcome, flipping: Sequence[str]) -> str:
+    if outcome.reasoning is None:
+        return INCONSISTENT
+    return "; ".join([NONE_LEFT] * bool(outcome.reasoning.plan.without_design) + [FLIP_FLOP] * bool(flipping))
 
 
 def _flipping(states: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:

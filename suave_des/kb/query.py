@@ -38,16 +38,7 @@ class QueryResult:
 
 
 def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) -> rdflib.Graph:
-    """Return the graph that queries are answered from.
-
-    Args:
-        base: the ontologies; labels and comments are there too.
-        state: adds what it asserts; None: the ontologies alone.
-        inferred: adds what Pellet infers.
-
-    Raises:
-        KnowledgeError: the state contradicts itself.
-    """
+    """Return the graph that queries are answered from, with labels and comments; see KnowledgeBase.query."""
     situation = () if state is None else base.assertions(state)
     more: Iterable[Triple] = InProcessPellet(base, base.content.all_terms()).infer(situation) if inferred else ()
     content = replace(base.content, structure=_with_fixed_names(base.content.structure))
@@ -75,16 +66,7 @@ def _with_fixed_names(structure: Sequence[str]) -> tuple[str, ...]:
 
 
 def answer(graph: rdflib.Graph, text: str) -> QueryResult:
-    """Answer a query.
-
-    Args:
-        graph: of graph_of.
-        text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs, owl, xsd
-            and swrl need no declaration.
-
-    Raises:
-        InputError: it is not a query, or would read something else than the knowledge base.
-    """
+    """Answer a query from a graph of graph_of; see KnowledgeBase.query."""
     from rdflib.plugins.sparql import prepareQuery
 
     try:

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, number_of
+from suave_des.kb.explain import Tracer, pellet_for
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import with_bindings
 from suave_des.kb.space import Situation, differing_decisions
 from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
-from suave_des.kb.tracing import Tracer, pellet_for
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.state import NONE_LEFT, STAYS
 from suave_des.metrics.result import KnowledgeRecord

@@ -27,7 +27,7 @@ from lxml import etree
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
-from suave_des.kb.explain import verdicts
+from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.space import Decide, Outcome, Region, Situation, measurements_in, parse_region
 from suave_des.kb.states import (
@@ -38,7 +38,6 @@ from suave_des.kb.states import (
     recorded_state,
     state_dict,
 )
-from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import Triple
@@ -210,7 +209,7 @@ def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[t
             regions[name] = region
     for values, words in measurements_in(knowledge.base, regions):
         for name, value in values.items():
-            builder.measurements.pop(name, None)
+            builder.parts["measurements"].pop(name, None)
             if value is not None:
                 builder.add("measurements", name, value)
         yield builder.state(), words

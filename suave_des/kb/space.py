@@ -97,11 +97,6 @@ class Outcome:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
         return INCONSISTENT if self.reasoning is None else self.changes.get(function, STAYS)
 
-    def choices(self, state: KnowledgeState, functions: Iterable[str]) -> list[str]:
-        """What happens to the groundings of functions in the state that was decided; empty without an objective."""
-        asked = [each.function for each in state.objectives]
-        return [self.choice(name) if name in asked else "" for name in functions]
-
 
 Decide = Callable[[Situation], Outcome]
 OnCount = Callable[[int, int], object]
@@ -367,12 +362,6 @@ def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     return own == {(swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own}
 
 
-def component_statuses(base: Ontology) -> tuple[str, ...]:
-    """Values of c_status to look at: what the thruster monitor reports, and what enabled rules ask for."""
-    asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), C_STATUS)
-    return tuple(sorted({*asked, FAILED, RECOVERED}))
-
-
 class Reports(NamedTuple):
     """(component, c_status) of the first ones of each group of interchangeable components; for how many they stand."""
 
@@ -433,7 +422,10 @@ class PolicySpace:
         """What can have an effect in these ontologies."""
         attributes = tuple(name for name in measured_attributes(base, settings) if has_effect(base, name))
         functions = tuple(name for name in base.functions if base.designs(name))
-        return cls(attributes, numbers_in(base), interchangeable_components(base), component_statuses(base), functions)
+        # What the thruster monitor reports, and what enabled rules ask for.
+        asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), C_STATUS)
+        statuses = tuple(sorted({*asked, FAILED, RECOVERED}))
+        return cls(attributes, numbers_in(base), interchangeable_components(base), statuses, functions)
 
     @property
     def scale(self) -> Scale:
@@ -601,33 +593,41 @@ class States:
         """All that have an objective in a state, by name."""
         return tuple(sorted({each.function for task in self.tasks for each in task.objectives}))
 
-    def columns(self) -> list[str]:
-        """Names of what `row` returns."""
-        return [*self.space.attributes, "components", "states", *(f"{name}_now" for name in self.functions)]
-
-    def row(self, state: KnowledgeState) -> tuple[Any, ...]:
-        """Describe a state.
+    def frame(self, states: Sequence[KnowledgeState]) -> Any:
+        """Describe some of the states, one in each row.
 
         Returns:
-            the place of each attribute's value on the scale; the components that report; for how many states it stands;
-            the grounding of each function, empty without an objective.
+            a data frame: the place of each attribute's value on the scale; the `components` that report; how many
+            `states` it stands for, as interchangeable components count one by one; and of each function with an
+            objective the grounding `_now`, else empty.
         """
-        values, asked = dict(state.measurements), [each.function for each in state.objectives]
-        return (
-            *(self.space.scale.place(values.get(name)) for name in self.space.attributes),
-            "; ".join(f"{name}={status}" for name, status in state.components),
-            self.numbers[state.components],
-            *((state.grounded(name) or NO_GROUNDING) if name in asked else "" for name in self.functions),
-        )
+        import pandas  # an inference alone needs none, the larger part of its start
 
-    @cached_property
-    def numbers(self) -> dict[tuple[tuple[str, str], ...], int]:
-        """For how many states one with certain reports stands, as interchangeable components count one by one."""
-        return dict(self.reports)
+        numbers = dict(self.reports)
+        columns: dict[str, list[Any]] = {}
+        for name in self.space.attributes:
+            columns[name] = [self.space.scale.place(dict(state.measurements).get(name)) for state in states]
+        columns["components"] = ["; ".join(f"{name}={status}" for name, status in each.components) for each in states]
+        columns["states"] = [numbers[state.components] for state in states]
+        for name in self.functions:
+            asked = (any(each.function == name for each in state.objectives) for state in states)
+            now = (state.grounded(name) or NO_GROUNDING for state in states)
+            columns[f"{name}_now"] = [design if is_asked else "" for design, is_asked in zip(now, asked, strict=True)]
+        return pandas.DataFrame(columns)
 
     def shared(self, other: States) -> States:
         """The states that another knowledge base with the same space has, too."""
         return replace(self, tasks=tuple(task for task in self.tasks if task in other.tasks))
+
+
+def add_decisions(cases: Any, states: States, outcomes: Sequence[Outcome], suffix: str = "") -> None:
+    """Add to a frame of states the inferred `statuses`, and what happens to the grounding of each function, `_then`."""
+    cases[f"statuses{suffix}"] = ["; ".join(outcome.statuses) for outcome in outcomes]
+    for name in states.functions:
+        then = map(Outcome.choice, outcomes, itertools.repeat(name))
+        cases[f"{name}_then{suffix}"] = [
+            words if now else "" for words, now in zip(then, cases[f"{name}_now"], strict=False)
+        ]
 
 
 def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> Iterator[KnowledgeState]:

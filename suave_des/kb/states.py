@@ -198,20 +198,20 @@ class ManagingSettings:
         )
 
     def state(
-        self, asked: Mapping[str, str | None], groundings: Mapping[str, str], **more: Mapping[str, Any]
+        self, objectives: Mapping[str, str | None], groundings: Mapping[str, str], **more: Mapping[str, Any]
     ) -> KnowledgeState:
         """Make a state.
 
         Args:
-            asked: o_status of the objectives, by function; None: UNGROUNDED without a grounding, else no status.
+            objectives: o_status of each, by function; None: UNGROUNDED without a grounding, else no status.
             groundings: function design by function.
             more: components and measurements, as KnowledgeState.of takes them.
         """
-        objectives = [
+        asked = [
             ObjectiveState(name, status or (None if name in groundings else UNGROUNDED), name in self.always_improved)
-            for name, status in asked.items()
+            for name, status in objectives.items()
         ]
-        return KnowledgeState.of(objectives, groundings=groundings, **more)
+        return KnowledgeState.of(asked, groundings=groundings, **more)
 
 
 @dataclass
@@ -227,10 +227,7 @@ class StateBuilder:
 
     base: Ontology
     settings: ManagingSettings
-    objectives: dict[str, str | None] = field(default_factory=dict)
-    groundings: dict[str, str] = field(default_factory=dict)
-    components: dict[str, str] = field(default_factory=dict)
-    measurements: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, dict[str, Any]] = field(default_factory=lambda: {kind: {} for kind in _NOUNS})
 
     def add(self, kind: str, name: str, value: Any) -> None:
         """Add one part: one of the objectives, groundings, components or measurements.
@@ -251,7 +248,7 @@ class StateBuilder:
         if kind == "groundings" and value not in self.base.designs(name):
             remedy = did_you_mean(value, self.base.designs(name))
             raise InputError(f"{name} has no function design {shown(value)}", remedy=remedy)
-        getattr(self, kind)[name] = value
+        self.parts[kind][name] = value
 
     def _known(self, kind: str) -> tuple[str, ...]:
         """Names that parts of a kind can have."""
@@ -313,8 +310,9 @@ class StateBuilder:
     def _add_value(self, name: str, value: str) -> None:
         kind = next((each for each in _NOUNS if name in self._known(each)), None)
         if kind is None:
+            known = dict.fromkeys(each for one in _NOUNS for each in self._known(one))
             problem = f"there is no quality attribute, component or function {shown(name)}"
-            raise InputError(problem, remedy=did_you_mean(name, [each for one in _NOUNS for each in self._known(one)]))
+            raise InputError(problem, remedy=did_you_mean(name, known))
         is_status = kind == "groundings" and (value == UNGROUNDED or triggers_adaptation(value))
         self.add("objectives" if is_status else kind, name, value)
 
@@ -332,9 +330,8 @@ class StateBuilder:
     def state(self) -> KnowledgeState:
         """Build the state. Without objectives, it has those of the groundings, else those of the search task."""
         search = [name for name in (*LASTING, GENERATE_SEARCH_PATH) if name in self.base.functions]
-        asked = self.objectives or dict.fromkeys(self.groundings or search)
-        parts = {"components": self.components, "measurements": self.measurements}
-        return self.settings.state(asked, self.groundings, **parts)
+        asked = self.parts["objectives"] or dict.fromkeys(self.parts["groundings"] or search)
+        return self.settings.state(**self.parts | {"objectives": asked})
 
 
 def state_dict(state: KnowledgeState) -> dict[str, Any]:

@@ -11,10 +11,9 @@ from suave_des.campaign.campaign import opened_campaign
 from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.spec import RUNS_LIMIT, check_range
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.kb.explain import LEFT_OUT, verdicts
+from suave_des.kb.explain import LEFT_OUT, Derivation, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.states import ManagingSettings
-from suave_des.kb.tracing import Derivation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.rdf import local_name

@@ -11,7 +11,7 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.policy import Policy, function_table, make_policy
+from suave_des.kb.policy import Policy, function_table
 from suave_des.kb.space import PolicySpace, Scale, Situation, States, component_reports, kind_of
 from suave_des.kb.states import ManagingSettings
 
@@ -30,7 +30,7 @@ VISIBLE = "FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_vis
 def policy_between(knowledge, *numbers):
     """A policy without failures, that tells measured values apart by few numbers: the fewer, the less to infer."""
     space = replace(PolicySpace.of(knowledge.base, knowledge.settings), numbers=tuple(map(Decimal, numbers)))
-    return make_policy(knowledge.base, knowledge.settings, knowledge.outcome, 0, space)
+    return knowledge.policy(0, space=space)
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +145,7 @@ class TestPolicy:
     def test_too_many_states_are_refused(self, knowledge):
         many = PolicySpace(("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ())
         with pytest.raises(InputError, match="kinds of states, which is too many"):
-            make_policy(knowledge.base, ManagingSettings(), knowledge.outcome, 9, many)
+            knowledge.policy(9, space=many)
 
 
 def test_the_csv_file_has_every_cell(command, tmp_path, policy):
@@ -208,7 +208,7 @@ def test_the_policy_of_two_attributes_is_that_of_deciding_each_state(tmp_path, r
     assert space.attributes == ("battery_level", "water_visibility")
     few = tuple(number for number in space.numbers if number < 4)[-2:]
     small = PolicySpace(space.attributes, few, space.alike, space.statuses, space.functions)
-    policy = make_policy(knowledge.base, knowledge.settings, knowledge.outcome, 0, small)
+    policy = knowledge.policy(0, space=small)
     check_like_deciding_each(knowledge, policy, 80)
 
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
+from suave_des.kb.explain import RuleQuestions
 from suave_des.kb.matching import Probes
 from suave_des.kb.space import Situation
 from suave_des.kb.states import FactReader, ManagingSettings, StateBuilder
-from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario

@@ -147,8 +147,8 @@ def why_not(
 
     The exit status is 0 even if a rule fires.
     """
+    from suave_des.kb.explain import RuleQuestions
     from suave_des.kb.states import FactReader, ManagingSettings, StateBuilder
-    from suave_des.kb.why_not import RuleQuestions
     from suave_des.knowledge.pellet import TimeLimit
     from suave_des.scenario_knowledge import open_base
 
