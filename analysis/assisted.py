@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from suave_des import load_scenario, run_campaign
 from suave_des.records.missions import missions_in
-from suave_des.results.assisted import assisted_mean, compare_assisted
+from suave_des.results.compare import assisted_mean, compare_assisted
 from suave_des.results.groups import grouped
 from suave_des.results.statistics import mean_interval
 

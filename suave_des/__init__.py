@@ -25,9 +25,8 @@ if _TYPE_CHECKING:
     from suave_des.resources import find
     from suave_des.results.compare import CampaignFrame, compare_folders
     from suave_des.results.figures import draw_folder
-    from suave_des.results.paper import compare_with_paper
     from suave_des.results.real import read_real
-    from suave_des.results.validation import validate
+    from suave_des.results.validation import compare_with_paper, validate
     from suave_des.scenario.loader import load_scenario, with_values
     from suave_des.simulation.mission import Mission
     from suave_des.simulation.simulator import Simulator
@@ -61,9 +60,8 @@ _HOMES = {
         "resources": ("find",),
         "results.compare": ("CampaignFrame", "compare_folders"),
         "results.figures": ("draw_folder",),
-        "results.paper": ("compare_with_paper",),
         "results.real": ("read_real",),
-        "results.validation": ("validate",),
+        "results.validation": ("compare_with_paper", "validate"),
         "scenario.loader": ("load_scenario", "with_values"),
         "simulation.mission": ("Mission",),
         "simulation.simulator": ("Simulator",),

@@ -205,7 +205,7 @@ def reproduce(
     from suave_des.campaign.campaign import run_campaign
     from suave_des.records.metrics import PAPER_METRICS
     from suave_des.records.missions import PAPER_ORDER
-    from suave_des.results.paper import FILE, compare_with_paper
+    from suave_des.results.validation import PAPER_FILE, compare_with_paper
 
     settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}
     with progress.shown("reproduce", quiet=quiet) as show:
@@ -220,8 +220,8 @@ def reproduce(
     if result.folder is None:
         console.print("\nNo files were written; --out DIR keeps each mission's figures.")
     else:
-        write_files(result.folder, {FILE: comparison.markdown()})
-        console.print(f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{FILE}")
+        write_files(result.folder, {PAPER_FILE: comparison.markdown()})
+        console.print(f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{PAPER_FILE}")
     exit_telling_failures(result)
 
 

@@ -32,7 +32,7 @@ from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.records.mission_folder import MissionRecord
-    from suave_des.results.mission_figures import Rules
+    from suave_des.results.mission import Rules
     from suave_des.tables import Written
 
 
@@ -96,8 +96,7 @@ def compare(
     assisted by simulated ones.
     """
     from suave_des.records.missions import read_missions
-    from suave_des.results.assisted import compare_assisted
-    from suave_des.results.compare import compare_groups
+    from suave_des.results.compare import compare_assisted, compare_groups
     from suave_des.results.groups import grouped
 
     check_written(out)

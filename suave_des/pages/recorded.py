@@ -24,8 +24,7 @@ from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records.mission_folder import MISSION_FILE, MissionRecord, read_mission, record_of
 from suave_des.records.store import STORE_FILE
 from suave_des.resources import find, hashes
-from suave_des.results.mission import adaptations
-from suave_des.results.mission_figures import Rules
+from suave_des.results.mission import Rules, adaptations
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.simulation.simulator import Simulator

@@ -26,7 +26,7 @@ from suave_des.pages.page import compressed, page
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.missions import Missions, read_missions
 from suave_des.records.store import read_manifest
-from suave_des.results.compare import compare
+from suave_des.results.compare import compare_groups
 from suave_des.results.groups import grouped
 from suave_des.results.style import looks
 from suave_des.tables import capital
@@ -99,7 +99,7 @@ def _results(missions: Missions) -> dict[str, Any]:
     Raises:
         InputError: they cannot be compared.
     """
-    found = compare(missions)
+    found = compare_groups(grouped(missions))
     return {
         "conclusion": found.conclusion,
         "notes": found.notes,

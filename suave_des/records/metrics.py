@@ -100,22 +100,6 @@ class Metric:
         unit = "percentage points" if self.name == FOUND else self.unit
         return f"{self.scale * value:.{self.decimals}f} {unit}".strip()
 
-    def claim(self, first: str, second: str, value: float) -> str:
-        """Write which of two managers has more or less, the better one first; the value is first - second."""
-        if value * (self.better or 1) < 0.0:
-            first, second, value = second, first, -value
-        phrase = self.more if value > 0.0 else self.less
-        if not phrase:
-            phrase = f"has {{}} {'more' if value > 0.0 else 'less'} {self.title} than"
-        return f"{first} {phrase.format(self.amount(abs(value)))} {second}"
-
-    def rank_claim(self, less: str, greater: str) -> str:
-        """Write which of two managers mostly has more or less in single runs, the better one first."""
-        if not self.better:
-            return f"{greater} mostly exceeds {less} in {self.title}"
-        first, phrase, second = (less, self.less, greater) if self.better < 0 else (greater, self.more, less)
-        return f"{first} {phrase.format('mostly')} {second}"
-
 
 def _read() -> Iterator[Metric]:
     """Read metrics.csv, beside this module."""

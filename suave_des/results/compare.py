@@ -16,21 +16,20 @@ import numpy as np
 import pandas
 
 from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, shown, unknown
-from suave_des.estimates import share_of
+from suave_des.errors import InputError, number_of, shown, unknown
+from suave_des.estimates import STUDENT, Estimate, share_of, t_quantile
 from suave_des.files import as_number
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.records.missions import SHARING, Missions, Source, missions_in
 from suave_des.results import statistics
-from suave_des.results.comparison import Comparison, concluded
+from suave_des.results.comparison import AssistedComparison, Comparison, assisted_conclusion, concluded
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
+from suave_des.results.real import CONDITION
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from suave_des.results.assisted import AssistedComparison
 
 
 class Choices(TypedDict, total=False):
@@ -65,12 +64,7 @@ def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> 
     Raises:
         InputError: results cannot be read, a name is not in them, or an extra is not installed.
     """
-    return compare(missions_in(paths), **choices)
-
-
-def compare_frame(frame: pandas.DataFrame, **choices: Unpack[Choices]) -> Comparison:
-    """Compare the missions of a data frame with the columns of runs.csv; see compare_folders."""
-    return compare(missions_in(frame), **choices)
+    return _compared(missions_in(paths), **choices)
 
 
 class CampaignFrame(pandas.DataFrame):
@@ -108,7 +102,7 @@ class CampaignFrame(pandas.DataFrame):
         Raises:
             InputError: a name is not there, or an extra is not installed.
         """
-        return compare_frame(self, **choices)
+        return _compared(missions_in(self), **choices)
 
     def assist(
         self, real: Source, population: Source, managers: Sequence[str] = (), metrics: Sequence[str] = ()
@@ -124,8 +118,6 @@ class CampaignFrame(pandas.DataFrame):
         Raises:
             InputError: the missions do not belong together, or are too few.
         """
-        from suave_des.results.assisted import compare_assisted
-
         simulated = missions_in(self), missions_in(population)
         return compare_assisted(grouped(missions_in(real), managers, metrics, simulated=simulated))
 
@@ -144,14 +136,9 @@ class CampaignFrame(pandas.DataFrame):
         return draw_missions(missions_in(self), kind)
 
 
-def compare(
-    missions: Missions,
-    managers: Sequence[str] = (),
-    metrics: Sequence[str] = (),
-    by: Sequence[str] = (),
-    **how: Any,
+def _compared(
+    missions: Missions, managers: Sequence[str] = (), metrics: Sequence[str] = (), by: Sequence[str] = (), **how: Any
 ) -> Comparison:
-    """Group missions, and compare the groups; see compare_folders."""
     return compare_groups(grouped(missions, managers, metrics, by), **how)
 
 
@@ -312,3 +299,133 @@ def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapp
                 found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
     title = f"runs that differ most: {metric.heading}"
     return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(found, default=(0.0, ""))[1]
+
+
+# Real missions, assisted by simulated ones
+#
+# A mean of real missions is corrected by what the simulation says about the conditions in which they were made: real +
+# weight * (population - same). This is prediction-powered inference (Angelopoulos et al. 2023; PPI++, arXiv:2311.01453)
+# with conditions as clusters. It holds for a wrong simulation, too, whose error is measured under the same conditions.
+
+LEAST_CONDITIONS = 3
+LEAST_TO_WEIGH = 10
+"""Conditions from which on the weight is estimated: with fewer, its own error costs more than it gains."""
+_NOTICEABLE = 0.1
+"""Least weight, and least gain of an interval's width, with which the simulation is said to help."""
+
+
+def assisted_mean(
+    real: Sample, same: Sample, population: Sample, chance: Sequence[float] = (0.0, 0.0, 0.0), shared: float = 0.0
+) -> tuple[Estimate, float]:
+    """Estimate the mean over a population of conditions from real missions under a few of them.
+
+    Args:
+        real: mean of the real missions under each condition, shape (conditions,).
+        same: mean of the simulated missions under the same conditions, in the same order.
+        population: mean of the simulated missions under each of many other conditions, shape (draws,).
+        chance: variances that these means have by chance within a condition: real, same, population.
+        shared: variance of the mean of `same` by random numbers that its conditions share.
+
+    Returns:
+        The mean, with its interval by Student's t over the conditions, and the weight of the simulation, from 0 to 1.
+        From LEAST_TO_WEIGH conditions on, the weight is that of PPI++. With fewer it is 1, or 0 where that makes the
+        interval narrower; and what the conditions show of their variance is not taken to be less than what follows from
+        chance and, for a weight of 0, from how the population varies: few conditions may be alike by accident.
+    """
+    n, draws, is_weighed = len(real), len(population), len(real) >= LEAST_TO_WEIGH
+    spread = float(population.var(ddof=1))
+
+    def variance(weight: float) -> float:
+        between = 0.0 if is_weighed else (1.0 - weight) ** 2 * max(0.0, spread - chance[2])
+        seen = float((real - weight * same).var(ddof=1))
+        return max(seen, between + chance[0] + weight**2 * chance[1]) / n + weight**2 * (spread / draws + shared)
+
+    if is_weighed:
+        both = float(np.concatenate([same, population]).var(ddof=1))
+        covariance = float(np.mean((real - real.mean()) * (same - same.mean())))
+        weight = min(max(covariance / ((1.0 + n / draws) * both), 0.0), 1.0) if both else 0.0
+    else:
+        weight = float(variance(1.0) <= variance(0.0))
+    mean = float(real.mean() + weight * (population.mean() - same.mean()))
+    half = t_quantile(n - 1 - is_weighed) * math.sqrt(variance(weight)) or math.nan
+    return Estimate(mean, mean - half, mean + half, STUDENT), weight
+
+
+def compare_assisted(real: Groups) -> AssistedComparison:
+    """Estimate each manager's means, and the differences between managers, from real missions and simulated ones.
+
+    A mission that never found the pipeline counts with the time limit as its search time.
+
+    Args:
+        real: real missions, with the simulated ones that assist them.
+
+    Raises:
+        InputError: the missions are too few.
+    """
+    names = [group.name for group in real.groups]
+    in_real, in_same, drawn = (
+        each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=real.time_limit_s)}) for each in real.sides
+    )
+    rows = []
+    for metric in real.metrics:
+        sides = [_means(frame, CONDITION, metric.name, name) for frame, name in ((in_real, "real"), (in_same, "same"))]
+        conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
+        draws, shared = _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
+        for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
+            rows.append(_estimate(both, metric, conditions, draws, shared))
+    return AssistedComparison(pandas.DataFrame(rows), (*real.missions.notes, *real.notes), real.metrics)
+
+
+def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.DataFrame:
+    """Return mean (name), variance (name_var) and number (name_n) of missions, by condition or draw and by manager."""
+    found = frame.groupby([by, "manager"], observed=True)[metric].agg(["mean", "var", "count"])
+    return found.set_axis([name, f"{name}_var", f"{name}_n"], axis=1)
+
+
+def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
+    """Return by run and manager how far simulated missions are on average from the mean of their condition.
+
+    Points of a sweep share a run's random numbers, so that the means of all conditions may be off by the same chance.
+    """
+    off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform("mean")
+    return same.assign(off=off).groupby(["seed", "run", "manager"], observed=True)["off"].mean().unstack("manager")
+
+
+def _estimate(
+    both: list[str], metric: Metric, conditions: pandas.DataFrame, drawn: pandas.DataFrame, shared: pandas.DataFrame
+) -> dict[str, Any]:
+    """Estimate the mean of one manager, or the difference of two, over the conditions that both have.
+
+    Raises:
+        InputError: there are too few conditions, simulated missions in one of them, or draws.
+    """
+    by_manager: Any = conditions.unstack()
+    own = by_manager.reindex(columns=pandas.MultiIndex.from_product([conditions.columns, both]))
+    own = own[own[["real", "same"]].notna().all(axis=1)]
+    draws, of_runs = (each.reindex(columns=both).dropna() for each in (drawn["draw"].unstack(), shared))
+    for number, least, of, remedy in (
+        (len(own), LEAST_CONDITIONS, "condition", "how they differ gives the interval"),
+        (int(own["same_n"].min().min()) if len(own) else 2, 2, "simulated mission", "in each condition, better 20"),
+        (len(draws), LEAST_TO_WEIGH, "draw", "in the population, better some hundred"),
+    ):
+        if number < least:
+            problem = f"{metric.title} of {' - '.join(both)}: there {'is' if number == 1 else 'are'}"
+            remedy = f"at least {least} are needed: {remedy}"
+            raise InputError(f"{problem} {number_of(number, of)}", remedy=remedy)
+    signs = np.array([1.0, -1.0][: len(both)])
+    real, same, many = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
+    sizes = own["real_n"], own["same_n"], float(drawn["draw_n"].unstack().mean().mean())
+    chance = [float((own["same_var"] / size).mean().sum()) for size in sizes]
+    in_common = float((of_runs.to_numpy() @ signs).var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
+    alone = statistics.mean_interval(real)
+    assisted, weight = assisted_mean(real, same, many, chance, in_common)
+    if metric.name == FOUND:
+        alone, assisted = (each.cut(1.0 - len(both), 1.0) for each in (alone, assisted))
+    half, runs = (assisted.high - assisted.low) / 2.0, int(own["real_n"][both[0]].sum())
+    narrower = (alone.high - alone.low) / 2.0 / half
+    needed = statistics.runs_for(float(real.std(ddof=1)), half) if half > 0.0 else None
+    row = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name, "runs": runs, "conditions": len(own)}
+    row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight, "narrower": narrower}
+    row["equal_runs"] = None if needed is None else round(needed * runs / len(own))
+    row["helps"] = weight >= _NOTICEABLE and narrower >= 1.0 + _NOTICEABLE
+    return row | {"conclusion": assisted_conclusion(row, metric)}

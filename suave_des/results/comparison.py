@@ -170,6 +170,50 @@ class Comparison(Written):
         return {**super()._content(), "largest_differences": {"rows": self.largest.rows, "replay": self.replay}}
 
 
+@dataclass(frozen=True)
+class AssistedComparison(Written):
+    """What real missions show, alone and assisted by simulated ones.
+
+        found = run_campaign("same.yaml").assist("real.csv", "population")
+        found.estimates[["group", "other", "assisted", "narrower", "conclusion"]]
+
+    Attributes:
+        estimates: a row for each metric and manager, or pair of managers: group, other (whose mean is subtracted, or
+            empty), metric, runs (real missions of the group), conditions, alone and assisted (means with the ends of
+            their intervals), weight, narrower (how many times as wide the interval of the real missions alone is),
+            equal_runs (real missions, as many in each condition, that would give the assisted interval), helps, and
+            conclusion.
+        notes: what a reader should know about the data.
+        metrics: that are compared.
+        conclusion: of all; empty, as each estimate has its own.
+    """
+
+    estimates: pandas.DataFrame
+    notes: tuple[str, ...]
+    metrics: tuple[Metric, ...] = field(repr=False)
+    conclusion: str = field(repr=False, default="")
+
+    def frames(self) -> dict[str, pandas.DataFrame]:
+        """Return the estimates."""
+        return {"estimates": self.estimates}
+
+    def sections(self) -> Iterator[Section]:
+        """Yield a table for each metric."""
+        headings = ("mean", "n", "alone", "95% interval", "assisted", "95% interval", "weight", "equals")
+        for metric in self.metrics:
+            own = rows_of(self.estimates[self.estimates["metric"] == metric.name])
+            table = Table(headings, [_assisted_cells(row, metric) for row in own])
+            yield Section(capital(metric.heading), [table], [row["conclusion"] for row in own])
+
+    def remarks(self) -> list[str]:
+        """Describe the numbers, and what to know about the data."""
+        how = (
+            "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
+            "equals: real missions that would give the assisted interval alone, as many in each condition as now.",
+        )
+        return [*how, *(f"Note: {note}." for note in self.notes)]
+
+
 # Tables
 
 
@@ -237,6 +281,17 @@ def _p(p: float) -> str:
     if p < 1e-300:  # next to the least that a float can hold
         return "<1e-300"
     return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
+
+
+def _assisted_cells(row: Row, metric: Metric) -> tuple[str, ...]:
+    both = [estimate_in(row, name) for name in ("alone", "assisted")]
+    cells = [text for found in both for text in (metric.number(found.value), metric.interval(found))]
+    equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] is not None else ""
+    return _group_name(row), f"{row['runs']} in {row['conditions']}", *cells, f"{row['weight']:.2f}", equal
+
+
+def _group_name(row: Row) -> str:
+    return f"{row['group']} - {row['other']}" if row["other"] else str(row["group"])
 
 
 # Conclusions
@@ -331,9 +386,12 @@ def conclusion(found: Row, metric: Metric) -> str:
         return f"No difference in {metric.title} is shown between {group} and {other}{but} ({mean}; {test})."
     if not _is_claimed(found):
         less, greater = (other, group)[:: 1 if ranks > 0.0 else -1]
-        claim = metric.rank_claim(less, greater)
+        first, phrase, second = (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
+        claim = f"{first} {phrase.format('mostly')} {second}"
+        if not metric.better:
+            claim = f"{greater} mostly exceeds {less} in {metric.title}"
         return f"By ranks, {claim} ({test}), but no difference of the means is shown ({mean})."
-    claim = metric.claim(group, other, apart.value)
+    claim = difference_claim(group, other, apart.value, metric)
     if ranks * apart.value < 0.0:
         greater = group if ranks > 0 else other
         return (
@@ -359,6 +417,16 @@ def _is_claimed(found: Row) -> bool:
     """Whether a difference of the means may be claimed."""
     is_open = found["difference"].contains(0.0) and _direction_of_ranks(found)
     return bool(found["p_holm"] < SIGNIFICANCE and not is_open)
+
+
+def difference_claim(first: str, second: str, value: float, metric: Metric) -> str:
+    """Write which of two managers has more or less, the better one first; the value is first - second."""
+    if value * (metric.better or 1) < 0.0:
+        first, second, value = second, first, -value
+    phrase = metric.more if value > 0.0 else metric.less
+    if not phrase:
+        phrase = f"has {{}} {'more' if value > 0.0 else 'less'} {metric.title} than"
+    return f"{first} {phrase.format(metric.amount(abs(value)))} {second}"
 
 
 def overall_conclusion(
@@ -454,3 +522,20 @@ def p_text(p: float) -> str:
 def _direction_of_ranks(found: Row) -> float:
     """Return the sign of the effect: above 0 if the first has the greater values, 0 if there is none."""
     return (found["effect"] or 0.0) - (0.5 if found["test"] == MANN_WHITNEY and found["effect"] is not None else 0.0)
+
+
+def assisted_conclusion(row: Row, metric: Metric) -> str:
+    """Write what an estimate shows, and whether the simulation helped."""
+    found, interval = estimate_in(row, "assisted"), metric.interval
+    if row["other"] and found.has_interval and not found.contains(0.0):
+        claim = difference_claim(row["group"], row["other"], found.value, metric)
+        found = found if found.value > 0.0 else -found
+    else:
+        is_share = metric.name == FOUND and not row["other"]
+        claim = f"{metric.title} of {_group_name(row)}: {(metric.number if is_share else metric.amount)(found.value)}"
+    claim += f" (95% interval {interval(found) or 'not known'})"
+    claim += f" from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
+    if not row["helps"]:
+        return f"{claim}; the simulation does not help."
+    equal = f", as that of {row['equal_runs']:,} real missions alone" if row["equal_runs"] is not None else ""
+    return f"{claim}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."

@@ -39,7 +39,7 @@ from suave_des.results.groups import (
     least_and_greatest,
     runs_sharing_draw,
 )
-from suave_des.results.mission_figures import Rules, draw_map, draw_timeline
+from suave_des.results.mission import Rules, draw_map, draw_timeline
 from suave_des.results.style import folded, key_words, value_words
 
 ENDINGS = (".png", ".pdf", ".svg")
@@ -95,9 +95,8 @@ def draw_differences(drawn: Groups) -> style.Picture:
         InputError: no two groups have runs that share their random numbers.
     """
     groups = drawn.groups
-    pairs = [(one, groups[0]) for one in groups[1:]]
-    if len(groups) <= _EACH_WITH_EACH:
-        pairs = list(combinations(groups, 2))
+    is_few = len(groups) <= _EACH_WITH_EACH
+    pairs = list(combinations(groups, 2)) if is_few else [(one, groups[0]) for one in groups[1:]]
     colours = {group.name: style.line(number)["color"] for number, group in _looks(groups)}
     rows = []
     for one, other in pairs:
@@ -266,9 +265,8 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     rows, columns = (sorted(each) if not isinstance(each[0], str) else each for each in (rows, columns))
     if max(len(rows), len(columns)) > _MOST_CELLS:
         problem = f"{len(columns)} by {len(rows)} means are too many for numbers"
-        raise InputError(
-            problem, place="parameters", remedy=f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
-        )
+        remedy = f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
+        raise InputError(problem, place="parameters", remedy=remedy)
     height = len(managers) * (0.24 * len(rows) + 0.3) + 0.9
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
@@ -286,16 +284,12 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
         of_metric[-1].set_xlabel(_folded(key_words(across)))
         for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
-            axis.set_ticks(range(len(values)), [_folded(style.text(_value_text(each)), 14) for each in values])
+            axis.set_ticks(range(len(values)), [_folded(style.text(value_words(each)), 14) for each in values])
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
     counts = frame.groupby([names, up, across])["run"].nunique().tolist()
     others = [name for name in missions.swept if name not in parameters]
     write_below(figure, _averaged(counts, others))
     return figure
-
-
-def _value_text(value: object) -> str:
-    return f"{value:g}" if isinstance(value, int | float) else value_words(value)
 
 
 def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:
@@ -364,17 +358,8 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
         middles.append(float(part["place"].mean()) + beside)
     means = np.array([each.value for each in found])
     low, high = np.array([each.interval or (each.value, each.value) for each in found]).T
-    axes.errorbar(
-        middles,
-        means,
-        yerr=(means - low, high - means),
-        label=style.text(folded(label)),
-        marker=style.marker(number),
-        ms=3.2,
-        capsize=2,
-        elinewidth=0.8,
-        **style.line(number),
-    )
+    look = style.line(number) | {"marker": style.marker(number), "ms": 3.2, "capsize": 2, "elinewidth": 0.8}
+    axes.errorbar(middles, means, yerr=(means - low, high - means), label=style.text(folded(label)), **look)
     return counts
 
 

@@ -21,6 +21,7 @@ from suave_des.records.metrics import (
     metric_of,
 )
 from suave_des.records.missions import SHARING, Missions
+from suave_des.results.real import matched
 
 _USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
@@ -71,7 +72,8 @@ class Groups:
         time_limit_s: whole seconds that missions of every group had; where all found the pipeline, the longest search.
             Of real missions that simulated ones assist, the limit of all; infinite if it is not known.
         lost: by name of a group that did not find the pipeline in most of its missions, in how many.
-        simulated: missions that assist them, under the same conditions and under many; empty: none do.
+        sides: real missions and those simulated under the same conditions, with the numbers of these, and those
+            simulated under many, with the numbers of their draws; empty if no simulated ones assist them.
     """
 
     missions: Missions
@@ -81,7 +83,7 @@ class Groups:
     counted: str
     time_limit_s: float
     lost: Mapping[str, str]
-    simulated: tuple[Missions, ...] = ()
+    sides: tuple[pandas.DataFrame, ...] = ()
 
 
 def grouped(
@@ -102,12 +104,13 @@ def grouped(
             missions, those of the paper.
         by: swept parameters each of whose values is a separate group.
         averages: whether a run's values are averaged over the other swept parameters.
-        simulated: a campaign under the conditions of the missions, which are real ones, and one under many; empty: the
-            missions are not assisted by others.
+        simulated: what assists real missions: a campaign that sweeps their conditions, and one under many, drawn as
+            theirs were. Conditions follow from columns named like what is swept, a column `condition` with numbers from
+            1, or the order.
 
     Raises:
         InputError: a name is not there, no mission has a metric, or there are too many groups; or simulated missions
-            lack a manager or a metric, have a number that is none, or another time limit than the others.
+            lack a manager or a metric, have a number that is none or another time limit, or are of other conditions.
     """
     frame = missions.frame.assign(source="") if simulated else missions.frame
     known = list(dict.fromkeys(frame["manager"]))
@@ -158,12 +161,15 @@ def grouped(
         notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
     for metric in chosen:
         notes += _never_found(groups) if metric.name == SEARCH_TIME else _left_out(groups, metric)
-    limit_s: float = _time_limit_s(groups)
-    if simulated:
-        ours = pandas.concat([group.frame for group in groups])
-        limit_s = _common_limit_s([ours, *(each.frame for each in simulated)], chosen)
     counted, lost = _counted(groups), dict(_mostly_lost(groups))
-    return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, tuple(simulated))
+    if not simulated:
+        return Groups(missions, groups, chosen, tuple(notes), counted, _time_limit_s(groups), lost)
+    same, population = simulated
+    notes = [*same.notes, *population.notes, *notes]
+    real = pandas.concat([group.frame for group in groups], ignore_index=True)
+    limit_s, drawn = _common_limit_s((real, same.frame, population.frame), chosen), _with_draws(population)
+    sides = (*matched(real, same.frame, same.swept), drawn)
+    return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, sides)
 
 
 def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
@@ -259,6 +265,16 @@ def runs_sharing_draw(frame: pandas.DataFrame) -> int:
 def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
     """Return of each mission the first run that shares its draws."""
     return (frame["run"] - 1) // alike * alike + 1
+
+
+def _with_draws(population: Missions) -> pandas.DataFrame:
+    """Return simulated missions, which must be of no sweep, with the numbers of their draws."""
+    if population.swept:
+        problem = f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
+        raise InputError(problem, place="population", remedy="draw the conditions, as perturbations")
+    frame = population.frame
+    drawn = frame.assign(draw=first_alike(frame, runs_sharing_draw(frame)))
+    return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 
 def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:

@@ -1,19 +1,29 @@
-"""What the record of a mission says: its modes, failures and tasks over time, and its adaptations with their causes."""
+"""What the record of a mission says over time, and its figures: a map with altitude, and all that happened."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import NamedTuple
+from itertools import cycle, groupby, pairwise
+from string import ascii_uppercase
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
-from suave_des.domain import MAINTAIN_MOTION, UNGROUND_MODE
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SEA_BED_Z_M, UNGROUND_MODE
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.records.mission_folder import MissionRecord
-from suave_des.results.style import component_words, function_mode_words
+from suave_des.results import style
+from suave_des.results.style import component_words, function_mode_words, function_words, mode_words, plain
 
 _LATEST_REACTION_S = 5.0
 """What was reported earlier is not taken as the cause of an adaptation."""
@@ -119,13 +129,11 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
 
 def _cause(record: MissionRecord, function: str, before: str, after: Span) -> str:
     """Return what was reported shortly before a change of mode and concerns its function."""
-    if cause := _battery_cause(record, function, before, after):
-        return cause
     if function == MAINTAIN_MOTION:
-        causes = [
-            (t_s, f"{component_words(component)} {'failed' if is_failed else 'recovered'}")
-            for t_s, component, is_failed in component_changes(record)
-        ]
+        words, changes = {True: "failed", False: "recovered"}, component_changes(record)
+        causes = [(t_s, f"{component_words(name)} {words[is_failed]}") for t_s, name, is_failed in changes]
+    elif cause := _battery_cause(record, before, after):
+        return cause
     else:
         crossings = details(record, "visibility_crossing")
         causes = [(t_s, f"visibility {detail.split(' (')[0]}") for t_s, detail in crossings]
@@ -133,10 +141,10 @@ def _cause(record: MissionRecord, function: str, before: str, after: Span) -> st
     return max(recent)[1] if recent else ""
 
 
-def _battery_cause(record: MissionRecord, function: str, before: str, after: Span) -> str:
+def _battery_cause(record: MissionRecord, before: str, after: Span) -> str:
     """Return the battery as the cause of a function's activation or deactivation, if it is."""
     level = battery_level(record)
-    if level is None or function == MAINTAIN_MOTION or UNGROUND_MODE not in (before, after.what):
+    if level is None or UNGROUND_MODE not in (before, after.what):
         return ""
     times = np.searchsorted(record.trajectory["t_s"], (after.begin_s - _LATEST_REACTION_S, after.begin_s))
     earlier, now = level.iloc[np.minimum(times, len(level) - 1)].astype(float)
@@ -149,3 +157,370 @@ def _battery_cause(record: MissionRecord, function: str, before: str, after: Spa
 def battery_level(record: MissionRecord) -> pandas.Series[float] | None:
     """Return the battery's level, 0 to 1, at each point of the trajectory; None without a battery."""
     return record.trajectory.get("battery_level")
+
+
+# The map
+
+_IDLE_MODES = ("", UNGROUND_MODE, "inactive")
+_ZOOM_MARGIN_M = 0.6
+_PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
+_VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
+_BATTERY_COLOUR = style.GREEN
+_LETTER_OFFSETS = ((4, 4), (-9, 4), (4, -10), (-9, -10), (0, 9), (0, -14), (12, 0), (-16, 0), (12, 10), (-16, 10))
+"""Where a letter may stand beside its point, in points; the first that is free is taken."""
+_LETTER_POINTS = 9.0
+_LETTER_ROW_SHARE = 0.075
+_LETTER: dict[str, Any] = {"weight": "bold", "fontsize": 8}
+
+
+class _Mark(NamedTuple):
+    """An event, to be marked on the map and over time."""
+
+    letter: str
+    t_s: float
+    x_m: float
+    y_m: float
+    text: str
+    colour: str
+
+
+def draw_map(record: MissionRecord) -> style.Picture:
+    """Draw the map of a mission, with altitude, visibility and battery over time."""
+    colours = mode_colours(record)
+    marks = list(_marks(record))
+    figure = style.Picture(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
+    panels = figure.subplot_mosaic("aa;bc", height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))
+    whole, zoom, time = panels["a"], panels["b"], panels["c"]
+    frame = _search_frame(record)
+    _draw_plan(whole, record, colours)
+    whole.add_patch(Rectangle(frame.p0, frame.width, frame.height, fill=False, ec=style.GREY, lw=0.7))
+    whole.annotate("b", (frame.x0, frame.y1), (-3, 0), textcoords="offset points", ha="right", va="top", fontsize=7.5)
+    whole.yaxis.set_major_locator(MultipleLocator(5.0))
+    _draw_plan(zoom, record, colours)
+    _draw_adaptations(zoom, record, colours, "x_m", "y_m")
+    _draw_letters(zoom, marks, frame)
+    _draw_over_time(time, record, colours, marks)
+    whole.set_title(f"a   Mission: {style.text(record.name)}")
+    zoom.set_title("b   Search")
+    time.set_title("c   Altitude and visibility")
+    handles = list(_legend(record, colours, marks))
+    whole.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    return figure
+
+
+def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> Iterator[Line2D]:
+    moving = [mode for mode in colours if mode not in _IDLE_MODES]
+    for mode in (*moving, *_IDLE_MODES[1:2] * (len(moving) < len(colours))):
+        yield Line2D([], [], label=style.text(mode_words(mode)), **_way_look(colours, mode))
+    yield Line2D([], [], **_PIPELINE, label="pipeline")
+    yield Line2D([], [], **_VISIBILITY, label="visibility; dotted: thresholds (c)")
+    if battery_level(record) is not None:
+        yield Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)")
+        yield Line2D([], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station")
+    yield Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=4, label="start")
+    if adaptations(record):
+        yield Line2D([], [], color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation")
+    for mark in marks:
+        symbol = rf"$\mathbf{{{mark.letter}}}$"
+        yield Line2D([], [], lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text)
+
+
+def mode_colours(record: MissionRecord) -> dict[str, str]:
+    """Return a colour for each mode, in the order of appearance; what does not move the vehicle is grey."""
+    modes = list(dict.fromkeys(record.trajectory["mode"]))
+    known = style.MODE_COLOURS | dict.fromkeys(_IDLE_MODES, style.GREY)
+    others = zip([mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False)
+    colours = known | dict(others)
+    return {mode: colours[mode] for mode in modes}
+
+
+def _marks(record: MissionRecord) -> Iterator[_Mark]:
+    """Yield the events that are marked: the detection, failures, recoveries from these, and the battery's limits."""
+    found = [(t_s, "pipeline detected", style.BLACK) for t_s, _ in details(record, "pipeline_detected")]
+    for t_s, detail in details(record, "battery_crossing"):
+        found.append((t_s, "battery low" if detail.startswith("falls") else "recharged", _BATTERY_COLOUR))
+    for t_s, component, is_failed in component_changes(record):
+        what, colour = ("failed", style.VERMILION) if is_failed else ("recovered", style.BLACK)
+        found.append((t_s, f"{component_words(component)} {what}", colour))
+    way = record.trajectory
+    for letter, (t_s, text, colour) in zip(ascii_uppercase, sorted(found, key=lambda each: each[0]), strict=False):
+        x_m, y_m = (float(np.interp(t_s, way["t_s"], way[axis])) for axis in ("x_m", "y_m"))
+        yield _Mark(letter, t_s, x_m, y_m, f"{text}, {t_s:.0f} s", colour)
+
+
+def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
+    """Return the style of a stretch of the path: line widths distinguish the search altitudes without colours."""
+    is_own = mode not in style.MODE_COLOURS and mode not in _IDLE_MODES
+    width = style.MODE_WIDTHS.get(mode, 1.2)
+    return {"color": colours.get(mode, style.GREY), "lw": width, "ls": "--" if is_own else "-"}
+
+
+def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: NDArray[np.float64]) -> None:
+    """Draw the vehicle's path, each stretch in its mode's colour and joined to the next."""
+    places = record.trajectory[across].to_numpy()
+    first = 0
+    for mode, points in groupby(record.trajectory["mode"]):
+        last = first + len(list(points))
+        stretch = slice(first, last + 1)
+        axes.plot(places[stretch], up[stretch], solid_capstyle="round", **_way_look(colours, mode))
+        first = last
+
+
+def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
+    """Draw what both maps have: pipeline, path, start and recharge station."""
+    x_m, y_m = np.array(record.scenario["pipeline"]["vertices_m"])[:, :2].T
+    axes.plot(x_m, y_m, **_PIPELINE, solid_capstyle="round", zorder=1.5)
+    axes.set_aspect("equal")
+    _draw_way(axes, record, colours, "x_m", record.trajectory["y_m"].to_numpy())
+    start = record.trajectory.iloc[0]
+    axes.plot(start["x_m"], start["y_m"], "o", color=style.BLACK, ms=4)
+    if battery := record.scenario.get("battery"):
+        axes.plot(battery["station_x_m"], battery["station_y_m"], "P", color=_BATTERY_COLOUR, ms=5, zorder=3)
+    axes.set(xlabel="x, east (m)", ylabel="y, north (m)")
+
+
+def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
+    """Mark events on the map; letters of events at nearly the same place stand apart."""
+    axes.set(xlim=(frame.x0, frame.x1), ylim=(frame.y0, frame.y1))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(5, integer=True))
+    points_per_m = 72.0 * axes.get_position().width * style.WIDTH_IN / frame.width
+    # In points: the lower left corners of letters, and of boxes around the markers that are drawn already.
+    markers = np.concatenate([each.get_xydata() for each in axes.lines if each.get_marker() in ("o", "v")])
+    taken = [(x - _LETTER_POINTS / 3, y - _LETTER_POINTS / 3) for x, y in markers * points_per_m]
+
+    def is_free(x: float, y: float) -> bool:
+        return all(abs(x - other[0]) > _LETTER_POINTS or abs(y - other[1]) > _LETTER_POINTS for other in taken)
+
+    for mark in marks:
+        if frame.contains(mark.x_m, mark.y_m):
+            axes.plot(mark.x_m, mark.y_m, "o", color=mark.colour, ms=3.5, mec="white", mew=0.6, zorder=4)
+            x, y = mark.x_m * points_per_m, mark.y_m * points_per_m
+            free = (offset for offset in _LETTER_OFFSETS if is_free(x + offset[0], y + offset[1]))
+            offset = next(free, _LETTER_OFFSETS[0])
+            taken.append((x + offset[0], y + offset[1]))
+            look = {"color": mark.colour, "zorder": 5, **_LETTER}
+            axes.annotate(mark.letter, (mark.x_m, mark.y_m), offset, textcoords="offset points", **look)
+
+
+def _search_frame(record: MissionRecord) -> Bbox:
+    """Return the frame around the vehicle's path until detection and the detected point, with a margin."""
+    way, metrics = record.trajectory, record.metrics
+    search = way.loc[way["t_s"] <= metrics["search_time_s"], ["x_m", "y_m"]].to_numpy(float)
+    if metrics["pipeline_found"]:
+        search = np.vstack([search, [metrics["detection_x_m"], metrics["detection_y_m"]]])
+    return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
+
+
+def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str) -> None:
+    """Mark where or when modes changed, in the colour of the new one."""
+    way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - SEA_BED_Z_M)
+    for each in adaptations(record):
+        x, y = (float(np.interp(each.t_s, way["t_s"], way[name])) for name in (across, up))
+        axes.plot(x, y, "v", color=style.BLACK, mfc=colours.get(each.after, "white"), ms=4.5, mew=0.7, zorder=3.5)
+
+
+def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
+    """Draw altitude, visibility with its thresholds, and battery."""
+    way = record.trajectory
+    altitude_m = way["z_m"].to_numpy() - SEA_BED_Z_M
+    draw_thresholds(axes, record)
+    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY)
+    _draw_way(axes, record, colours, "t_s", altitude_m)
+    _draw_adaptations(axes, record, colours, "t_s", "altitude_m")
+    tallest = max(altitude_m.max(), way["visibility_m"].max())
+    rows = _letter_rows(marks, record.end_s)
+    top = tallest * (1.06 + _LETTER_ROW_SHARE * (max(rows, default=0) + 1))
+    for mark, row in zip(marks, rows, strict=True):
+        axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        look: dict[str, Any] = {"color": mark.colour, "ha": "center", "va": "top", "bbox": box, **_LETTER}
+        axes.text(mark.t_s, top * (1.0 - _LETTER_ROW_SHARE * row), mark.letter, **look)
+    axes.set(ylim=(0.0, top), xlim=(0.0, record.end_s), xlabel="mission time (s)", ylabel="altitude; visibility (m)")
+    if (level := battery_level(record)) is not None:
+        beside = axes.twinx()
+        beside.plot(way["t_s"], 100.0 * level, color=_BATTERY_COLOUR, lw=1.0, ls="--")
+        beside.set(ylim=(0.0, 100.0 * top / tallest), yticks=(0, 25, 50, 75, 100), ylabel="battery (%)")
+        beside.grid(False)
+        beside.spines["right"].set_visible(True)
+
+
+def draw_thresholds(axes: Axes, record: MissionRecord) -> None:
+    """Draw the thresholds of the visibility over time."""
+    for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
+        axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
+
+
+def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:
+    """Return the row of each letter over time: one that would touch another goes into the next row."""
+    near_s = 0.028 * end_s
+    last_s: list[float] = []
+    rows = []
+    for mark in marks:
+        row = next((row for row, t_s in enumerate(last_s) if mark.t_s - t_s >= near_s), len(last_s))
+        last_s[row : row + 1] = [mark.t_s]
+        rows.append(row)
+    return rows
+
+
+# Over time
+
+_BAR = 0.62
+_BAR_POINTS = 6.5
+_LETTER_IN, _LINES_IN = _BAR_POINTS * 0.55 / 72.0, style.WIDTH_IN * 0.86
+"""Widths of a letter of a bar's text, about half its size, and of all lines."""
+_LISTED = 26
+"""Adaptations that are listed; a manager that changes modes all the time has more."""
+_COLUMN_LETTERS = 66
+"""Longest line of which two stand side by side."""
+_FAILED, _TASK, _ON = style.VERMILION, "#D9D9D9", "#9ECAE1"
+
+Rules = Mapping[tuple[float, str], Sequence[str]]
+"""Names of the rules that made a function be adapted, by time (s) and function."""
+_Line = tuple[str, list[tuple[Span, str, str]]]
+"""A line of the chart: its name, and spans with colour and text."""
+
+
+def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) -> style.Picture:
+    """Draw a mission over time, with the rules that caused adaptations where they are known."""
+    lines = list(_lines(record))
+    changes = adaptations(record)
+    listed = changes[:_LISTED]
+    sentences = [_sentence(each, rules.get((each.t_s, each.function), ())) for each in listed]
+    longest = max(map(len, sentences), default=0)
+    if len(changes) > _LISTED:
+        sentences.append(f"and {len(changes) - _LISTED} more")
+    columns = 2 if len(listed) > 6 and longest <= _COLUMN_LETTERS else 1
+    list_in = 0.17 * -(-len(sentences) // columns) + 0.1 if changes else 0.01
+    level = battery_level(record)
+    heights = [1.9, *([0.7] if level is not None else []), 0.24 * len(lines) + 0.2, list_in]
+    figure = style.Picture(figsize=(style.WIDTH_IN, sum(heights) + 0.9), layout="constrained")
+    panels = figure.subplots(len(heights), 1, height_ratios=heights)
+    for axes in panels[1:-1]:
+        axes.sharex(panels[0])
+    _draw_altitude(panels[0], record, listed)
+    if level is not None:
+        panels[1].plot(record.trajectory["t_s"], 100.0 * level, color=style.GREEN, lw=1.2)
+        panels[1].set(ylabel="battery (%)", ylim=(0, 105))
+    _draw_lines(panels[-2], lines)
+    for axes in panels[:-2]:
+        axes.tick_params(labelbottom=False)
+    panels[0].set_xlim(0.0, record.end_s)
+    panels[-2].set_xlabel("mission time (s)")
+    panels[0].set_title(style.text(record.name), pad=16)
+    for axes in panels[:-1]:
+        for each in changes:
+            axes.axvline(each.t_s, color="#777777", lw=0.5, ls=":", zorder=1)
+    _draw_list(panels[-1], sentences, columns)
+    return figure
+
+
+def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptation]) -> None:
+    """Draw visibility and its thresholds, the requested altitude and that flown, and letters for adaptations."""
+    way = record.trajectory
+    draw_thresholds(axes, record)
+    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY, label="visibility; dotted: thresholds")
+    times_s, asked_m = _altitude_asked_for(record)
+    axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, label="requested altitude")
+    axes.plot(way["t_s"], way["z_m"] - SEA_BED_Z_M, color=style.BLUE, lw=1.3, label="altitude flown")
+    found_s = record.metrics["search_time_s"]
+    if record.metrics["pipeline_found"]:
+        axes.axvline(found_s, color=style.BLACK, lw=0.9)
+        is_late = found_s > 0.8 * record.end_s
+        look: dict[str, Any] = {"textcoords": "offset points", "ha": "right" if is_late else "left", "fontsize": 7}
+        axes.annotate("pipeline found", (found_s, 0.0), (-3 if is_late else 3, 3), **look)
+    axes.set_ylabel("altitude; visibility (m)")
+    axes.set_ylim(0.0, axes.get_ylim()[1] * 1.12)  # with room for the letters above the curves
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=2.4)
+    last_s, row = -1e9, 0
+    for letter, each in zip(ascii_uppercase, listed, strict=False):
+        row = row + 1 if each.t_s - last_s < 0.022 * record.end_s else 0
+        last_s = each.t_s
+        place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        place |= {"ha": "center", "va": "top", "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5}}
+        axes.annotate(letter, (each.t_s, 1.0), (0, -2 - 8 * row), fontsize=7, weight="bold", **place)
+
+
+def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]]:
+    """Return the requested altitude above the sea bed over time, nan where there was none."""
+    follow_m = record.scenario.get("revision", {}).get("follow", {}).get("altitude_m", np.nan)
+    asked: dict[str, float] = {}
+    times_s, altitudes_m = [0.0], [np.nan]
+    changes = [(span.begin_s, function, span.what) for function, spans in mode_spans(record).items() for span in spans]
+    for t_s, function, mode in sorted(changes):
+        if function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
+            asked.pop(function, None)
+            if function_mode_words(function, mode) != "off":
+                spiral_m = record.search_altitudes_m.get(mode, np.nan)
+                asked[function] = spiral_m if function == GENERATE_SEARCH_PATH else follow_m
+            times_s.append(t_s)
+            altitudes_m.append(next(reversed(asked.values()), np.nan))
+    return [*times_s, record.end_s], [*altitudes_m, altitudes_m[-1]]
+
+
+def _lines(record: MissionRecord) -> Iterator[_Line]:
+    """Yield the lines of the chart: tasks, the modes of each function, and failures."""
+    yield "task", [(span, _TASK, plain(span.what)) for span in task_spans(record)]
+    colours = style.MODE_COLOURS | mode_colours(record)
+    for function, spans in mode_spans(record).items():
+        bars = []
+        for span in spans:
+            if function_mode_words(function, span.what) != "off":
+                is_moving = span.what in colours and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
+                colour = colours[span.what] if is_moving else _ON if "recover" not in span.what else style.ORANGE
+                bars.append((span, colour, function_mode_words(function, span.what)))
+        yield function_words(function), bars
+    for component, spans in sorted(failure_spans(record).items()):
+        yield component_words(component), [(span, _FAILED, "failed") for span in spans]
+
+
+def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
+    """Draw a bar for each span; its text is in it or behind it, or in a legend where there is no room for any."""
+    end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
+    letter_s = _LETTER_IN / _LINES_IN * end_s
+    named, unnamed = set[tuple[int, str]](), dict[tuple[int, str], str]()
+    for row, (_, bars) in enumerate(lines):
+        ends_s = [*(span.begin_s for span, _, _ in bars[1:]), end_s]
+        for (span, colour, text), next_s in zip(bars, ends_s, strict=True):
+            width_s = span.end_s - span.begin_s
+            axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
+            label = style.text(text)
+            if 0.0 < width_s >= len(label) * letter_s:
+                luminance = np.dot((0.299, 0.587, 0.114), to_rgb(colour))
+                ink = style.BLACK if luminance > 0.5 else "white"
+                look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "color": ink}
+                axes.text(span.begin_s + 1.0, row, label, zorder=3, clip_on=True, **look)
+            elif next_s - span.end_s > len(label) * letter_s:
+                axes.text(span.end_s + 1.0, row, label, zorder=3, va="center", fontsize=_BAR_POINTS)
+            else:
+                unnamed[row, label] = colour
+                continue
+            named.add((row, label))
+    legend = [
+        Patch(color=colour, label=f"{style.text(lines[row][0])}: {label}")
+        for (row, label), colour in unnamed.items()
+        if (row, label) not in named
+    ]
+    if legend:
+        place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+        axes.legend(handles=legend, ncols=4, handlelength=1.2, **place)
+    axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
+    axes.set_ylim(len(lines) - 0.5, -0.5)
+    axes.grid(axis="y", visible=False)
+
+
+def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:
+    """List the adaptations with what caused them."""
+    axes.set_axis_off()
+    rows = -(-len(sentences) // columns)
+    for place, text in enumerate(sentences):
+        column, row = divmod(place, rows)
+        letter = "" if place >= _LISTED else f"{ascii_uppercase[place]}  "
+        look: dict[str, Any] = {"va": "top", "fontsize": 6.5, "transform": axes.transAxes}
+        axes.text(column / columns, 1.0 - row / rows, style.text(letter + text), **look)
+
+
+def _sentence(each: Adaptation, rules: Sequence[str]) -> str:
+    before, after = (function_mode_words(each.function, mode) for mode in (each.before, each.after))
+    cause = f"rule {', '.join(rules)}" if rules else each.cause
+    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}" + (f" ({cause})" if cause else "")

@@ -34,7 +34,6 @@ CONDITION = "condition"
 """Column of a frame of missions: number of the condition, from 1."""
 NUMBER_COLUMNS = (CONDITION, "block")
 """Columns of data files that may have that number."""
-_REMEDY = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
 _RELATIVE, _ABSOLUTE = 1e-3, 0.01
 """Data files give conditions rounded; values as near as this are the same."""
 _START_M = 0.25
@@ -97,21 +96,6 @@ class Targets(Strict):
         default_factory=dict
     )
     """By metric, over all managers."""
-
-
-def read_targets(path: Path) -> Targets:
-    """Read a file of shares and of targets by condition.
-
-    Raises:
-        InputError: with file and line: it cannot be read, or is not valid.
-    """
-    return validated(read_yaml(path), Targets)
-
-
-def targets_beside(data: Path) -> Path | None:
-    """Find the file of targets of a data file: NAME.targets.yaml beside NAME.csv, if it is there."""
-    path = data.with_suffix(".targets.yaml")
-    return path if path.is_file() else None
 
 
 def count(share: Share, runs: pandas.DataFrame) -> tuple[int, int]:
@@ -224,7 +208,8 @@ class Conditions:
         places, sizes = by_manager.cumcount().to_numpy(), by_manager.transform("size").to_numpy()
         for row in np.flatnonzero(sizes % len(self))[:1]:
             own = f"{number_of(int(sizes[row]), 'mission')} of manager {managers.iloc[row]}"
-            raise InputError(f"has {own}, which {len(self)} conditions do not share evenly", remedy=_REMEDY)
+            remedy = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
+            raise InputError(f"has {own}, which {len(self)} conditions do not share evenly", remedy=remedy)
         return np.asarray(1 + places // (sizes // len(self)), dtype=np.int64)
 
 
@@ -297,20 +282,18 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
     notes = [f"{note}." for file in files for note in file.notes]
     frame = pandas.concat([file.frame for file in files], ignore_index=True)
     if conditions is not None:
+        named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
         try:
-            numbers = conditions.numbers(frame)
+            numbers = conditions.numbers(frame) if named else conditions.in_order(frame["manager"])
         except InputError as error:
-            lines = [(file.path, int(line)) for file in files for line in file.frame.index]
-            raise line_error(*lines[int(error.place or 0)], error.problem, error.remedy) from None
-        if numbers is None:
-            try:
-                numbers = conditions.in_order(frame["manager"])
-            except InputError as error:
-                names = ", ".join(str(file.path) for file in files)
-                raise InputError(error.problem, file=names, remedy=error.remedy) from None
+            if error.place is not None:
+                lines = [(file.path, int(line)) for file in files for line in file.frame.index]
+                raise line_error(*lines[int(error.place)], error.problem, error.remedy) from None
+            names = ", ".join(str(file.path) for file in files)
+            raise InputError(error.problem, file=names, remedy=error.remedy) from None
+        if not named:
             each = f"one after the other, as many missions of each of the {len(conditions)}"
             notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}.")
-        named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
         frame = frame.drop(columns=named).assign(**{CONDITION: numbers})
     return RealRuns(tuple(files), frame, tuple(notes))
 
@@ -328,18 +311,16 @@ def matched(
     Raises:
         InputError: nothing is swept, or the real missions are not of these conditions.
     """
-    place = "real missions"
     if not names:
         remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
     points = simulated[list(names)].drop_duplicates()
     conditions = Conditions(tuple(names), tuple(points.itertuples(index=False, name=None)))
+    is_named = not real.columns.intersection([*names, *NUMBER_COLUMNS]).empty
     try:
-        numbers = conditions.numbers(real)
-        if numbers is None:
-            numbers = conditions.in_order(real["manager"])
+        numbers = conditions.numbers(real) if is_named else conditions.in_order(real["manager"])
     except InputError as error:
-        raise InputError(error.problem, place=place, remedy=error.remedy) from None
+        raise InputError(error.problem, place="real missions", remedy=error.remedy) from None
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
     real, simulated = real.assign(**{CONDITION: numbers}), simulated.assign(**{CONDITION: own})
     for name in real.columns.intersection(simulated.columns).intersection(["initial_x_m", "initial_y_m"]):
@@ -348,7 +329,7 @@ def matched(
             worst = int((off - off.median()).abs().to_numpy().argmax())
             problem = f"{name} is {off.iloc[worst]:+.2f} m from the simulated one under condition {off.index[worst]}"
             remedy = f"under the others it is {off.median():+.2f} m: simulate the same conditions, in the same order"
-            raise InputError(problem, place=place, remedy=remedy)
+            raise InputError(problem, place="real missions", remedy=remedy)
     return real, simulated
 
 
@@ -383,13 +364,14 @@ def published_for(scenario: str | Path) -> Path | None:
 def targets_of(
     real: RealRuns, given: Path | None = None
 ) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
-    """Read the shares and limits of the file given, or of those beside the data, and name the files.
+    """Read the shares and limits of the file given, or of NAME.targets.yaml beside each NAME.csv, and name the files.
 
     Raises:
         InputError: with file and line: one cannot be read, or is not valid.
     """
-    paths = (given,) if given else tuple(path for file in real.files if (path := targets_beside(file.path)))
-    lists = [read_targets(path) for path in paths]
+    beside = [file.path.with_suffix(".targets.yaml") for file in real.files]
+    paths = (given,) if given else tuple(path for path in beside if path.is_file())
+    lists = [validated(read_yaml(path), Targets) for path in paths]
     shares: list[Share] = []
     for each in lists:
         shares += [share for share in each.shares if share not in shares]

@@ -162,9 +162,10 @@ def key_words(key: str) -> str:
 
 
 def value_words(value: object) -> str:
-    """Return what a value that is a word, such as a mode or a file, is called in a figure."""
-    text = str(value)
-    return mode_words(text) if text else "none"
+    """Return what a value, such as a number, a mode or a file, is called in a figure."""
+    if isinstance(value, int | float):
+        return f"{value:g}"
+    return mode_words(str(value)) if str(value) else "none"
 
 
 def mode_words(mode: str) -> str:
@@ -188,11 +189,6 @@ def function_mode_words(function: str, mode: str) -> str:
 def component_words(component: str) -> str:
     """Return what a component is called."""
     return plain(component.removeprefix("c_"))
-
-
-def is_off(function: str, mode: str) -> bool:
-    """Whether a function does nothing in a mode."""
-    return function_mode_words(function, mode) == "off"
 
 
 def plain(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Compare simulated missions with real ones: samples, pairs of managers, clusters, targets, and the tables."""
+"""Compare simulated missions with real ones: samples, pairs, clusters, targets, and the paper's table (SEAMS 2023)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from pathlib import Path
 from string import Formatter
 from types import MappingProxyType
 from typing import Any
@@ -19,12 +20,15 @@ from suave_des.arguments import plain_arguments
 from suave_des.draws import Streams
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import interval_names, mean_of, percent, share_of, std_of
-from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME
+from suave_des.records.metrics import DISTANCE, FOUND, METRICS, PAPER_METRICS, REACTION_TIME, SEARCH_TIME
+from suave_des.records.missions import in_papers_order
+from suave_des.records.runs import read_runs
+from suave_des.resources import find
 from suave_des.results import statistics
 from suave_des.results.comparison import Row
-from suave_des.results.real import CONDITION, ConditionLimits, Region, Share, count
+from suave_des.results.real import CONDITION, PAPERS_RUNS, ConditionLimits, Region, Share, count
 from suave_des.results.statistics import SIGNIFICANCE, Sample
-from suave_des.tables import Table, rows_of
+from suave_des.tables import Table, markdown_text, rows_of
 
 COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
@@ -35,13 +39,8 @@ _SIGNIFICANT_DIGITS = 8
 _Generators = Callable[[str], np.random.Generator]
 """Makes the random generator of each use of chance, by a name of its own: no result depends on the others."""
 
-TABLES = {
-    "cells": "validation.csv",
-    "pairs": "validation_pairs.csv",
-    "shares": "validation_shares.csv",
-    "conditions": "validation_conditions.csv",
-    "targets": "validation_targets.csv",
-}
+TABLES = {"cells": "validation.csv"}
+TABLES |= {name: f"validation_{name}.csv" for name in ("pairs", "shares", "conditions", "targets")}
 """Names of the tables, and their files."""
 JSON_FILE = "validation.json"
 FILES = (*TABLES.values(), JSON_FILE)
@@ -168,13 +167,8 @@ def validate(
     }
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
     cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")  # so narrow that none needs it
-    pairs = pandas.DataFrame(
-        [
-            _pair(pair, metric, [samples[metric, name] for name in pair], generators)
-            for metric in COMPARED
-            for pair in combinations([manager for each, manager in samples if each == metric], 2)
-        ]
-    )
+    of_one_metric = [both for both in combinations(samples, 2) if both[0][0] == both[1][0]]
+    pairs = pandas.DataFrame([_pair(*both, [samples[each] for each in both], generators) for both in of_one_metric])
     counted = compare_shares(shares, real, ours, managers)
     conditions = compare_conditions(real, ours, managers, COMPARED)
     required = _targets(cells, pairs, counted, over_conditions(conditions), limits)
@@ -198,10 +192,8 @@ def _with_common_limit(sides: list[pandas.DataFrame]) -> tuple[float | None, lis
         return None, sides
     longest_s = [side.loc[is_found, SEARCH_TIME].max() for side, is_found in zip(sides, found, strict=True)]
     limit_s = max(float(numbers.median()), *map(float, longest_s))
-    both = zip(sides, found, strict=True)
-    return limit_s, [
-        side.assign(**{SEARCH_TIME: side[SEARCH_TIME].where(is_found, limit_s)}) for side, is_found in both
-    ]
+    times_s = [side[SEARCH_TIME].where(is_found, limit_s) for side, is_found in zip(sides, found, strict=True)]
+    return limit_s, [side.assign(**{SEARCH_TIME: each}) for side, each in zip(sides, times_s, strict=True)]
 
 
 def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
@@ -236,9 +228,10 @@ def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Gen
 
 
 def _pair(
-    pair: tuple[str, str], metric: str, samples: Sequence[Sequence[Sample]], generators: _Generators
+    one: tuple[str, str], other: tuple[str, str], samples: Sequence[Sequence[Sample]], generators: _Generators
 ) -> dict[str, Any]:
-    """Compare two managers, each with its real and its simulated sample."""
+    """Compare two managers in a metric (metric, manager), each with its real and its simulated sample."""
+    metric, pair = one[0], (one[1], other[1])
     (real, ours), (other_real, other_ours) = samples
     test = statistics.mann_whitney(real, other_real, "asymptotic")  # as the subsamples below are tested
     sign = statistics.sign_of(test["p_less"], test["p_greater"])
@@ -247,21 +240,13 @@ def _pair(
     effects = test["effect"], statistics.mann_whitney(ours, other_ours, "asymptotic")["effect"]
     superiority = [1.0 - each if is_less_better else each for each in effects]
     ps = (test["p_less"], test["p_greater"])[:: 1 if is_less_better else -1]
-    return {
-        "first": pair[0],
-        "second": pair[1],
-        "metric": metric,
-        "published_superiority": superiority[0],
-        "simulated_superiority": superiority[1],
-        "published_first_better_p": ps[0],
-        "published_second_better_p": ps[1],
-        "published_better": {0: "neither", 1: pair[is_less_better], -1: pair[not is_less_better]}[sign],
-        "first_n": sizes[0],
-        "second_n": sizes[1],
-        "agreement": statistics.agreement(
-            sign, (ours, other_ours), sizes, generators(f"subsamples/{pair[0]}/{pair[1]}/{metric}")
-        ),
-    }
+    better = {0: "neither", 1: pair[is_less_better], -1: pair[not is_less_better]}[sign]
+    rng = generators(f"subsamples/{pair[0]}/{pair[1]}/{metric}")
+    row: dict[str, Any] = {"first": pair[0], "second": pair[1], "metric": metric}
+    row |= dict(zip(("published_superiority", "simulated_superiority"), superiority, strict=True))
+    row |= dict(zip(("published_first_better_p", "published_second_better_p"), ps, strict=True))
+    row |= {"published_better": better, "first_n": sizes[0], "second_n": sizes[1]}
+    return row | {"agreement": statistics.agreement(sign, (ours, other_ours), sizes, rng)}
 
 
 # Shares
@@ -276,13 +261,13 @@ def compare_shares(
         A row for each, with the columns of validation_shares.csv.
     """
     sides = published, simulated
-    where: Region = {"pipeline_found": ((1.0, 1.0),)}
-    found = [Share(manager=manager, name="pipeline found", where=where) for manager in managers]
-    counted = [(share, [count(share, side) for side in sides]) for share in shares if share.manager in managers]
-    of_found = [(share, [count(share, side[side[FOUND].notna()]) for side in sides]) for share in found]
-    counted += [(share, counts) for share, counts in of_found if all(n for _, n in counts)]
+    known, where = Region({"pipeline_found": ((0.0, 1.0),)}), Region({"pipeline_found": ((1.0, 1.0),)})
+    found = [Share(manager=manager, name="pipeline found", among=known, where=where) for manager in managers]
     rows = []
-    for share, counts in counted:
+    for share in (*(each for each in shares if each.manager in managers), *found):
+        counts = [count(share, side) for side in sides]
+        if share in found and not all(n for _, n in counts):
+            continue
         low, high = share.target or (math.nan, math.nan)
         row: dict[str, Any] = {"manager": share.manager, "name": share.name}
         for side, (number, n) in zip(("published", "simulated"), counts, strict=True):
@@ -401,8 +386,6 @@ def _targets(
 
 _VERDICTS: Mapping[bool | None, str] = {True: "met", False: "NOT MET", None: "not judged"}
 _KINDS = {
-    "mean": "mean",
-    "std": "std",
     "ks": "KS p",
     "conclusion": "agreeing conclusions",
     "condition_median": "difference within conditions",
@@ -425,7 +408,7 @@ class _Cells(Formatter):
 _CELLS = _Cells()
 
 
-def table_of(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
+def _table(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
     """Fill a table with the rows of a frame; each column has a heading and a template for its cells."""
     rows = []
     for row in rows_of(frame):
@@ -435,8 +418,7 @@ def table_of(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[st
     return Table([heading for heading, _ in columns], rows, title, align)
 
 
-def interval_column(name: str, style: str) -> tuple[str, str]:
-    """Return the heading and the template of a column with the interval of a value."""
+def _interval(name: str, style: str) -> tuple[str, str]:
     low, high = interval_names(name)
     return "95% interval", f"{{{low}:{style}}} to {{{high}:{style}}}"
 
@@ -449,19 +431,19 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
         for side in ("published", "simulated")
     ]
     title = f"Samples: {runs}, then simulated"
-    yield table_of(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
+    yield _table(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
     title = f"Simulated compared with {runs} (difference = simulated - {real})"
     columns: tuple[tuple[str, str], ...] = (
         ("difference of means", "{difference_of_means:+.2f}"),
-        interval_column("difference_of_means", "+.1f"),
+        _interval("difference_of_means", "+.1f"),
     )
-    ratio = ("std ratio", "{std_ratio:.2f}"), interval_column("std_ratio", ".2f")
+    ratio = ("std ratio", "{std_ratio:.2f}"), _interval("std_ratio", ".2f")
     tests = ("KS p", "{ks_p:p}"), ("AD p", "{ad_p:p}")
-    yield table_of(validation.cells, title, "ll", *head, *columns, *ratio, *tests)
+    yield _table(validation.cells, title, "ll", *head, *columns, *ratio, *tests)
     title = f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size"
     columns = (head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}"))
     better = (f"{real}: better", "{published_better}"), ("simulated agrees", "{agreement:share}")
-    yield table_of(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better)
+    yield _table(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better)
     title = f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)"
     shares = validation.shares
     if len(shares):
@@ -470,20 +452,132 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
         shares = shares.assign(mark=np.where((share < low) | (share > high), "*", ""))
     count = real, "{published_count:.0f} of {published_n:.0f}"
     simulated = ("simulated", "{simulated_share:share}"), ("", "{mark}")
-    interval = interval_column("published_share", ".0%")
-    yield table_of(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
+    interval = _interval("published_share", ".0%")
+    yield _table(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
     stds = (f"std: {real}", "{real_std:.2f}"), ("simulated", "{simulated_std:.2f}"), ("ratio", "{std_ratio:.2f}")
     columns = (*head, ("|difference|", "{difference:.2f}"), *stds)
     within = over_conditions(validation.conditions)
-    yield table_of(within, "Within conditions: medians over the conditions", "ll", *columns)
+    yield _table(within, "Within conditions: medians over the conditions", "ll", *columns)
     rows = [_target(each) for each in rows_of(validation.targets)]
     yield Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl")
 
 
 def _target(each: Row) -> tuple[str, ...]:
     kind = each["kind"]
-    what = f"{METRICS[each['what']].brief}: {_KINDS[kind]}" if kind in _KINDS else each["what"]
+    what = each["what"] if kind == "share" else f"{METRICS[each['what']].brief}: {_KINDS.get(kind, kind)}"
     style = ".0%" if kind in ("conclusion", "share") else ".2f"
     value, low, high = (_CELLS.format_field(each[name], style) for name in ("value", "low", "high"))
     must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else ""
     return each["subject"], what, value, must_be, _VERDICTS[each["met"]]
+
+
+# The paper's table
+
+_CLAIMS = {SEARCH_TIME: "find the pipeline sooner", DISTANCE: "inspect more of it"}
+"""What the paper says that metacontrol does on average."""
+MARK = "*"
+"""Marks figures outside the paper's interval."""
+PAPER_FILE = "paper_table.md"
+
+
+@dataclass(frozen=True)
+class PaperComparison:
+    """The paper's table beside ours.
+
+    Attributes:
+        figures: a row for each manager, in the order of the paper's table, metric, and statistic ("mean" or "std"): the
+            paper's figure (paper) and ours (here), each with the ends of its 95% interval, and difference (here -
+            paper); nan where there are too few missions; mark: whether ours is outside the paper's interval.
+        published: missions behind the paper's table.
+        ours: missions of the same managers.
+    """
+
+    figures: pandas.DataFrame
+    published: pandas.DataFrame
+    ours: pandas.DataFrame
+
+    @property
+    def managers(self) -> list[str]:
+        """In the order of the paper's table."""
+        return list(self.figures["manager"].unique())
+
+    def table(self, metric: str = "") -> Table:
+        """Return the figures as text; of one metric or, with a column for that, of both."""
+        own = self.figures[self.figures["metric"].isin([metric] if metric else PAPER_METRICS)]
+        names = [("manager", "{manager}"), ("metric", "{of.heading}"), ("", "{statistic}")]
+        columns = ("paper", "{paper:.2f}"), _interval("paper", ".1f"), ("here", "{here:.2f}")
+        apart = _interval("here", ".1f"), ("difference", "{difference:+.2f}"), ("", "{mark}")
+        if metric:
+            del names[1]
+        title = METRICS[metric].heading if metric else ""
+        return _table(own, title, f"{'l' * len(names)}rrrrrl", *names, *columns, *apart)
+
+    def remarks(self) -> Iterator[str]:
+        """Summarise the comparison in sentences."""
+        sizes = self._sizes(self.published), self._sizes(self.ours)
+        yield f"Paper: {sizes[0]}. Here: {sizes[1]}. Difference = here - paper."
+        marks = self.figures.loc[self.figures["here"].notna(), "mark"]
+        inside = int((marks == "").sum())
+        rest = f"; those marked {MARK} do not" if inside < len(marks) else ""
+        yield f"{inside} of {number_of(len(marks), 'figure')} lie in the 95% intervals of the paper's{rest}."
+        yield (
+            "Intervals: Student's t for means; chi-square for standard deviations, a rough guide only, because it"
+            " assumes normally distributed values."
+        )
+        for metric, claim in _CLAIMS.items():
+            yield from self._claim(metric, claim)
+
+    def _sizes(self, missions: pandas.DataFrame) -> str:
+        """Describe the number of missions of each manager."""
+        sizes = {name: int((missions["manager"] == name).sum()) for name in self.managers}
+        if len(set(sizes.values())) == 1:
+            return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager"
+        return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
+
+    def _claim(self, metric: str, claim: str) -> Iterator[str]:
+        """Say whether metacontrol is the best on average, as in the paper, and what could be chance."""
+        samples = {name: each for name in self.managers if len(each := sample(self.ours, name, metric))}
+        best = samples.pop("metacontrol", None)
+        if best is None or not samples:
+            return
+        apart = {name: statistics.difference_interval(best, other) for name, other in samples.items()}
+        chance = [name for name, each in apart.items() if not each.has_interval or each.contains(0.0)]
+        rest = f"; the difference from {' and '.join(chance)} could be chance" if chance else ""
+        if all(METRICS[metric].better * each.value > 0.0 for each in apart.values()):
+            verb, _, what = claim.partition(" ")
+            yield f"As in the paper, metacontrol {verb}s {what} than the others, on average{rest}."
+        else:
+            yield f"Unlike in the paper, metacontrol does not {claim} than all others, on average{rest}."
+
+    def markdown(self) -> str:
+        """Write the comparison as Markdown."""
+        return "\n\n".join([self.table().markdown(), *map(markdown_text, self.remarks())]) + "\n"
+
+
+@plain_arguments
+def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) -> PaperComparison:
+    """Compare the missions of a campaign with published figures.
+
+    Args:
+        runs: with the columns of runs.csv.
+        published: file of the published runs; managers that are not in it are left out. None: the shipped one.
+
+    Raises:
+        InputError: the file cannot be read, or has fewer than two runs of a manager.
+    """
+    theirs = in_papers_order(read_runs(published or find(PAPERS_RUNS, "scenarios/published")).frame)
+    rows = []
+    for manager in theirs["manager"].unique():
+        for metric in PAPER_METRICS:
+            for statistic, estimate in (("mean", mean_of), ("std", std_of)):
+                paper, here = (estimate(sample(side, manager, metric).tolist()) for side in (theirs, runs))
+                if not paper.has_interval:
+                    problem = f"fewer than two published runs of {manager}"
+                    raise InputError(problem, place=metric, remedy="an interval needs two or more")
+                row = {"manager": manager, "metric": metric, "statistic": statistic}
+                rows.append(row | paper.columns("paper") | here.columns("here"))
+    figures = pandas.DataFrame(rows)
+    ours = figures["here"].astype(float)
+    is_outside = (ours < figures["paper_ci95_low"]) | (ours > figures["paper_ci95_high"])
+    figures = figures.assign(difference=ours - figures["paper"], mark=np.where(is_outside, MARK, ""))
+    return PaperComparison(figures, theirs, runs)

@@ -7,8 +7,16 @@ from typing import Any
 
 import pandas
 
+from suave_des.results.compare import CampaignFrame
 from suave_des.results.comparison import Comparison
 from suave_des.tables import rows_of
+
+
+def compare_frame(frame: pandas.DataFrame, **choices: Any) -> Comparison:
+    """Compare the missions of a frame."""
+    missions = CampaignFrame(frame)
+    missions.attrs |= frame.attrs
+    return missions.compare(**choices)
 
 
 def rows(frame: pandas.DataFrame) -> list[Any]:

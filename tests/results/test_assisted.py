@@ -11,7 +11,8 @@ import pytest
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.records.missions import missions_in
-from suave_des.results.assisted import AssistedComparison, assisted_mean, compare_assisted
+from suave_des.results.compare import assisted_mean, compare_assisted
+from suave_des.results.comparison import AssistedComparison
 from suave_des.results.groups import grouped
 from tests.helpers.command import command_here
 

@@ -13,9 +13,9 @@ from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.resources import find
-from suave_des.results.compare import Choices, compare_folders, compare_frame
+from suave_des.results.compare import Choices, compare_folders
 from suave_des.results.comparison import Comparison
-from tests.helpers.compared import difference, interval, row, rows
+from tests.helpers.compared import compare_frame, difference, interval, row, rows
 
 PUBLISHED = find("seams2023_runs.csv", "scenarios/published")
 MANAGERS = ("none", "random", "metacontrol")

@@ -26,8 +26,7 @@ from suave_des.results.figures import (
     write_picture,
 )
 from suave_des.results.groups import grouped
-from suave_des.results.mission import adaptations, failure_spans, mode_spans
-from suave_des.results.mission_figures import draw_map, draw_timeline
+from suave_des.results.mission import adaptations, draw_map, draw_timeline, failure_spans, mode_spans
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.estimates import mean_of, std_of
-from suave_des.results.compare import compare_folders, compare_frame
+from suave_des.results.compare import compare_folders
 from suave_des.results.comparison import Comparison
-from tests.helpers.compared import interval, rows
+from tests.helpers.compared import compare_frame, interval, rows
 
 PUBLISHED = Path(__file__).parents[2] / "scenarios" / "published"
 

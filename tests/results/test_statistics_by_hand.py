@@ -10,7 +10,6 @@ from scipy import stats
 
 from suave_des.estimates import mean_of, share_of
 from suave_des.results import statistics
-from suave_des.results.compare import compare_frame
 from suave_des.results.comparison import Comparison
 from suave_des.results.statistics import (
     agreement,
@@ -22,7 +21,7 @@ from suave_des.results.statistics import (
     ratio_interval,
     sign_of,
 )
-from tests.helpers.compared import rows
+from tests.helpers.compared import compare_frame, rows
 
 
 def frame(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> pandas.DataFrame:

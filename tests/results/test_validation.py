@@ -9,12 +9,14 @@ import pytest
 from analysis.split_check import split_check
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
-from suave_des.results.real import Share, read_targets, targets_beside
+from suave_des.results.real import Share, Targets
 from suave_des.results.validation import JSON_FILE, TABLES, validate
+from suave_des.scenario.yamlfile import read_yaml, validated
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 MANAGERS = ("none", "random", "metacontrol")
 DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+TARGETS = DATA.with_suffix(".targets.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +32,7 @@ def like_published(published):
 
 @pytest.fixture(scope="module")
 def good(published, like_published, few_resamples):
-    return validate(published, like_published, MANAGERS, shares=read_targets(targets_beside(DATA)).shares)
+    return validate(published, like_published, MANAGERS, shares=validated(read_yaml(TARGETS), Targets).shares)
 
 
 def missed(validation):
@@ -75,12 +77,12 @@ def test_a_cluster_that_is_averaged_away_fails_its_share(published, like_publish
     smeared = like_published.copy()
     late = smeared["search_time_s"].between(120, 130) & (smeared["manager"] == "metacontrol")
     smeared.loc[late, "search_time_s"] += 12
-    found = missed(validate(published, smeared, MANAGERS, shares=read_targets(targets_beside(DATA)).shares))
+    found = missed(validate(published, smeared, MANAGERS, shares=validated(read_yaml(TARGETS), Targets).shares))
     assert ("share", "metacontrol", "found at 120 to 130 s") in found
 
 
 def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(published, like_published, good):
-    shares = read_targets(targets_beside(DATA)).shares
+    shares = validated(read_yaml(TARGETS), Targets).shares
     assert validate(published, like_published, MANAGERS, shares=shares).texts({}) == good.texts({})
     alone = validate(published, like_published, ("none",))
     pandas.testing.assert_frame_equal(alone.cells, good.cells.query("manager == 'none'").reset_index(drop=True))

@@ -9,8 +9,9 @@ from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
-from suave_des.results.real import Conditions, Share, count, read_real, read_targets, targets_beside
+from suave_des.results.real import Conditions, Share, Targets, count, read_real
 from suave_des.results.validation import balanced, compare_conditions, compare_shares, over_conditions, validate
+from suave_des.scenario.yamlfile import read_yaml, validated
 
 OWN = "manager,search_time_s,distance_inspected_m"
 FAILURE = "thruster_events.0.time_s"
@@ -115,7 +116,7 @@ def test_a_file_of_targets_may_limit_differences_within_conditions(write, limit,
     path = write("real.targets.yaml", f"conditions: {{search_time_s: {{median_difference: {limit}, std_ratio: 2}}}}\n")
     real = missions("bt", {1: [50, 52, 54], 2: [120, 121, 122]})
     simulated = missions("bt", {1: [55, 55, 55], 2: [119, 119, 119]})
-    found = validate(real, simulated, ["bt"], limits=read_targets(path).conditions)
+    found = validate(real, simulated, ["bt"], limits=validated(read_yaml(path), Targets).conditions)
     targets = found.targets.set_index("kind")["met"]
     assert targets["condition_median"] is met
     assert targets["condition_std"]
@@ -199,7 +200,7 @@ def test_no_mission_has_no_share(missions):
 def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their_targets():
     data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
     published = read_runs(data).frame
-    shares = read_targets(targets_beside(data)).shares
+    shares = validated(read_yaml(data.with_suffix(".targets.yaml")), Targets).shares
     assert {share.manager for share in shares} == {"none", "random", "metacontrol"}
     with_target = [share for share in shares if share.target is not None]
     assert len(with_target) == 4
@@ -230,7 +231,7 @@ ENTRY = "shares:\n  - manager: none\n    name: early\n    where: {where}\n"
 def test_a_wrong_file_of_shares_is_named_with_its_line(write, content, place, problem):
     path = write("runs.targets.yaml", content)
     with pytest.raises(InputError) as caught:
-        read_targets(path)
+        validated(read_yaml(path), Targets)
     assert caught.value.file == str(path)
     assert caught.value.place.startswith(place)
     assert problem in caught.value.problem
