@@ -415,7 +415,7 @@ def _table(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str,
         values = {"of": METRICS.get(row.get("metric", "")), **row}
         cells = (_CELLS.vformat(template, (), values) for _, template in columns)
         rows.append(tuple("" if cell == " to " else cell for cell in cells))
-    return Table([heading for heading, _ in columns], rows, title, align)
+    return Table(tuple(heading for heading, _ in columns), rows, title, align)
 
 
 def _interval(name: str, style: str) -> tuple[str, str]:
