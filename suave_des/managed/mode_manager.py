@@ -23,7 +23,6 @@ class ModeManager:
     happens. The effect comes later; effects on one function keep the order of their requests.
 
     Attributes:
-        nodes: the function's nodes, by function name.
         latency_s: draws the time from a request to its effect.
         listeners: each is called with function and mode when a mode has taken effect.
         adaptation_listeners: each is called at each adaptation with function, mode before and mode requested.

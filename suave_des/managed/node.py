@@ -83,7 +83,6 @@ class SetPointSender:
 
     Attributes:
         vehicle: the vehicle whose autopilot receives the set-points.
-        env: the mission's clock.
         frame_error_m: where the vehicle goes minus where the node sends it, in x, y and z: its frame is a bit off.
         loss_probability: probability that a message is lost.
         stream: random stream that decides which messages are lost; not needed if none can be.

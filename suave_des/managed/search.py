@@ -31,7 +31,7 @@ def spiral(
     """Generate way-points of the spiral.
 
     Args:
-        step, radius_m: the spiral's step counter and its radius before the first of them.
+        step, radius_m: step counter and radius before the first of them.
         altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees from there.
         form: angle from one way-point to the next, rad, and the tangent of half the camera's field of view.
         centre_m: x and y of its centre.

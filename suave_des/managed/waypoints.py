@@ -40,9 +40,6 @@ class WaypointFunction(FunctionNode):
     It ticks from `start_at` until `stop`, or until no way-point is left. Between two ticks at which it acts, the
     vehicle flies through the way-points that were queued; then the last of them is reached (SEND), or one is not
     reached in time (RESEND).
-
-    Attributes:
-        sender: the connection to the autopilot.
     """
 
     sender: SetPointSender

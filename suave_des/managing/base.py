@@ -107,11 +107,8 @@ class System:
     def change_mode(self, function: str, mode: str) -> bool:
         """Request a mode of a function, which takes effect after the scenario's latency.
 
-        Args:
-            function, mode: names, as in the modes file.
-
         Returns:
-            Whether there is such a mode.
+            Whether the modes file has such a mode.
         """
         return self.modes.change_mode(function, mode)
 
@@ -145,10 +142,7 @@ class System:
         return self._open_knowledge()
 
     def file(self, name: str) -> Path:
-        """Find an input file of the manager's on this machine.
-
-        Args:
-            name: as `ManagingSubsystem.input_files` gave it.
+        """Find an input file on this machine by its name, as `ManagingSubsystem.input_files` gave it.
 
         Raises:
             InputError: it was not given there.

@@ -86,11 +86,7 @@ class Behaviour:
 
 
 class BehaviourTree(ManagingSubsystem):
-    """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected.
-
-    Attributes:
-        root: of the tree.
-    """
+    """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected."""
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 

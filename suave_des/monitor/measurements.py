@@ -79,9 +79,7 @@ class Measurements:
     A monitor that repeats an unchanged value of a signal reports nothing new: only those that differ are in the table.
 
     Attributes:
-        key: name of the quality attribute.
-        signal: its true value over mission time.
-        timing: when it is measured.
+        signal: the true value over mission time.
         times_s: when the values are published, ascending.
         values: these values.
         arrays: both as arrays, for vectorised computations.
@@ -109,10 +107,7 @@ class Measurements:
         """Measure a signal over a mission.
 
         Args:
-            key: name of the quality attribute.
-            signal: what is measured.
-            duration_s: of the mission.
-            timing: when it is measured.
+            key, signal, duration_s, timing: what is measured in a mission of that time, and when.
             time_step_s: the signal is read at mission time rounded down to multiples of this; 0: at mission time.
             noise: draws the error of one measurement; None: there is none.
             is_lost: says which messages are not published; None: all are.
@@ -179,10 +174,7 @@ class BatteryMeasurements(Measurements):
 
     Args:
         discharge_time_s: time from full to empty.
-        timing: when it is measured.
-        duration_s: of the mission.
-        noise: draws the error of one measurement; None: there is none.
-        is_lost: says which messages are not published; None: all are.
+        timing, duration_s, noise, is_lost: as of `Measurements.of`.
 
     Attributes:
         recharges: how often it was recharged so far.

@@ -62,8 +62,7 @@ def start_monitors(
     """Start the monitors of what has subscribers.
 
     Args:
-        env: the mission's clock.
-        bus: where they publish.
+        env, bus: when and where they publish.
         measurements: of quality attributes; for lookups they need no monitor.
         states: what is published once a second, by kind and key.
         detected: the event of the pipeline's first sight; its value is the index of the point seen.

@@ -21,10 +21,7 @@ class Thrusters:
     """The health of the vehicle's thrusters.
 
     Attributes:
-        env: the mission's clock.
-        vehicle: the vehicle.
         revision: says how they fail, and from when on.
-        log: adds an event to the mission's record.
         unrecoverable: thrusters that f_maintain_motion cannot recover at present.
         working: mission times at which thrusters failed or recovered, and how many worked from then on.
     """
@@ -80,10 +77,8 @@ def thruster_monitor(
     come one period apart, in list order, and a later one waits for the one before it.
 
     Args:
-        thrusters: what happens to them.
-        bus: where it is published.
-        schedule: the events.
-        timing: when the monitor checks.
+        thrusters, bus: to whom it happens, and where it is published.
+        schedule, timing: the events with their times, s, and when the monitor checks.
         after_previous: whether each time counts from the event before it (revision 2023) or from the start (1.5).
         is_lost: says whether the message at a mission time is not published; None: each one is.
     """

@@ -38,8 +38,6 @@ class ManagerHost:
     an earlier one changed nothing is left out.
 
     Attributes:
-        manager_type: the manager's class.
-        system: what the manager sees and can do.
         bus: where the diagnostics come from that the manager subscribes to.
         error_of: makes the error that ends the mission from one that the manager raised.
         learned, training: see `ManagingSubsystem.recall`.
