@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from suave_des.arguments import check_names, plain_arguments
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
-from suave_des.campaign.inputs import check_inputs, provenance
+from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.progress import OnProgress, is_live, shown
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range
 from suave_des.files import check_output_folder, make_output_folder, write_files
@@ -103,11 +103,10 @@ def run_mission(
     name = name_of(manager)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs([loaded], [name], replacements)
-    made = {} if folder is None else provenance(loaded, inputs, command)
     result = Simulator(loaded).run(name, run, seed, record=True)
     if folder is not None:
         make_output_folder(folder)
-        files = mission_files(result, loaded, made)
+        files = mission_files(result, loaded, inputs, command)
         write_files(folder, files, stale=(KNOWLEDGE_FILE,))
     return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
 

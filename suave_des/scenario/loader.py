@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -69,46 +68,6 @@ class LoadedScenario:
             return found
         problem = f"manager {manager} reads this file, and it is not there"
         raise InputError(problem, file=name, remedy="give its path from here, or from the scenario that names it")
-
-    def located(self, error: InputError) -> InputError:
-        """Add file and line to an error about a name that only the ontology could check.
-
-        Args:
-            error: with a place such as "values.NAME" or "disabled_rules.NAME"; any other comes back as it is.
-        """
-        part, _, name = (error.place or "").partition(".")
-        if error.file is not None or part not in ("values", "disabled_rules"):
-            return error
-        in_file = self.layer.data.get("knowledge", {}).get(part, ())
-        if name not in in_file:
-            return InputError(error.problem, place="--disable-rule", remedy=error.remedy)
-        key = name if part == "values" else in_file.index(name)
-        return self.layer.error(error.problem, ("knowledge", part, key), error.remedy)
-
-
-def declared_files(
-    scenarios: Iterable[LoadedScenario], input_files: Mapping[str, Callable[[Mapping[str, Any]], Collection[str]]]
-) -> dict[tuple[str, str], Path]:
-    """Locate the files that managers declare by their hooks `input_files`, by manager and their names as given.
-
-    Raises:
-        InputError: a file does not exist, or a class does not declare a list of names.
-    """
-    found = dict[tuple[str, str], Path]()
-    for loaded, (manager, hook) in product(scenarios, input_files.items()):
-        try:
-            names = hook(loaded.manager_settings(manager))
-            names = names if isinstance(names, str) else tuple(names)
-        except InputError:
-            raise
-        except Exception as error:
-            problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
-            raise InputError(problem, remedy="give its settings by --manager-option NAME=VALUE") from error
-        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-            problem = f"manager {manager}: input_files gave {shown(names)}"
-            raise InputError(problem, remedy="return a list of file names as text")
-        found |= {(manager, name): loaded.manager_file(manager, name) for name in names}
-    return found
 
 
 class Replacements(TypedDict, total=False):

@@ -18,8 +18,8 @@ from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.draws import Draws
 from suave_des.learned import read_learned
 from suave_des.managed.follow import InspectionPath
-from suave_des.registry import custom_functions, manager_class
-from suave_des.scenario.loader import LoadedScenario, declared_files
+from suave_des.registry import custom_functions, declared_files, manager_class
+from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Calibration, CurrentWaveDescription, VehicleDescription
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
@@ -78,7 +78,7 @@ class PreparedScenario:
             InputError: a file is not there; or the training result cannot be read, or has something else in it.
         """
         if manager not in self._manager_inputs:
-            found = declared_files([self.loaded], {manager: manager_class(manager).input_files})
+            found = declared_files([self.loaded], {manager: manager_class(manager)})
             declared = {name: path for (_, name), path in found.items()}
             name = None if self.training is not None else self.loaded.manager_settings(manager).get("learned")
             path = None if name is None else self.loaded.manager_file(manager, str(name))
