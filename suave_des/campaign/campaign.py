@@ -54,11 +54,7 @@ _MORE_MANAGERS = "for other managers, run a campaign with the same seed into ano
 
 
 class CampaignInterrupted(KeyboardInterrupt):
-    """Ctrl-C during a campaign; finished missions are kept.
-
-    Attributes:
-        result: with the missions that were finished.
-    """
+    """Ctrl-C during a campaign; finished missions are kept, and `result` has them."""
 
     def __init__(self, result: CampaignResult) -> None:
         self.result = result
@@ -135,10 +131,9 @@ def resume_campaign(
 
 
 def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: bool = False) -> MissionRunner:
-    """Open a campaign, to run missions of it again.
+    """Open the campaign in a folder, to run missions of it again.
 
     Args:
-        folder: the campaign's.
         managers: those whose missions are wanted, which the user has named himself; empty: all.
         confirmed: whether all code that the folder names may run, see `check_trusted`.
 
@@ -183,12 +178,7 @@ def _run(
 ) -> CampaignResult:
     """Check a campaign, run the missions that are not done yet, and write the files.
 
-    Args:
-        stack: of what is to be closed at the end.
-        spec: the whole specification.
-        read: reads the campaign.
-        store: of the campaign that is resumed; None: it is new.
-        on_progress: as of run_campaign.
+    `stack` closes at the end what is opened here; `store` is that of a campaign that is resumed, None for a new one.
     """
     executor: Executor = in_process
     spec.check()

@@ -67,9 +67,7 @@ class Campaign:
     Attributes:
         request: what was given of the specification; the rest is left to the campaign file.
         spec: the whole specification.
-        loaded: its scenario.
         variation: what differs between its missions besides manager and run.
-        file: the campaign file, if there is one.
         inputs: SHA-256 of the ensemble's file by its name, if there is one.
     """
 
@@ -197,9 +195,9 @@ class MissionRunner:
             return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point), []
         except MissionTimeOut as error:
             place = place_of(error)
-            return self.campaign.failed(key, f"{self.campaign.too_long}{place and f', in {place}'}", error.time_s)[
-                1
-            ], []
+            cause = f"{self.campaign.too_long}{place and f', in {place}'}"
+            _, failure = self.campaign.failed(key, cause, error.time_s)
+            return failure, []
         drawn = (result.drawn[path] for path in variation.drawn)
         members = () if member is None else (member,)
         row = (*row_of(result.metrics), *map(cell_of, values.values()), *drawn, *members, *further_of(result))

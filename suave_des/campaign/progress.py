@@ -20,13 +20,7 @@ _FIRST_TIME = "(the first run compiles the mission code: 20 to 60 s)"
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of a campaign, in missions.
-
-    Attributes:
-        done: missions that are done, failed ones among them.
-        failed: missions that failed.
-        total: missions that are to be done.
-    """
+    """Progress of a campaign, in missions; those done include those that failed."""
 
     done: int
     failed: int
@@ -43,13 +37,9 @@ def is_live() -> bool:
 
 @contextmanager
 def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
-    """Show progress until the end, and yield what to give to a campaign as on_progress.
+    """Show progress of the campaign `label` until the end, and yield what to give to it as on_progress.
 
     Elsewhere than on a terminal or in a notebook it is lines, the first after 10 s and then every 30 s.
-
-    Args:
-        label: name of the campaign.
-        quiet: show nothing.
     """
     if quiet or sys.stderr is None:
         yield None
@@ -94,7 +84,6 @@ class _Text:
         """Missions that were done at first, as those of a campaign that is resumed."""
 
     def take(self, progress: Progress) -> None:
-        """Take the current progress; called for each mission or chunk."""
         self._last_s = time.monotonic()
         if self.progress is None:
             self._first_s, self._before = self._last_s, progress.done
@@ -102,7 +91,6 @@ class _Text:
 
     @property
     def age_s(self) -> float:
-        """Time since it began."""
         return time.monotonic() - self._began_s
 
     def line(self) -> str:

@@ -48,7 +48,6 @@ class CampaignResult:
     """The result of a campaign.
 
     Attributes:
-        campaign: what was run.
         done: number of missions that have a row.
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv, by column: for each manager, at each point that was reached.

@@ -160,11 +160,7 @@ class CampaignSpec(CampaignKeys):
 
 
 def check_range(what: str, number: int, least: int, greatest: int) -> None:
-    """Check that a number lies between two others.
-
-    Raises:
-        InputError: it does not.
-    """
+    """Raise an InputError if a number is no whole one, or not between two others, which are allowed, too."""
     if not (isinstance(number, Integral) and least <= number <= greatest):
         raise InputError(f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}")
 
@@ -177,7 +173,6 @@ class CampaignFile:
     """A campaign file that was read.
 
     Attributes:
-        settings: its content.
         scenario: path of the scenario that it names.
         inputs: SHA-256 of the file, by its name as shown to the user.
         layer: has the lines.

@@ -43,7 +43,6 @@ _ENSEMBLE_LIMIT_BYTES = 5_000_000
 _CHECKED_POINTS = 300
 """Of sweeps with more values, so many are checked before anything runs."""
 
-
 Values = Annotated[tuple[Any, ...], Field(min_length=1)]
 
 
@@ -99,12 +98,7 @@ class Sweep(Strict):
 
 
 def plain(given: Any) -> Any:
-    """Convert what a caller gives to the form of a file: arrays, ranges, series and the like become lists, paths text.
-
-    Example:
-        >>> plain({"thruster_events.0.time_s": range(20, 50, 10)})
-        {'thruster_events.0.time_s': [20, 30, 40]}
-    """
+    """Convert what a caller gives to the form of a file: arrays, ranges and series become lists, paths text."""
     if isinstance(given, Path):
         return str(given)
     if isinstance(given, Mapping):
@@ -123,13 +117,7 @@ def cell_of(value: Any) -> str | int | float | bool | None:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Parameter sets that fit real missions equally well.
-
-    Attributes:
-        name: of its file.
-        paths: key paths in the scenario.
-        members: values of the parameters, one tuple for each member.
-    """
+    """Parameter sets that fit real missions equally well: for each member the values at the key paths of scenarios."""
 
     name: str
     paths: tuple[str, ...]
@@ -149,7 +137,6 @@ class Variation:
     """Differences between a campaign's missions.
 
     Attributes:
-        sweep: what differs between points.
         drawn: names of what each run draws, by the key path in the scenario.
         paths: key path in the scenario of each parameter that is swept, by its name as given.
         runs_per_draw: number of consecutive runs that share a draw.
@@ -346,10 +333,8 @@ def differences(
     becomes narrower, down to that.
 
     Args:
-        rows: rows of runs.csv, ordered by their keys.
-        managers: names, in the campaign's order.
+        rows: of runs.csv, ordered by their keys.
         metrics: place in a row, by column.
-        ensemble: parameter sets of the campaign.
         runs_sharing_draw: consecutive runs that share a draw, and so are not independent.
     """
     for point, group in groupby(rows, key=lambda each: each[0].point):

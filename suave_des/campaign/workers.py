@@ -60,10 +60,6 @@ class LocalWorkers:
 
     Each worker has a pipe of its own. A ProcessPoolExecutor has one for all, and waits for ever when a worker is killed
     while it writes into it; it does not say either which chunk a worker had.
-
-    Args:
-        managers: whose missions are run.
-        workers: number of processes; they start at once, and import what they need.
     """
 
     def __init__(self, managers: Sequence[str], workers: int) -> None:
@@ -72,7 +68,7 @@ class LocalWorkers:
         self._again = deque[_Task]()
 
     def __enter__(self) -> Self:
-        """Start the workers."""
+        """Start the workers, which import what they need before there is work for them."""
         with ExitStack() as stack:
             stack.push(self.__exit__)
             for _ in range(self._size):
@@ -164,14 +160,10 @@ class LocalWorkers:
 
 @dataclass
 class _Worker:
-    """One worker process.
+    """One worker process, with this end of its pipe, which ends when the process does, and its tasks, oldest first.
 
-    Attributes:
-        process: the process.
-        connection: this end of its pipe; it ends when the process does.
-        tasks: what it was given, oldest first.
-        due_s: when it has to be done with the oldest; infinite if it has nothing to do.
-        is_overdue: whether it was killed because it took too long.
+    `due_s` is when it has to be done with the oldest, infinite if it has nothing to do; once that is over, it is killed
+    as overdue.
     """
 
     process: SpawnProcess

@@ -25,10 +25,10 @@ from suave_des.cli.options import (
     Scenario,
     Seed,
     Trusted,
+    any_scenario,
     check_no_use,
     command_line,
     complete_managers,
-    complete_scenarios,
     flags,
     manager_options,
 )
@@ -54,19 +54,10 @@ _MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
 
 
 def campaign(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A scenario or campaign file, or a shipped scenario.",
-            show_default=False,
-            autocompletion=complete_scenarios,
-        ),
-    ] = None,
+    scenario: Annotated[str | None, any_scenario(False)] = None,
     *,
     options: Annotated[
-        Given,
-        Fields(("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite")),
+        Given, Fields(("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite"))
     ],
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
@@ -236,13 +227,9 @@ def run(
         ),
     ],
     manager: Annotated[
-        str,
-        typer.Option(metavar="NAME", help="A manager's name, or module:Class.", autocompletion=complete_managers),
+        str, typer.Option(metavar="NAME", help="A manager's name, or module:Class.", autocompletion=complete_managers)
     ] = "metacontrol",
-    run_number: Annotated[
-        int,
-        typer.Option("--run", metavar="K", help="Run number."),
-    ] = 1,
+    run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run number.")] = 1,
     manager_option: ManagerOptions = None,
     files: Files,
 ) -> None:

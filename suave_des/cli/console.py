@@ -94,11 +94,7 @@ def print_table(console: Console, table: Table) -> None:
 
 
 def check_written(out: Path | None) -> None:
-    """Check that a result can be written into a file, if one is given.
-
-    Raises:
-        InputError: its ending is none of a table, or it cannot be written.
-    """
+    """Raise an InputError if a file is given whose ending is none of a table, or that cannot be written."""
     if out is not None:
         if out.suffix.lower() not in _ENDINGS:
             problem = f"expected a table, got {out.suffix or 'a file without an ending'}"

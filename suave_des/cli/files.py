@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from suave_des.cli.console import output, plain, print_table
-from suave_des.cli.options import Overwrite
+from suave_des.cli.options import Overwrite, any_scenario
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, make_output_folder, write_files
 from suave_des.resources import shipped_folder
@@ -46,15 +46,11 @@ def schema() -> None:
 
 
 def import_config(
-    files: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE...", help="The exemplar's files, in any order."),
-    ],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="The exemplar's files, in any order.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
     campaign: Annotated[Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")] = None,
     revision: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Revision of the files, if they fit several."),
+        str | None, typer.Option(metavar="NAME", help="Revision of the files, if they fit several.")
     ] = None,
     runner_seed: Annotated[
         int | None,
@@ -86,13 +82,10 @@ def import_config(
 
 
 def export_config(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A scenario or campaign file, or a shipped scenario.")
-    ],
+    scenario: Annotated[str, any_scenario(False)],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml.")],
     revision: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Revision that is to read them.", show_default="the scenario's"),
+        str | None, typer.Option(metavar="NAME", help="Revision that is to read them.", show_default="the scenario's")
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args, get_type_hints
 
 import typer
 from typer.core import TyperGroup
@@ -47,15 +47,10 @@ complete_scenarios = _completing(_scenarios)
 Scenario = Annotated[
     str,
     typer.Argument(
-        metavar="SCENARIO",
-        help="A scenario file, or the name of a shipped one.",
-        autocompletion=complete_scenarios,
+        metavar="SCENARIO", help="A scenario file, or the name of a shipped one.", autocompletion=complete_scenarios
     ),
 ]
-Results = Annotated[
-    list[Path],
-    typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files."),
-]
+Results = Annotated[list[Path], typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files.")]
 Modes = Annotated[
     Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file instead of the scenario's.")
 ]
@@ -63,18 +58,19 @@ Reasoner = Annotated[
     str | None, typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow).")
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
-SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", show_default="1")]
-"""For commands that may go on from results, which have a seed already."""
 Workers = Annotated[int, typer.Option("--workers", help="Worker processes.")]
-ManagersInData = Annotated[
-    str | None,
-    typer.Option(
-        "--managers",
-        metavar="NAME,...",
-        help="Managers to compare; by default all in the data.",
-        autocompletion=complete_managers,
-    ),
-]
+
+
+def any_scenario(default: str | Literal[False]) -> Any:
+    """Declare the argument SCENARIO of commands that take campaign files, too, with its default as shown."""
+    text = "A scenario or campaign file, or a shipped scenario."
+    return typer.Argument(metavar="SCENARIO", help=text, show_default=default, autocompletion=complete_scenarios)
+
+
+def managers_option(text: str, default: str | None = None, *names: str) -> Any:
+    """Declare an option that takes names of managers, with its help, its default as shown, and further names for it."""
+    settings: dict[str, Any] = {"metavar": "NAME,...", "help": text, "autocompletion": complete_managers}
+    return typer.Option("--managers", *names, show_default=default or True, **settings)
 
 
 def _quiet(context: typer.Context, value: bool) -> bool:
@@ -171,20 +167,15 @@ class KnowledgeFiles:
     """Options that replace or add to a scenario's ontologies, rules and values; a field is named as its option."""
 
     ontology: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="FILE", help="Ontology instead of the scenario's; repeatable."),
+        list[Path] | None, typer.Option(metavar="FILE", help="Ontology instead of the scenario's; repeatable.")
     ] = None
     rules: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="FILE", help="File of rules to add to the ontologies; repeatable."),
+        list[Path] | None, typer.Option(metavar="FILE", help="File of rules to add to the ontologies; repeatable.")
     ] = None
     disable_rule: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Rule to disable; repeatable.")] = None
     set: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="KEY=VALUE",
-            help="Value of the scenario, such as visibility.period_s=40; repeatable.",
-        ),
+        typer.Option(metavar="KEY=VALUE", help="Value of the scenario, such as visibility.period_s=40; repeatable."),
     ] = None
 
     @property
@@ -228,16 +219,7 @@ def _is_given(value: object) -> bool:
 
 
 def check_no_use(options: Mapping[str, object], where: str, remedy: str = "remove it") -> None:
-    """Check that none of some options is given.
-
-    Args:
-        options: options with their values, such as those of `Files.given`.
-        where: the use of the command, such as "with --resume".
-        remedy: what to do instead.
-
-    Raises:
-        InputError: one is given.
-    """
+    """Raise an InputError if one of some options, with their values, is given where it has no use."""
     for option, value in options.items():
         if _is_given(value):
             raise InputError(f"{option} cannot be used {where}", remedy=remedy)
@@ -263,11 +245,7 @@ def key_and_value(word: str, option: str) -> tuple[str, Any]:
 
 
 def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Settings by manager and key.
-
-    Args:
-        words: as given, MANAGER.KEY=VALUE or KEY=VALUE.
-        managers: names of the managers that missions are run with.
+    """Read settings, given as MANAGER.KEY=VALUE or KEY=VALUE, of the managers that missions are run with, by key.
 
     Raises:
         InputError: a word has another form, or is for no manager of these.
@@ -351,12 +329,7 @@ def name_of(command: Command) -> str:
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn each parameter of a command that is a dataclass, or has `Fields`, into options, one for each field.
-
-    Example:
-        def show(scenario: Scenario, *, files: Files) -> None:
-            loaded = load_scenario(scenario, **files.replacements)
-    """
+    """Turn each parameter of a command that is a dataclass, or has `Fields`, into options, one for each field."""
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
     last: list[inspect.Parameter] = []

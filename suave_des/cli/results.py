@@ -14,16 +14,15 @@ from suave_des.cli.options import (
     Fields,
     Files,
     Given,
-    ManagersInData,
     Quiet,
     Results,
-    SeedIfNew,
     Trusted,
+    any_scenario,
     check_no_use,
     comma_separated,
     command_line,
-    complete_managers,
     complete_metrics,
+    managers_option,
 )
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, check_output_folder, make_output_folder, write_files
@@ -43,15 +42,7 @@ FigureKind = Literal["auto", "map", "timeline", "distributions", "differences", 
 
 def compare(
     results: Results,
-    managers: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="Only these, in this order.",
-            show_default="all",
-            autocompletion=complete_managers,
-        ),
-    ] = None,
+    managers: Annotated[str | None, managers_option("Only these, in this order.", "all")] = None,
     against: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Compare all others with this one only.", show_default="each with each"),
@@ -78,16 +69,11 @@ def compare(
         typer.Option(metavar="DIR", help="DIR... are real missions; this is a campaign under the same conditions."),
     ] = None,
     population: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many such conditions."),
+        Path | None, typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many such conditions.")
     ] = None,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = "table",
     out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write .csv, .json, .md or .tex instead of printing.",
-        ),
+        Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
     ] = None,
 ) -> None:
     """Compare managers by their results.
@@ -126,14 +112,7 @@ _RUNS = 2000
 
 
 def validate(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A scenario or campaign file, or a shipped scenario.",
-            show_default=DEFAULT_SCENARIO,
-        ),
-    ] = None,
+    scenario: Annotated[str | None, any_scenario(DEFAULT_SCENARIO)] = None,
     data: Annotated[
         list[str] | None,
         typer.Option(
@@ -146,7 +125,7 @@ def validate(
     runs_file: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Compare this runs.csv; nothing is simulated.")
     ] = None,
-    managers: ManagersInData = None,
+    managers: Annotated[str | None, managers_option("Managers to compare; by default all in the data.")] = None,
     targets: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."),
@@ -296,31 +275,17 @@ Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser
 def replay(
     folders: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="[DIR]...",
-            help="Folder of a campaign, or one or two of run.",
-            show_default=False,
-        ),
+        typer.Argument(metavar="[DIR]...", help="Folder of a campaign, or one or two of run.", show_default=False),
     ] = None,
     scenario: Annotated[
         str | None, typer.Option(metavar="SCENARIO", help="Run missions of this scenario instead.")
     ] = None,
     managers: Annotated[
         str | None,
-        typer.Option(
-            "--managers",
-            "--manager",
-            metavar="NAME,...",
-            help="One or two managers.",
-            autocompletion=complete_managers,
-            show_default="metacontrol; for a campaign, the last and the first",
-        ),
+        managers_option("One or two managers.", "metacontrol; for a campaign, the last and the first", "--manager"),
     ] = None,
-    run_number: Annotated[
-        int | None,
-        typer.Option("--run", metavar="K", help="Run number.", show_default="1"),
-    ] = None,
-    seed: SeedIfNew = None,
+    run_number: Annotated[int | None, typer.Option("--run", metavar="K", help="Run number.", show_default="1")] = None,
+    seed: Annotated[int | None, typer.Option(help="Random seed.", show_default="1")] = None,
     point: Annotated[
         int | None, typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default="0")
     ] = None,
@@ -366,8 +331,7 @@ def replay(
 def report(
     results: Results,
     paths: Annotated[
-        int,
-        typer.Option(metavar="N", min=0, max=100, help="Runs of each manager with path and timeline."),
+        int, typer.Option(metavar="N", min=0, max=100, help="Runs of each manager with path and timeline.")
     ] = 12,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR")

@@ -39,7 +39,6 @@ class Session:
     """One mission at a time, as JSON.
 
     Args:
-        simulator: of the scenario.
         run, seed: of the first mission.
         real_time_factor: seconds of mission time per second; 0: time advances only when a client requests it.
     """
@@ -239,12 +238,9 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class Server(ThreadingHTTPServer):
-    """Serves a session at an address until it is shut down.
+    """Serves a session at an address until it is shut down; 127.0.0.1 is reachable only from this machine.
 
-    Args:
-        session: answers the requests.
-        host: address to listen on; 127.0.0.1 is reachable only from this machine.
-        port: 0: any that is free.
+    Port 0 is any that is free.
 
     Raises:
         InputError: the address cannot be used.

@@ -37,15 +37,9 @@ def compressed(text: str) -> str:
 
 
 def page(name: str, title: str, content: Any, styles: Sequence[str], scripts: Sequence[str], **blocks: str) -> str:
-    """Put a page together.
+    """Put a page together of assets by their names, a title as plain text, and plain data.
 
-    Args:
-        name: of its HTML among the assets.
-        title: of the page, as plain text.
-        content: its data, plain.
-        styles: names of CSS files among the assets.
-        scripts: names of JavaScript files among the assets; they share one scope, in this order.
-        blocks: further text that its HTML has a place for.
+    The scripts share one scope, in their order; `blocks` are further text that the HTML has a place for.
     """
     return Template(asset(name)).substitute(
         title=html.escape(title),

@@ -40,10 +40,8 @@ def missions_in(
     """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which are run again.
 
     Args:
-        folders: of missions or of campaigns.
         managers: names; none: of a campaign the last and the first.
-        run: number of the run, the same for all.
-        point: of a campaign's sweep.
+        run, point: of a campaign, the same for all managers.
         confirmed: whether the code of managers and functions that a campaign's folder names may run.
 
     Raises:

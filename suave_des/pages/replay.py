@@ -23,11 +23,7 @@ SCRIPTS: Final = ("common.js", "scene_geometry.js", "scene.js", "views.js", "pan
 
 
 def replay_page(missions: Sequence[MissionRecord]) -> str:
-    """Make the page that plays missions side by side, all at the same mission time.
-
-    Args:
-        missions: of scenarios with the same pipeline; two of the same seed and run had the same random numbers.
-    """
+    """Make the page that plays missions over the same pipeline side by side, all at the same mission time."""
     scenario = missions[0].settings
     battery = scenario.battery
     content = {

@@ -55,9 +55,8 @@ class MissionRecord:
 
     Attributes:
         metrics: its row of runs.csv, by column.
-        scenario: the scenario in full, as mission.json has it.
-        events: events.csv.
-        trajectory: trajectory.csv; mode is empty before the first one, other missing values are nan.
+        scenario: in full, as mission.json has it.
+        events, trajectory: the files' content; mode is empty before the first one, other missing values are nan.
         knowledge: the states that its manager reasoned about.
         inputs: SHA-256 of each input file, by its name.
         search_altitudes_m: of the search modes.
@@ -121,13 +120,7 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
 def mission_files(
     result: MissionResult, loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
 ) -> dict[str, str]:
-    """Return the content of each file of a mission's folder, by its name.
-
-    Args:
-        result: of the mission, with its record.
-        loaded: the mission's scenario.
-        inputs, command: as of provenance.
-    """
+    """Return the content of each file of a mission's folder by its name; `inputs` and `command` as of provenance."""
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
     points = ((*cells(point), *(point.further[name] for name in further)) for point in result.trajectory)
     mission = {
@@ -216,15 +209,7 @@ def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
 
 @dataclass(frozen=True)
 class RecordedMission:
-    """A mission's knowledge states.
-
-    Attributes:
-        manager: its managing subsystem.
-        point: of the campaign's sweep.
-        run: number of the run.
-        scenario: the campaign's, with the values that are swept as at this point.
-        records: in order of time.
-    """
+    """A mission's knowledge states in order of time, and its scenario, with what is swept as at its point."""
 
     manager: str
     point: int
@@ -235,18 +220,15 @@ class RecordedMission:
 
 def knowledge_text(records: Iterable[KnowledgeRecord]) -> str:
     """Return the content of knowledge.jsonl."""
-    return "".join(
-        json.dumps(
-            {
-                "t_s": round(record.t_s, 6),
-                **_plain(record.state),
-                "measurements": {name: format(value, "f") for name, value in record.state.measurements},
-            },
-            ensure_ascii=False,
-        )
-        + "\n"
+    cycles = (
+        {
+            "t_s": round(record.t_s, 6),
+            **_plain(record.state),
+            "measurements": {name: format(value, "f") for name, value in record.state.measurements},
+        }
         for record in records
     )
+    return "".join(json.dumps(cycle, ensure_ascii=False) + "\n" for cycle in cycles)
 
 
 def scenario_line(scenario: Scenario) -> str:
@@ -259,12 +241,7 @@ def mission_line(
 ) -> str:
     """Return the line of a mission in knowledge_states.jsonl; it depends on the mission alone.
 
-    Args:
-        manager: name of the managing subsystem.
-        point: of the sweep.
-        run: number of the run.
-        records: of the mission's result.
-        swept: value at this point of each key path in the scenario that is swept.
+    `swept` has the value at this point of each key path in the scenario that is swept.
     """
     states: dict[tuple[Any, ...], int] = {}
     table: list[dict[str, Any]] = []

@@ -50,10 +50,7 @@ def missions_in(source: Source) -> Missions:
 
 
 def read_missions(paths: Sequence[Path]) -> Missions:
-    """Read the missions in folders or files of results.
-
-    Args:
-        paths: folders of `suave-des campaign` or `reproduce`, of the exemplar's own CSV files, or single CSV files.
+    """Read the missions in folders of `suave-des campaign` or `reproduce`, or of the exemplar, or in single CSV files.
 
     Raises:
         InputError: one of them has no missions, is given twice, or has missions of several scenarios.

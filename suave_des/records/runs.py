@@ -95,7 +95,6 @@ class Runs:
     """Missions read from a file.
 
     Attributes:
-        path: the file.
         frame: a row for each mission, indexed by its line, with COLUMNS and the further columns of the file.
         sha256: of the file's bytes, in hex.
         averages: lines of rows that are averages rather than missions, and were left out.
@@ -189,13 +188,7 @@ def is_foreign(content: Content) -> bool:
 
 
 class _Cells:
-    """The cells of a file, as text.
-
-    Args:
-        path: of the file.
-        text: its cells, indexed by line.
-        layout: names of its columns, by ours.
-    """
+    """The cells of a file, as text and indexed by line, with the names of its columns by ours."""
 
     def __init__(self, path: Path, text: pandas.DataFrame, layout: Mapping[str, str]) -> None:
         ours = {column: name for name, column in layout.items()}
@@ -205,11 +198,7 @@ class _Cells:
         self.names = {name: column for column, name in ours.items()}
 
     def missions(self) -> pandas.DataFrame:
-        """Check and convert the cells; a frame with COLUMNS and the further ones, indexed by line.
-
-        Raises:
-            InputError: with the line, here and in all methods: about a row.
-        """
+        """Check and convert the cells; a frame with COLUMNS and the further ones. Errors name the line."""
         is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
         managers = [str(name) for name in self.text["manager"].unique()]
         are_names = {name: len(name.split()) == 1 or bool(name and not is_own) for name in managers}
@@ -298,10 +287,7 @@ _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct",
 def exemplar_names(managers: Sequence[str], revision: str, *, has_battery: bool) -> Iterator[tuple[str, str]]:
     """Yield for each manager the name of its file, without .csv, and that of its missions in it.
 
-    Args:
-        managers: of a campaign.
-        revision: the scenario's.
-        has_battery: whether the scenario has one: then the mission is the extended one, except for manager bt.
+    The mission of a scenario with a battery is the extended one, except for manager bt.
     """
     used: set[str] = set()
     for number, manager in enumerate(managers, 1):
@@ -327,14 +313,11 @@ def suave_pieces(
     """Yield the content of a file of the exemplar's, piece by piece.
 
     Seconds and metres are as in runs.csv, but for durations, which are whole seconds, and for the search time when the
-    pipeline was not found.
+    pipeline was not found. All revisions but 2023 have the current layout, that of 1.5.
 
     Args:
-        revision: the scenario's; all but 2023 have the current layout, that of 1.5.
         name: of the missions in it.
-        columns: of runs.csv.
-        rows: rows of runs.csv, each with the number of its mission in the campaign, from 1.
-        time_limit_s: of the missions.
+        columns, rows: of runs.csv, each row with the number of its mission in the campaign, from 1.
     """
     layout = _LAYOUT_2023 if revision == "2023" else _LAYOUT_1_5
 

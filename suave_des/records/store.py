@@ -48,11 +48,8 @@ _ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
 class MissionKey(NamedTuple):
     """The key of a mission in a campaign; missions and their rows are in the order of their keys.
 
-    Attributes:
-        point: number of the sweep's point, from 0; 0 without a sweep.
-        manager: index among the campaign's managers, from 0.
-        run: number of the run, from 1; runs with the same number use common random numbers under all managers and at
-            all points.
+    A sweep's points and a campaign's managers are counted from 0, runs from 1. Runs with the same number use common
+    random numbers under all managers and at all points.
     """
 
     point: int
@@ -64,13 +61,10 @@ class MissionFailure(NamedTuple):
     """A mission that has no row.
 
     Attributes:
-        manager: name of the managing subsystem.
-        run: number of the run.
         time_s: mission time at which it happened; None if that is not known.
         cause: the manager's exception, or another reason why the mission ended.
         lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
             resumed campaign runs such a mission once more.
-        point: of the sweep, from 0.
     """
 
     manager: str
@@ -97,12 +91,6 @@ class StoreError(SuaveDesError):
 
 class Store:
     """The outcomes of one campaign; no other process can use the file until it is closed.
-
-    Example:
-        store = Store(folder / STORE_FILE)
-        store.begin({"seed": 1})
-        store.append([(MissionKey(0, 0, 1), row)])
-        store.close()
 
     Args:
         path: the database's file, made if it is missing; None for a temporary one, which is gone when this is closed.
@@ -190,10 +178,7 @@ class Store:
             raise _damaged(self.path, error) from error
 
     def begin(self, about: Mapping[str, Any]) -> None:
-        """Begin a new campaign, in place of an earlier one; atomic.
-
-        Args:
-            about: what is noted about the campaign, by name.
+        """Begin a new campaign, in place of an earlier one, with what is noted about it, by name; atomic.
 
         Raises:
             StoreError: it cannot be written.
@@ -295,10 +280,9 @@ class Store:
                 yield from (_outcome(record, self.path) for record in db.execute(_ALL))
 
     def close(self, *, keep_empty: bool = True) -> None:
-        """Leave one plain file behind. If the disk is full, a journal stays beside it, from which the rest is read.
+        """Leave one plain file behind, without outcomes only if `keep_empty`.
 
-        Args:
-            keep_empty: whether the file stays if it has no outcomes.
+        If the disk is full, a journal stays beside it, from which the rest is read.
         """
         is_empty = False
         with suppress(SuaveDesError):
@@ -321,12 +305,6 @@ def has_campaign(folder: Path) -> bool:
     return (folder / STORE_FILE).is_file() and _looked_up(folder, "SELECT count(*) FROM sqlite_master") != 0
 
 
-def stored_identity(folder: Path) -> str | None:
-    """Return the identity of the campaign whose missions are kept in a folder; None where it cannot be read."""
-    found = _looked_up(folder, "SELECT json_extract(value, '$') FROM about WHERE name = 'identity'")
-    return None if found is None else str(found)
-
-
 def _looked_up(folder: Path, query: str) -> Any:
     """Return the one value that a query finds in a folder's store; None where it cannot be read."""
     try:
@@ -337,7 +315,6 @@ def _looked_up(folder: Path, query: str) -> Any:
 
 
 def _own(path: Path) -> list[Path]:
-    """Return the files of a database."""
     return [path.with_name(f"{path.name}{ending}") for ending in _ENDINGS]
 
 
@@ -381,13 +358,10 @@ def _crc(*parts: object) -> int:
 
 
 def write_campaign(folder: Path, files: Mapping[str, Content], suave: Mapping[str, Content]) -> None:
-    """Write a campaign's files into its folder, replacing those of an earlier campaign.
+    """Write a campaign's files, of those in FILES, into its folder, replacing those of an earlier campaign.
 
-    Args:
-        folder: an existing one.
-        files: content by name, names of FILES.
-        suave: content of the exemplar's own files by name. They have a folder to themselves: scripts that take all
-            files of a folder, or compare one file with the others, find what they expect.
+    The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a folder, or compare
+    one file with the others, find what they expect.
 
     Raises:
         InputError: they cannot be written; nothing half-written stays.
@@ -403,11 +377,7 @@ def write_campaign(folder: Path, files: Mapping[str, Content], suave: Mapping[st
 
 
 def check_no_link(folder: Path) -> None:
-    """Check that the folder of the exemplar's files is no link, whose files would be replaced.
-
-    Raises:
-        InputError: it is.
-    """
+    """Raise an InputError if the folder of the exemplar's files is a link, whose files would be replaced."""
     if (folder / SUAVE_FOLDER).is_symlink():
         raise InputError("is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it")
 
@@ -436,7 +406,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read, or is of another campaign than the missions that are kept beside it.
     """
-    kept = stored_identity(folder)
+    kept = _looked_up(folder, "SELECT json_extract(value, '$') FROM about WHERE name = 'identity'")
     path = folder / MANIFEST_FILE
     found = read_json(path) if path.exists() else None
     manifest = found if isinstance(found, dict) else {}
