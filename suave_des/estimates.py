@@ -9,7 +9,7 @@ from typing import Literal
 
 CONFIDENCE = 0.95
 STUDENT, CHI_SQUARE = "Student's t", "chi-square"
-WILSON, CLOPPER_PEARSON = "Wilson", "Clopper and Pearson"
+_OF_SHARES = {"wilson": "Wilson", "exact": "Clopper and Pearson"}
 _NAN = math.nan
 
 Interval = tuple[float, float]
@@ -144,11 +144,10 @@ def share_of(count: int, n: int, method: Literal["wilson", "exact"] = "wilson") 
     """Estimate a share, with its interval by Wilson (1927), or by Clopper and Pearson (1934)."""
     from scipy.stats import binomtest
 
-    name = WILSON if method == "wilson" else CLOPPER_PEARSON
     if n == 0:
-        return Estimate(method=name)
+        return Estimate(method=_OF_SHARES[method])
     low, high = binomtest(count, n).proportion_ci(CONFIDENCE, method=method)
-    return Estimate(count / n, float(low), float(high), name)
+    return Estimate(count / n, float(low), float(high), _OF_SHARES[method])
 
 
 def t_quantile(freedom: int) -> float:

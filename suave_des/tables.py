@@ -79,11 +79,7 @@ class Table:
         return widths
 
     def text(self, width: int | None = None) -> str:
-        """Write the table for a terminal, without its title.
-
-        Args:
-            width: that it should have at most: longer texts are broken into lines; None: any.
-        """
+        """Write the table for a terminal, without its title; texts that make it wider are broken into lines."""
         return "\n".join(self._lines(self._widths(width)))
 
     def _lines(self, widths: Sequence[int]) -> Iterator[str]:
@@ -166,7 +162,12 @@ class Section(NamedTuple):
 
 
 class Written(ABC):
-    """Results that are written as text, Markdown, LaTeX, CSV and JSON."""
+    """Results that are written as text, Markdown, LaTeX, CSV and JSON.
+
+    Attributes:
+        conclusion: of all of them, in a sentence.
+        notes: what a reader should know about the data.
+    """
 
     conclusion: str
     notes: tuple[str, ...]

@@ -33,9 +33,6 @@ class FurtherMetrics:
     """Notes during the mission what further metrics are computed from, and computes them.
 
     Attributes:
-        env: the mission's clock.
-        scenario: says which are asked for.
-        thrusters: with the vehicle, which has the track.
         measurements: what monitors have measured, by quality attribute.
         adaptations_undone: changes of a function's mode that were soon taken back: indecision.
         reasoning_time_s: mission time that the reasoner took in cycles that changed a function design.
@@ -154,7 +151,6 @@ def covered_area_m2(track: Array, last_row: int, visibility_m: Array, sea_bed_z_
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
         last_row: the last row that counts.
         visibility_m: measured water visibility at each row, shape (rows,); nan while there is no measurement.
-        sea_bed_z_m: height of the sea bed.
         view_tangent: tangent of half the camera's field of view.
     """
     rows = track[: last_row + 1 : _ROW_STEP, :3]

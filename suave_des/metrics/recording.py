@@ -26,10 +26,7 @@ TRAJECTORY_PERIOD_ROWS = 4
 class Recorder:
     """Records what happens, if it is enabled; missions of a campaign are not recorded.
 
-    Attributes:
-        env: the mission's clock.
-        enabled: whether anything is kept.
-        metric: has the values of quality attributes whose crossing is kept.
+    Of quality attributes it keeps the crossings of the metric's values.
     """
 
     env: simpy.Environment

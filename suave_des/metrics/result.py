@@ -27,13 +27,9 @@ class MissionMetrics:
     """One row of runs.csv.
 
     Attributes:
-        scenario: name of the scenario.
-        manager: name of the managing subsystem.
         run: number of the run, from 1; runs with the same number use common random numbers under all managers.
-        seed: seed of the campaign.
         initial_x_m: where the vehicle was put, world frame; likewise initial_y_m.
         mission_duration_s: mission time at the end.
-        pipeline_found: whether the search ended with the pipeline found.
         search_time_s: as the revision counts it; the time limit (rev 1.5: the duration) if not found.
         distance_inspected_m: as published last by the follow function.
         mean_reaction_time_s: mean of the completed reactions, none if there was none.
@@ -63,8 +59,7 @@ class MissionMetrics:
 class TrajectoryPoint:
     """Where the vehicle was at a mission time, and under which mode; visibility as measured, none before that.
 
-    Attributes:
-        further: what else was measured, such as battery_level, by its column; of each point the same.
+    What else was measured, such as battery_level, is in `further` by its column; of each point the same.
     """
 
     t_s: float

@@ -146,8 +146,7 @@ def compare_groups(
     groups: Groups, *, against: str | None = None, half_widths: Sequence[str] = (), unpaired: bool = False
 ) -> Comparison:
     """Compare groups of missions; see compare_folders."""
-    for module in ("statsmodels", "lifelines"):
-        statistics.library(module)
+    statistics.library()
     widths, pairs = _half_widths(half_widths, groups.metrics), _pairs(groups.groups, against)
     found = [
         _difference(*pair, metric, widths.get(metric.name), unpaired=unpaired)
@@ -219,15 +218,7 @@ def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
 def _difference(
     first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool
 ) -> dict[str, Any]:
-    """Estimate the difference of two groups in one metric, and test it.
-
-    Args:
-        first: the one group.
-        second: the other.
-        metric: to compare.
-        half_width: of the interval for which the number of runs is given; None: as usual for the metric.
-        unpaired: whether runs are taken as independent though they share their random numbers.
-    """
+    """Estimate the difference of two groups in one metric, and test it; half_width None: as usual for the metric."""
     is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
     row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
@@ -356,9 +347,6 @@ def compare_assisted(real: Groups) -> AssistedComparison:
 
     A mission that never found the pipeline counts with the time limit as its search time.
 
-    Args:
-        real: real missions, with the simulated ones that assist them.
-
     Raises:
         InputError: the missions are too few.
     """
@@ -383,10 +371,8 @@ def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.D
 
 
 def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
-    """Return by run and manager how far simulated missions are on average from the mean of their condition.
-
-    Points of a sweep share a run's random numbers, so that the means of all conditions may be off by the same chance.
-    """
+    """Return by run and manager how far simulated missions are on average from the mean of their condition."""
+    # Points of a sweep share a run's random numbers, so that the means of all conditions may be off by the same chance.
     off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform("mean")
     return same.assign(off=off).groupby(["seed", "run", "manager"], observed=True)["off"].mean().unstack("manager")
 
@@ -394,11 +380,7 @@ def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
 def _estimate(
     both: list[str], metric: Metric, conditions: pandas.DataFrame, drawn: pandas.DataFrame, shared: pandas.DataFrame
 ) -> dict[str, Any]:
-    """Estimate the mean of one manager, or the difference of two, over the conditions that both have.
-
-    Raises:
-        InputError: there are too few conditions, simulated missions in one of them, or draws.
-    """
+    """Estimate the mean of one manager, or the difference of two, over the conditions that both have."""
     by_manager: Any = conditions.unstack()
     own = by_manager.reindex(columns=pandas.MultiIndex.from_product([conditions.columns, both]))
     own = own[own[["real", "same"]].notna().all(axis=1)]

@@ -57,15 +57,13 @@ def estimate_in(row: Row, name: str) -> Estimate:
 class Comparison(Written):
     """The result of a comparison.
 
-        comparison = compare_folders([Path("before"), Path("after")])
-        print(comparison.conclusion)
+        comparison = compare_folders(["before", "after"])
         comparison.differences[["group", "other", "difference", "p_holm"]]
 
     In the frames, columns that end in `_ci95_low` and `_ci95_high` are the ends of the 95% interval of the one before,
     whose method is in the column that ends in `_interval`; nan where there are too few values.
 
     Attributes:
-        conclusion: in one sentence.
         summaries: a row for each metric and group: group (name of the manager, with its source or its value of a sweep
             where that is needed), metric, n (independent values: missions, or runs where several points of a sweep are
             averaged), missing (missions without a value), mean (of `pipeline_found` the share), std, median, q1 and q3;
@@ -79,8 +77,6 @@ class Comparison(Written):
             the difference), half_width (of the interval for which the number of runs is given), runs_needed_paired
             (runs of each manager for that, if they are paired), runs_needed_unpaired (none: over ten million, or not
             known), and conclusion.
-        notes: what a reader should know about the data.
-        metrics: the compared metrics.
         counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
         largest: of each pair the least and the greatest difference in the first metric, each with its run.
         replay: the command that replays both missions of the largest of these; empty: not known.
@@ -183,8 +179,6 @@ class AssistedComparison(Written):
             their intervals), weight, narrower (how many times as wide the interval of the real missions alone is),
             equal_runs (real missions, as many in each condition, that would give the assisted interval), helps, and
             conclusion.
-        notes: what a reader should know about the data.
-        metrics: that are compared.
         conclusion: of all; empty, as each estimate has its own.
     """
 
@@ -300,14 +294,9 @@ def _group_name(row: Row) -> str:
 def concluded(
     groups: Groups, summaries: Sequence[Row], differences: Sequence[dict[str, Any]], largest: Table, replay: str
 ) -> Comparison:
-    """Write what follows from the estimates of groups and their differences.
+    """Write what follows from the estimates of groups and their differences; `largest` and `replay` as of Comparison.
 
-    Args:
-        groups: that are compared.
-        summaries: a row for each metric and group, by the columns of Comparison.summaries, but with whole estimates.
-        differences: a row for each metric and pair, likewise.
-        largest: of each pair, the runs that differ most.
-        replay: the command that replays both missions of the largest difference.
+    Summaries and differences have the columns of Comparison's frames, but whole estimates.
     """
     by_name = {metric.name: metric for metric in groups.metrics}
     for row in differences:
@@ -434,11 +423,7 @@ def overall_conclusion(
 ) -> str:
     """Write the conclusion for the first metric: which manager is best, by how much, and whether it is significant.
 
-    Args:
-        metric: the first one.
-        differences: of all metrics and groups, with their conclusions.
-        means: of this metric, by group, where they are known.
-        groups: names of those that it is about.
+    It is about the groups named, of which `means` has those that are known; differences are of all metrics and groups.
     """
     tested = [each for each in differences if each["test"]]
     own = [each for each in tested if each["metric"] == metric.name and {each["group"], each["other"]} <= set(groups)]

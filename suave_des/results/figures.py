@@ -156,7 +156,6 @@ def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
 
 
 def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
-    """Yield each group with the number of its look."""
     return zip(style.looks([group.name for group in groups]), groups, strict=True)
 
 
@@ -235,9 +234,9 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
     figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
     if len(missions.swept) == columns > 1:
-        write_below(figure, f"{_averaged(counts, ())}, each averaged over the parameters of the other panels")
+        _write_below(figure, f"{_averaged(counts, ())}, each averaged over the parameters of the other panels")
     else:
-        write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))
+        _write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))
     return figure
 
 
@@ -288,19 +287,17 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
     counts = frame.groupby([names, up, across])["run"].nunique().tolist()
     others = [name for name in missions.swept if name not in parameters]
-    write_below(figure, _averaged(counts, others))
+    _write_below(figure, _averaged(counts, others))
     return figure
 
 
 def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:
-    """Say of how many runs means are, and what they are averaged over besides."""
     low, high = min(counts), max(counts)
     of = f"means of n = {low if low == high else f'{low} to {high}'} run{'s' * (high > 1)}"
     return f"{of}, each averaged over {', '.join(map(key_words, others))}" if others else of
 
 
-def write_below(figure: Figure, text: str) -> None:
-    """Write what a figure shows below it."""
+def _write_below(figure: Figure, text: str) -> None:
     figure.supxlabel(fill(text, int(16 * figure.get_figwidth())), fontsize=7.5, color="#555555")
 
 
@@ -364,7 +361,6 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
 
 
 def _folded(text: str, width: int = 26) -> str:
-    """Break a long name into lines, so that names stay apart."""
     return fill(text, width, break_long_words=False)
 
 
@@ -389,7 +385,7 @@ def draw_results(
 
     Args:
         folders: one of a mission (trajectory.csv), or of campaigns (runs.csv) and files like these.
-        out: picture to write; its ending says which kind.
+        out: picture to write, .png, .pdf or .svg.
         kind: of the figure; "auto": of a mission its map, of a campaign the distributions, of a sweep the means.
         parameters: of a sweep: those to draw; empty: all.
         rules_of: finds the rules behind the adaptations of a mission, for its timeline.
@@ -410,23 +406,14 @@ def draw_results(
 
 
 def check_picture(out: Path) -> None:
-    """Check that a name is a picture's.
-
-    Raises:
-        InputError: it has another ending.
-    """
+    """Raise an InputError if a file has not the ending of a picture."""
     if out.suffix.lower() not in ENDINGS:
         problem = f"expected a picture, got {out.suffix or 'a file without an ending'}"
         raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
 
 
 def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) -> None:
-    """Write a figure atomically, and without the time of writing.
-
-    Args:
-        figure: to write.
-        out: .png, .pdf or .svg.
-        bbox_inches: "tight" trims it to what is drawn; None: it has the figure's own size.
+    """Write a figure atomically, and without the time of writing; bbox_inches "tight" trims it to what is drawn.
 
     Raises:
         InputError: it cannot be written.
@@ -438,12 +425,7 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
 
 @style.publication()
 def draw_mission(record: MissionRecord, kind: str = MAP, rules: Rules = MappingProxyType({})) -> Figure:
-    """Draw a mission.
-
-    Args:
-        record: of the mission.
-        kind: MAP or TIMELINE.
-        rules: behind its adaptations, for the timeline.
+    """Draw a mission's MAP or TIMELINE, with the rules behind its adaptations.
 
     Raises:
         InputError: there is no such figure of a mission.
@@ -475,5 +457,5 @@ def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str
     if missions.swept:
         swept = ", ".join(key_words(parameter) for parameter in missions.swept)
         shown_are = "means of each run over" if is_of_means else "missions at"
-        write_below(figure, f"{shown_are} all points of the sweep: {swept}")
+        _write_below(figure, f"{shown_are} all points of the sweep: {swept}")
     return figure

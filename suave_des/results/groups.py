@@ -27,7 +27,6 @@ _USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
 """More make tables that nobody reads, and thousands of tests."""
 _MEMBER = "ensemble_member"
-"""Column of runs.csv: the parameter set of a run."""
 _FEW = 20
 _PLACES = ("real missions", "assisted by", "population")
 """Of errors in real missions and those that assist them."""
@@ -64,9 +63,7 @@ class Groups:
     """Missions in groups, and what is asked about them.
 
     Attributes:
-        missions: of all sources.
         groups: in the order of their first missions.
-        metrics: to compare.
         notes: what a reader should know about the groups.
         counted: what the rows of groups are: "mission", "run", "draw", or "value" where they differ.
         time_limit_s: whole seconds that missions of every group had; where all found the pipeline, the longest search.
@@ -99,7 +96,7 @@ def grouped(
 
     Args:
         missions: of all sources.
-        managers: names of the managers to include; empty: all.
+        managers: names of those to include; empty: all.
         metrics: columns of runs.csv; empty: those of the usual ones that at least one mission has; with simulated
             missions, those of the paper.
         by: swept parameters each of whose values is a separate group.
@@ -179,11 +176,7 @@ def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
 
 
 def check_swept(missions: Missions, names: Sequence[str], place: str) -> None:
-    """Check that a sweep varies these columns.
-
-    Raises:
-        InputError: it does not vary one of them; `place` says where that was asked for.
-    """
+    """Raise an InputError if a sweep does not vary one of these columns; `place` says where that was asked for."""
     for name in names:
         if name not in missions.swept:
             raise unknown(f"{shown(name)} is not what a sweep varies here", name, missions.swept, "swept are", place)
@@ -278,11 +271,7 @@ def _with_draws(population: Missions) -> pandas.DataFrame:
 
 
 def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
-    """Return by source how many runs are averaged, because some share a draw.
-
-    Campaigns are compared run by run, and so by means over the same runs. Other sources, such as real missions, are not
-    averaged.
-    """
+    """Return by source how many runs are averaged, because some share a draw; of sources without runs nothing is."""
     are_runs = (frame["run"].notna() & (frame["seed"] != "")).groupby(frame["source"], observed=True).all()
     return dict.fromkeys(map(str, are_runs.index[are_runs]), runs_sharing_draw(frame))
 
@@ -291,12 +280,8 @@ def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.
     """Average rows of the same seed and run.
 
     A mean over other points, or other runs of a draw, than that of another manager would compare these points and not
-    the managers. So a metric is missing where not all of the wanted rows have a value; a row is left out where a
-    whole mission is missing.
-
-    Args:
-        frame: rows to average.
-        wanted: how many rows each run has where none is missing.
+    the managers. So a metric is missing where not all of the wanted rows have a value, of which a run has so many; a
+    row is left out where a whole mission is missing.
     """
     numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
     by_run = frame.groupby(["seed", "run"], sort=False, observed=True)

@@ -42,14 +42,7 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Adaptation:
-    """A change of the mode of a function in use.
-
-    Attributes:
-        t_s: when it took effect.
-        function: whose mode changed.
-        before: its mode before; likewise after.
-        cause: its cause, in words; empty if it is not known.
-    """
+    """A change of the mode of a function in use; its cause is in words, empty if it is not known."""
 
     t_s: float
     function: str
@@ -267,7 +260,6 @@ def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across
 
 
 def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
-    """Draw what both maps have: pipeline, path, start and recharge station."""
     x_m, y_m = np.array(record.scenario["pipeline"]["vertices_m"])[:, :2].T
     axes.plot(x_m, y_m, **_PIPELINE, solid_capstyle="round", zorder=1.5)
     axes.set_aspect("equal")
@@ -321,7 +313,6 @@ def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str]
 
 
 def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
-    """Draw altitude, visibility with its thresholds, and battery."""
     way = record.trajectory
     altitude_m = way["z_m"].to_numpy() - SEA_BED_Z_M
     draw_thresholds(axes, record)
@@ -510,7 +501,6 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
 
 
 def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:
-    """List the adaptations with what caused them."""
     axes.set_axis_off()
     rows = -(-len(sentences) // columns)
     for place, text in enumerate(sentences):

@@ -99,12 +99,7 @@ class Targets(Strict):
 
 
 def count(share: Share, runs: pandas.DataFrame) -> tuple[int, int]:
-    """Count the missions in a share, and those that it is a share of.
-
-    Args:
-        share: with its manager.
-        runs: a row for each mission, with the columns of records.runs.COLUMNS.
-    """
+    """Count the missions in a share, and those that it is a share of; runs have the columns of records.runs.COLUMNS."""
     own = runs[runs["manager"] == share.manager]
     if share.of == "detections":
         own = own[own["detection_x_m"].notna()]
@@ -126,13 +121,10 @@ def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
 
 @dataclass(frozen=True)
 class Conditions:
-    """The conditions of a campaign.
+    """The conditions of a campaign: names of the parameters that differ, and for each condition their values.
 
+    Example:
         conditions = Conditions.of(Sweep(zip={"start.y_m": [2.5, 2.8], "thruster_events.0.time_s": [146.4, 91.2]}))
-
-    Attributes:
-        names: parameters that differ between conditions, as the campaign gives them.
-        values: of the parameters, for each condition.
     """
 
     names: tuple[str, ...]
@@ -152,15 +144,11 @@ class Conditions:
         """Return a condition's values, such as "start.y_m=2.455"."""
         return ", ".join(f"{name}={value}" for name, value in zip(self.names, self.values[number - 1], strict=True))
 
-    def numbers(self, runs: pandas.DataFrame) -> NDArray[np.int64] | None:
-        """Return the number of each mission's condition, by what its columns say.
+    def numbers(self, runs: pandas.DataFrame) -> NDArray[np.int64]:
+        """Return the number of each mission's condition, from 1, shape (n,).
 
-        Args:
-            runs: a row for each mission; of columns named like the parameters, those that are there must agree, and
-                without any a column of NUMBER_COLUMNS may have the numbers.
-
-        Returns:
-            From 1, shape (n,); none if there is no such column.
+        Of columns named like the parameters, those that are there must agree; without any, one of NUMBER_COLUMNS has
+        the numbers; without that, missions are in order.
 
         Raises:
             InputError: about a row, counted from 0 as its place: it is of no condition, or of several.
@@ -169,7 +157,7 @@ class Conditions:
             return self._by_values(runs, named)
         column = next((name for name in NUMBER_COLUMNS if name in runs), None)
         if column is None:
-            return None
+            return self.in_order(runs["manager"])
         numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
         for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(self) + 1)))[:1]:
             problem = f"{column}: there is no condition {runs[column].iloc[row]}"
@@ -195,11 +183,8 @@ class Conditions:
     def in_order(self, managers: pandas.Series[str]) -> NDArray[np.int64]:
         """Number missions by their order, as the exemplar's runner makes them: equally many runs of each condition.
 
-        Args:
-            managers: of each mission, in the order in which they were made.
-
         Returns:
-            From 1, shape (n,).
+            From 1, shape (n,), by the manager of each mission.
 
         Raises:
             InputError: a manager's missions do not divide evenly.
@@ -228,7 +213,6 @@ class RealRuns:
     """Real missions of one or several files.
 
     Attributes:
-        files: as read, in the order given.
         frame: a row for each mission with the columns of records.runs.COLUMNS, file by file; with `condition` if the
             conditions are known.
         notes: what a reader of the comparison should know about the data.
@@ -284,7 +268,7 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
     if conditions is not None:
         named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
         try:
-            numbers = conditions.numbers(frame) if named else conditions.in_order(frame["manager"])
+            numbers = conditions.numbers(frame)
         except InputError as error:
             if error.place is not None:
                 lines = [(file.path, int(line)) for file in files for line in file.frame.index]
@@ -301,12 +285,9 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
 def matched(
     real: pandas.DataFrame, simulated: pandas.DataFrame, names: Sequence[str]
 ) -> tuple[pandas.DataFrame, pandas.DataFrame]:
-    """Return real and simulated missions with the numbers of their conditions, the points of a sweep.
+    """Return real and simulated missions with the numbers of their conditions, the points of a sweep of these names.
 
-    Args:
-        real: a row for each; their conditions are found as by read_real.
-        simulated: a row for each, in the order of the points.
-        names: columns that are swept.
+    Conditions of real missions are found as by Conditions.numbers; simulated ones are in the order of the points.
 
     Raises:
         InputError: nothing is swept, or the real missions are not of these conditions.
@@ -316,9 +297,8 @@ def matched(
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
     points = simulated[list(names)].drop_duplicates()
     conditions = Conditions(tuple(names), tuple(points.itertuples(index=False, name=None)))
-    is_named = not real.columns.intersection([*names, *NUMBER_COLUMNS]).empty
     try:
-        numbers = conditions.numbers(real) if is_named else conditions.in_order(real["manager"])
+        numbers = conditions.numbers(real)
     except InputError as error:
         raise InputError(error.problem, place="real missions", remedy=error.remedy) from None
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
@@ -334,11 +314,7 @@ def matched(
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
-    """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
-
-    Args:
-        campaign: path of a campaign or scenario file, or name of a shipped one.
-        replacements: of the scenario's files, as of load_scenario.
+    """Read the conditions that a campaign file sweeps; None of a scenario file, or if it sweeps none.
 
     Raises:
         InputError: a file cannot be used.

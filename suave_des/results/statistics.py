@@ -1,4 +1,4 @@
-"""Statistics of comparisons, from SciPy, statsmodels and lifelines, in the form in which tables use them.
+"""Statistics of comparisons, from SciPy and statsmodels, in the form in which tables use them.
 
 A sample is a float array of shape (n,) without missing values. Intervals are 95% intervals. What draws takes a
 generator, and is repeatable with its seed.
@@ -37,16 +37,16 @@ _ROUNDING = 1e-9
 _ALTERNATIVES: tuple[Literal["two-sided", "less", "greater"], ...] = ("two-sided", "less", "greater")
 
 
-def library(module: str) -> Any:
-    """Import a module of statsmodels or lifelines.
+def library(module: str = "") -> Any:
+    """Import statsmodels, or a module of it.
 
     Raises:
         InputError: it is not installed; the error names the extra that has it.
     """
     try:
-        return import_module(module)
+        return import_module(f"statsmodels{module}")
     except ImportError:
-        problem = f"comparisons need {module.split('.')[0]}, which is not installed"
+        problem = "comparisons need statsmodels, which is not installed"
         raise InputError(problem, remedy="pip install 'suave-des[compare]'") from None
 
 
@@ -126,7 +126,7 @@ def _std(sample: Sample, axis: int) -> Sample:
 
 def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimate:
     """Estimate the difference of two independent shares (count, n), with its interval by Newcombe (1998)."""
-    proportion = library("statsmodels.stats.proportion")
+    proportion = library(".stats.proportion")
     low, high = proportion.confint_proportions_2indep(
         *first, *second, method="newcomb", compare="diff", alpha=1.0 - CONFIDENCE
     )
@@ -151,26 +151,26 @@ def search_times(times_s: Sample, found: NDArray[np.bool_], horizon_s: float) ->
     """Estimate times until the pipeline is found, missions without it being censored (Kaplan and Meier 1958).
 
     Args:
-        times_s: when it was found, or the mission ended without.
-        found: whether it was found.
+        times_s: when it was found, or, where `found` is false, the mission ended without.
         horizon_s: to which the restricted mean reaches: the shortest time limit of all that is compared.
 
     Returns:
         The mean of the time until found or `horizon_s`, whichever is less; and the time by which half of the missions
         have found it, infinite if less than half do.
     """
-    fitted = library("lifelines").KaplanMeierFitter(alpha=1.0 - CONFIDENCE)
-    utilities = library("lifelines.utils")
     with _quiet():
-        fitted.fit(times_s, found)
-        restricted = Estimate(float(utilities.restricted_mean_survival_time(fitted, t=horizon_s)))
-        half = 0.5 + _ROUNDING
-        median_s = float(utilities.qth_survival_time(half, fitted))
-        low, high = sorted(utilities.qth_survival_times(half, fitted.confidence_interval_).to_numpy(float).ravel())
+        fitted = library(".duration.survfunc").SurvfuncRight(times_s, found)
+        half = 0.5 - _ROUNDING
+        median_s = float(np.nanmin([fitted.quantile(half), math.inf]))  # nan: less than half
+        ends_s = fitted.quantile_ci(half, 1.0 - CONFIDENCE, method="cloglog")  # nan: no step is in it
+    is_before = fitted.surv_times < horizon_s
+    steps_s = np.diff([0.0, *fitted.surv_times[is_before], horizon_s])
+    restricted = Estimate(float(np.append(1.0, fitted.surv_prob[is_before]) @ steps_s))
+    low, high = (median_s if math.isnan(end_s) else float(end_s) for end_s in ends_s)
     if not (~found & (times_s < horizon_s)).any():
         # None is censored before the horizon, so the restricted mean is that of a sample.
         restricted = replace(mean_interval(np.minimum(times_s, horizon_s)), value=restricted.value)
-    return restricted, Estimate(median_s, float(low), float(high), "Kaplan-Meier")
+    return restricted, Estimate(median_s, low, high, "Kaplan-Meier")
 
 
 # Tests
@@ -230,7 +230,7 @@ def rank_sum_test(first: Sample, second: Sample) -> Test:
     if min(len(first), len(second)) < 2 or np.ptp(np.concatenate([first, second])) == 0.0:
         return found
     with _quiet():
-        ranks = library("statsmodels.stats.nonparametric").rank_compare_2indep(first, second)
+        ranks = library(".stats.nonparametric").rank_compare_2indep(first, second)
         low, high = ranks.conf_int(alpha=1.0 - CONFIDENCE)
     effect = _with_interval(found["effect"], low, high, A12).cut(0.0, 1.0)  # none of samples that do not overlap
     return found | effect.columns("effect")
@@ -247,7 +247,7 @@ def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Test:
 def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Test:
     """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the two differ."""
     both = [[int(np.sum((first == row) & (second == column))) for column in (True, False)] for row in (True, False)]
-    found = library("statsmodels.stats.contingency_tables").mcnemar(both, exact=True)
+    found = library(".stats.contingency_tables").mcnemar(both, exact=True)
     return {"test": MCNEMAR, "p": min(1.0, float(found.pvalue)), "effect_name": "", "effect": None}
 
 
@@ -255,27 +255,22 @@ def holm(ps: Sequence[float]) -> list[float]:
     """Adjust p-values for all tests together (Holm 1979)."""
     if not ps:
         return []
-    adjusted = library("statsmodels.stats.multitest").multipletests(ps, method="holm")[1]
+    adjusted = library(".stats.multitest").multipletests(ps, method="holm")[1]
     return [float(p) for p in adjusted]
 
 
-def runs_for(spread: float, half_width: float, fixed: float = 0.0, least: int = 2) -> int | None:
-    """Return how many runs make half the 95% interval of a mean that narrow.
+def runs_for(spread: float, half_width: float) -> int | None:
+    """Return how many runs make half the 95% interval of a mean that narrow; None for more than ten million.
 
     Args:
         spread: standard deviation of a run's value; of a difference of two means, the root of the sum of squares.
         half_width: wanted, above 0.
-        fixed: standard error of what is added to the mean and does not depend on the number of runs.
-        least: number of runs, 2 or more.
-
-    Returns:
-        The least number; None for more than ten million.
     """
 
     def suffices(runs: int) -> bool:
-        return t_quantile(runs - 1) * math.hypot(spread / math.sqrt(runs), fixed) <= half_width
+        return t_quantile(runs - 1) * (spread / math.sqrt(runs)) <= half_width
 
-    found = bisect_left(range(_MOST_RUNS + 1), True, lo=least, key=suffices)
+    found = bisect_left(range(_MOST_RUNS + 1), True, lo=2, key=suffices)
     return found if found <= _MOST_RUNS else None
 
 
@@ -313,19 +308,10 @@ def agreement(
     rng: np.random.Generator,
     subsamples: int = SUBSAMPLES,
 ) -> float:
-    """Return the share of random subsamples of two samples that lead to a conclusion by one-sided Mann-Whitney tests.
+    """Return the share of random subsamples of two samples that lead to a conclusion, a sign as of sign_of.
 
-    The tests are by the normal approximation, with ties corrected.
-
-    Args:
-        sign: the conclusion; see sign_of.
-        samples: to draw from, without replacement.
-        sizes: of the subsamples of each.
-        rng: to draw with.
-        subsamples: how many to draw.
-
-    Returns:
-        The share; nan if a sample is too small to draw from.
+    They are drawn without replacement, and tested by one-sided Mann-Whitney tests by the normal approximation, with
+    ties corrected. The share is nan if a sample is too small to draw from.
     """
     from scipy.stats import mannwhitneyu
 

@@ -13,14 +13,7 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from suave_des.domain import (
-    DEFAULT_MODE,
-    FOLLOW_PIPELINE,
-    GENERATE_RECHARGE_PATH,
-    GENERATE_SEARCH_PATH,
-    MAINTAIN_MOTION,
-    UNGROUND_MODE,
-)
+from suave_des import domain
 from suave_des.results.groups import printable
 from suave_des.tables import broken_name
 
@@ -112,15 +105,15 @@ _UNITS = {
 }
 """Units by the ending of a key; the longer endings first."""
 _FUNCTIONS = {
-    GENERATE_SEARCH_PATH: "search",
-    FOLLOW_PIPELINE: "follow",
-    MAINTAIN_MOTION: "thrusters",
-    GENERATE_RECHARGE_PATH: "recharge",
+    domain.GENERATE_SEARCH_PATH: "search",
+    domain.FOLLOW_PIPELINE: "follow",
+    domain.MAINTAIN_MOTION: "thrusters",
+    domain.GENERATE_RECHARGE_PATH: "recharge",
 }
 _MODES = {
     "": "before the first mode",
-    UNGROUND_MODE: "no function moves it",
-    DEFAULT_MODE: "search, default altitude",
+    domain.UNGROUND_MODE: "no function moves it",
+    domain.DEFAULT_MODE: "search, default altitude",
     "fd_spiral_low": "search, low",
     "fd_spiral_medium": "search, medium",
     "fd_spiral_high": "search, high",
@@ -130,14 +123,14 @@ _MODES = {
 }
 """Modes of the functions that move the vehicle."""
 _OTHER_MODES = {
-    (MAINTAIN_MOTION, "fd_all_thrusters"): "in use",
-    (MAINTAIN_MOTION, "fd_recover_thrusters"): "recovery",
-    (MAINTAIN_MOTION, DEFAULT_MODE): "recovery, default",
-    (FOLLOW_PIPELINE, DEFAULT_MODE): "off",
-    (FOLLOW_PIPELINE, "fd_follow_pipeline"): "on",
-    (GENERATE_RECHARGE_PATH, "normal"): "on",
+    (domain.MAINTAIN_MOTION, "fd_all_thrusters"): "in use",
+    (domain.MAINTAIN_MOTION, "fd_recover_thrusters"): "recovery",
+    (domain.MAINTAIN_MOTION, domain.DEFAULT_MODE): "recovery, default",
+    (domain.FOLLOW_PIPELINE, domain.DEFAULT_MODE): "off",
+    (domain.FOLLOW_PIPELINE, "fd_follow_pipeline"): "on",
+    (domain.GENERATE_RECHARGE_PATH, "normal"): "on",
 }
-_OFF = (UNGROUND_MODE, "inactive")
+_OFF = (domain.UNGROUND_MODE, "inactive")
 
 
 def key_words(key: str) -> str:

@@ -44,7 +44,6 @@ TABLES |= {name: f"validation_{name}.csv" for name in ("pairs", "shares", "condi
 """Names of the tables, and their files."""
 JSON_FILE = "validation.json"
 FILES = (*TABLES.values(), JSON_FILE)
-"""All files of a validation."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,6 @@ class Validation:
     """The result of a comparison with real missions: data frames with the columns of the files that TABLES names.
 
     Attributes:
-        managers: compared, in the order given.
         cells: a row for each metric and manager: both samples, their difference and its tests.
         pairs: a row for each metric and pair of managers.
         shares: a row for each cluster or other region, and manager.
@@ -139,8 +137,7 @@ def validate(
         print(found.targets[found.targets["met"] != True])
 
     Args:
-        published: a row for each mission, with the columns of records.runs.COLUMNS.
-        simulated: the same, in any number; further columns do not matter.
+        published: a row for each mission, with the columns of records.runs.COLUMNS; likewise simulated.
         managers: those to compare; each must have missions on both sides.
         shares: regions to count.
         limits: targets by metric for what is compared condition by condition.
@@ -202,7 +199,7 @@ def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
 
 
 def _described(name: str, sample: Sample) -> dict[str, Any]:
-    """Describe a sample by columns that begin with a name: n, mean, std and median; the first two with intervals."""
+    """Describe a sample by columns that begin with a name: n, mean and std with their intervals, and median."""
     values = sample.tolist()
     row = mean_of(values).columns(f"{name}_mean") | std_of(values).columns(f"{name}_std")
     return {f"{name}_n": len(values), **row, f"{name}_median": float(np.median(sample)) if values else None}
@@ -255,11 +252,7 @@ def _pair(
 def compare_shares(
     shares: Sequence[Share], published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
 ) -> pandas.DataFrame:
-    """Count shares in published and simulated missions, and that of missions that found the pipeline, where known.
-
-    Returns:
-        A row for each, with the columns of validation_shares.csv.
-    """
+    """Count shares, and that of missions that found the pipeline, where known: columns of validation_shares.csv."""
     sides = published, simulated
     known, where = Region({"pipeline_found": ((0.0, 1.0),)}), Region({"pipeline_found": ((1.0, 1.0),)})
     found = [Share(manager=manager, name="pipeline found", among=known, where=where) for manager in managers]
@@ -306,12 +299,7 @@ def balanced(real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequ
 def compare_conditions(
     real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str], metrics: Sequence[str]
 ) -> pandas.DataFrame:
-    """Compare missions condition by condition.
-
-    Returns:
-        A row for each metric, manager and condition, with the columns of validation_conditions.csv; empty if no
-        conditions are known.
-    """
+    """Compare missions condition by condition: columns of validation_conditions.csv; empty without conditions."""
     if CONDITION not in real or CONDITION not in simulated:
         return pandas.DataFrame()
     parts = []
@@ -329,12 +317,10 @@ def compare_conditions(
 
 
 def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
-    """Summarise a comparison condition by condition.
+    """Summarise a comparison condition by condition: for each metric and manager, and for "all" of them.
 
-    Returns:
-        A row for each metric and manager, and for the metric with manager "all": `conditions` (how many), and medians
-        over these: `difference` (|simulated - real median|), `real_std` and `simulated_std` (standard deviations within
-        a condition), and the ratio of these, simulated / real, `std_ratio`; nan for what is not known.
+    Rows have the number of `conditions`, and medians over these: `difference` (|simulated - real median|), `real_std`
+    and `simulated_std` (within a condition), and their ratio `std_ratio`, simulated / real; nan for what is not known.
     """
     rows = []
     for metric, of_metric in compared.groupby("metric", sort=False) if len(compared) else ():
@@ -482,14 +468,12 @@ PAPER_FILE = "paper_table.md"
 
 @dataclass(frozen=True)
 class PaperComparison:
-    """The paper's table beside ours.
+    """The paper's table beside ours, from the missions published and ours.
 
     Attributes:
         figures: a row for each manager, in the order of the paper's table, metric, and statistic ("mean" or "std"): the
             paper's figure (paper) and ours (here), each with the ends of its 95% interval, and difference (here -
             paper); nan where there are too few missions; mark: whether ours is outside the paper's interval.
-        published: missions behind the paper's table.
-        ours: missions of the same managers.
     """
 
     figures: pandas.DataFrame
@@ -528,14 +512,12 @@ class PaperComparison:
             yield from self._claim(metric, claim)
 
     def _sizes(self, missions: pandas.DataFrame) -> str:
-        """Describe the number of missions of each manager."""
         sizes = {name: int((missions["manager"] == name).sum()) for name in self.managers}
         if len(set(sizes.values())) == 1:
             return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager"
         return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
 
     def _claim(self, metric: str, claim: str) -> Iterator[str]:
-        """Say whether metacontrol is the best on average, as in the paper, and what could be chance."""
         samples = {name: each for name in self.managers if len(each := sample(self.ours, name, metric))}
         best = samples.pop("metacontrol", None)
         if best is None or not samples:

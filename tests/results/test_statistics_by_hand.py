@@ -61,6 +61,22 @@ def test_paired_shares_differ_by_the_formula_of_bonett_and_price():
     assert found.interval == pytest.approx((p - q - half, p - q + half), rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("times_s", "found", "horizon_s", "mean_s", "half"),
+    [
+        ([40, 90, 90, 120, 150, 200, 210, 260, 300, 300], "yynynyynnn", 280, 198.1428571428571, (210, 40, math.inf)),
+        ([20.9, 78, 128.5, 150, 150, 125, 79], "ynnnnyy", 150, 115.1, (math.inf, 20.9, math.inf)),
+        ([150, 150, 150], "nnn", 150, 150.0, (math.inf, math.inf, math.inf)),
+        ([146], "y", 146, 146.0, (146, 146, 146)),
+    ],
+)
+def test_censored_search_times_are_those_of_lifelines(times_s, found, horizon_s, mean_s, half):
+    was_found = np.array([each == "y" for each in found])  # expected: lifelines 0.30, KaplanMeierFitter
+    restricted, estimated = statistics.search_times(np.array(times_s, float), was_found, horizon_s)
+    assert restricted.value == pytest.approx(mean_s, rel=1e-12)
+    assert (estimated.value, estimated.low, estimated.high) == half
+
+
 @pytest.mark.parametrize("n", range(2, 60, 2))
 def test_half_of_the_missions_have_found_it_when_the_middle_one_has(n):
     # The survival function is a product of fractions, which need not be exactly a half there.
