@@ -19,23 +19,11 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.kb.matching import (
-    FACT_KINDS,
-    Binding,
-    Bound,
-    Facts,
-    Probes,
-    bound,
-    matched,
-    matches,
-    nearest_match,
-    shown_bindings,
-    stated,
-    unified,
-    with_bindings,
-)
+from suave_des.kb import matching
+from suave_des.kb.matching import FACT_KINDS, Binding, Bound, Facts, Probes, bound, with_bindings
 from suave_des.kb.space import Situation
 from suave_des.kb.states import FactReader
+from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology, Terms
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.pellet.in_process import (
@@ -45,26 +33,7 @@ from suave_des.knowledge.pellet.in_process import (
     one_at_a_time,
     trace_contradiction,
 )
-from suave_des.knowledge.rdf import (
-    C_STATUS,
-    HAS_QA_VALUE,
-    HAS_VALUE,
-    IS_QA_TYPE,
-    NUMERIC,
-    O_STATUS,
-    OWL,
-    RDF_TYPE,
-    TOMASYS,
-    Lit,
-    Triple,
-    canonical,
-    fact_of,
-    facts_of,
-    is_fact,
-    local_name,
-    n_triple,
-    value_of,
-)
+from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import COMPARISONS, Atom, AtomKind, Rule, Variable, write_atom, write_term
 from suave_des.knowledge.rules.files import fatal_problems
@@ -155,7 +124,7 @@ class Tracer:
     @cached_property
     def known(self) -> tuple[Triple, ...]:
         """All that follows and that rules mention, in canonical form and in a fixed order."""
-        return tuple(sorted({canonical_triple(triple) for triple in self.entailed if is_fact(triple)}, key=str))
+        return tuple(sorted({canonical_triple(triple) for triple in self.entailed if rdf.is_fact(triple)}, key=str))
 
     @cached_property
     def _facts(self) -> Facts:
@@ -164,13 +133,13 @@ class Tracer:
     @cached_property
     def _leaves(self) -> dict[Triple, Triple]:
         """What is asserted, by its canonical form."""
-        return {canonical_triple(triple): triple for triple in sorted(filter(is_fact, self.asserted), key=str)}
+        return {canonical_triple(triple): triple for triple in sorted(filter(rdf.is_fact, self.asserted), key=str)}
 
     @cached_property
     def _schema(self) -> Content:
         """The ontologies without facts about individuals; all rules keep their numbers."""
         content = self.base.content
-        return replace(content, triples=tuple(each for each in content.triples if not is_fact(each)))
+        return replace(content, triples=tuple(each for each in content.triples if not rdf.is_fact(each)))
 
     def derive(self, triple: Triple) -> Derivation:
         """Derive a triple that is entailed."""
@@ -184,13 +153,13 @@ class Tracer:
     def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
         with one_at_a_time:
-            for binding in matches(rule, self._facts):
-                concluded = [triple for atom in rule.head if (triple := stated(atom, binding)) is not None]
+            for binding in matching.matches(rule, self._facts):
+                concluded = [triple for atom in rule.head if (triple := matching.stated(atom, binding)) is not None]
                 if all(
                     canonical_triple(triple) in self._facts for triple in concluded
                 ):  # what is the same, Pellet knows
                     facts = tuple(map(self._fact, sorted(concluded, key=str)))
-                    yield shown_bindings(binding, self.base.names), facts
+                    yield matching.shown_bindings(binding, self.base.names), facts
 
     def _derive(self, triple: Triple, above: frozenset[Triple]) -> Derivation | None:
         """The first tree for a triple that does not depend on itself or on what is above it; None if there is none."""
@@ -207,20 +176,20 @@ class Tracer:
 
     def _by_rules(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         for rule in self.base.content.enabled_rules:
-            starts = (matched(atom, triple, {}) for atom in rule.head)
+            starts = (matching.matched(atom, triple, {}) for atom in rule.head)
             for start in (each for each in starts if each is not None):
-                for binding in matches(rule, self._facts, start):
-                    said = (stated(atom, binding) for atom in rule.body)
+                for binding in matching.matches(rule, self._facts, start):
+                    said = (matching.stated(atom, binding) for atom in rule.body)
                     body = dict.fromkeys(canonical_triple(each) for each in said if each is not None)
                     if above.isdisjoint(body):
                         premises = tuple(found for each in body if (found := self._derive(each, above)) is not None)
                         if len(premises) == len(body):
-                            bindings = shown_bindings(binding, self.base.names)
+                            bindings = matching.shown_bindings(binding, self.base.names)
                             yield Derivation(self._fact(triple), "rule", rule.name, bindings, premises=premises)
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
-        kind: AtomKind = "class" if triple[1] == RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
+        kind: AtomKind = "class" if triple[1] == rdf.RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
         asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
         for other in self.known:
             about_same = {triple[0], triple[2]} & {other[0], other[2]}
@@ -251,7 +220,7 @@ class Tracer:
         return tuple(_IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema)
 
     def _fact(self, triple: Triple) -> Fact:
-        return fact_of(triple, self.base.names)
+        return rdf.fact_of(triple, self.base.names)
 
 
 def pellet_for(base: Ontology) -> InProcessPellet:
@@ -267,7 +236,7 @@ def pellet_for(base: Ontology) -> InProcessPellet:
 
 def canonical_triple(triple: Triple) -> Triple:
     """The triple that stands for all that say the same with another form of its value."""
-    return (*triple[:2], canonical(triple[2]))
+    return (*triple[:2], rdf.canonical(triple[2]))
 
 
 def _denial(triple: Triple) -> str:
@@ -275,17 +244,17 @@ def _denial(triple: Triple) -> str:
     subject, predicate, value = triple
     denied, restriction = "urn:denied", "urn:restriction"
     triples: list[Triple] = [
-        (denied, OWL + "complementOf", value if predicate == RDF_TYPE else restriction),
-        (denied, RDF_TYPE, OWL + "Class"),
-        (subject, RDF_TYPE, denied),
+        (denied, rdf.OWL + "complementOf", value if predicate == rdf.RDF_TYPE else restriction),
+        (denied, rdf.RDF_TYPE, rdf.OWL + "Class"),
+        (subject, rdf.RDF_TYPE, denied),
     ]
-    if predicate != RDF_TYPE:
+    if predicate != rdf.RDF_TYPE:
         triples += [
-            (restriction, RDF_TYPE, OWL + "Restriction"),
-            (restriction, OWL + "onProperty", predicate),
-            (restriction, OWL + "hasValue", value),
+            (restriction, rdf.RDF_TYPE, rdf.OWL + "Restriction"),
+            (restriction, rdf.OWL + "onProperty", predicate),
+            (restriction, rdf.OWL + "hasValue", value),
         ]
-    return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(n_triple, triples)))
+    return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(rdf.n_triple, triples)))
 
 
 _WORDS: Final = {
@@ -298,17 +267,17 @@ _WORDS: Final = {
 }
 #: What a state asserts, and how to give it where it is missing.
 _GIVEN_BY_STATES: Final[Mapping[str, str]] = {
-    TOMASYS + "FunctionGrounding": "; ground a function: --at FUNCTION=DESIGN",
-    TOMASYS + "typeFD": "; ground a function: --at FUNCTION=DESIGN",
-    TOMASYS + "solvesO": "; ground a function: --at FUNCTION=DESIGN",
-    C_STATUS: "; report a component: --at COMPONENT=FALSE",
-    HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
-    TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
+    rdf.TOMASYS + "FunctionGrounding": "; ground a function: --at FUNCTION=DESIGN",
+    rdf.TOMASYS + "typeFD": "; ground a function: --at FUNCTION=DESIGN",
+    rdf.TOMASYS + "solvesO": "; ground a function: --at FUNCTION=DESIGN",
+    rdf.C_STATUS: "; report a component: --at COMPONENT=FALSE",
+    rdf.HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
+    rdf.TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
 }
 #: All that states assert.
 _IN_STATES: Final = frozenset(
-    {*_GIVEN_BY_STATES, HAS_VALUE, IS_QA_TYPE, O_STATUS}
-    | {TOMASYS + name for name in ("QAvalue", "typeF", "o_always_improve")}
+    {*_GIVEN_BY_STATES, rdf.HAS_VALUE, rdf.IS_QA_TYPE, rdf.O_STATUS}
+    | {rdf.TOMASYS + name for name in ("QAvalue", "typeF", "o_always_improve")}
 )
 
 
@@ -376,13 +345,13 @@ class RuleQuestions:
         facts = self._known(state)
         if isinstance(facts, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
-        binding, failing = nearest_match(rule, facts, start)
+        binding, failing = matching.nearest_match(rule, facts, start)
         identities = [number for number, atom in enumerate(rule.body) if atom.kind in ("same", "different")]
         # What is the same and what is different, Pellet alone knows.
         if not failing and identities and not Probes(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)):
             failing = (identities[0],)
         if not failing:
-            bindings = with_bindings(shown_bindings(binding, self.base.names))
+            bindings = with_bindings(matching.shown_bindings(binding, self.base.names))
             said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
             return WhyNot(rule.name, f"it fires{bindings}, and concludes {said}", fires=True)
         # What no state can bring comes first.
@@ -397,7 +366,10 @@ class RuleQuestions:
     def missing(self, triple: Triple, state: KnowledgeState) -> list[WhyNot]:
         """Say why no rule concludes a fact, of each that could; those that lack least first."""
         starts = (
-            (rule, next((start for head in rule.head if (start := matched(head, triple, {})) is not None), None))
+            (
+                rule,
+                next((start for head in rule.head if (start := matching.matched(head, triple, {})) is not None), None),
+            )
             for rule in self.base.content.enabled_rules
         )
         found = [self.of(rule, state, start) for rule, start in starts if start is not None]
@@ -428,8 +400,8 @@ class RuleQuestions:
         return self._facts[state]
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
-        fact = stated(atom, binding)
-        return write_atom(atom) if fact is None else str(fact_of(fact, self.base.names))
+        fact = matching.stated(atom, binding)
+        return write_atom(atom) if fact is None else str(rdf.fact_of(fact, self.base.names))
 
     def _concluder(self, rule: Rule, atom: Atom, binding: Binding, facts: Facts) -> str:
         """The rule that comes nearest to concluding what is missing, and why it does not."""
@@ -439,10 +411,10 @@ class RuleQuestions:
         found = []
         for other in self._usable.content.enabled_rules:
             for head in other.head if other is not rule else ():
-                start = unified(head.arguments, wanted, {})
+                start = matching.unified(head.arguments, wanted, {})
                 if (head.kind, head.predicate) != (atom.kind, atom.predicate) or start is None:
                     continue
-                nearest_one, failing = nearest_match(other, facts, start)
+                nearest_one, failing = matching.nearest_match(other, facts, start)
                 if failing:
                     first = other.body[failing[0]]
                     reason = describe_failure(self._usable, first, nearest_one, facts)
@@ -491,7 +463,7 @@ def _compared(base: Ontology, atom: Atom, binding: Binding) -> str:
     ]
     words = _WORDS[COMPARISONS[atom.predicate]]
     kinds = [value.datatype for value in sides if isinstance(value, Lit)]
-    numbers = [kind in NUMERIC for kind in kinds]
+    numbers = [kind in rdf.NUMERIC for kind in kinds]
     if len(kinds) == 2 and numbers[0] != numbers[1]:
         text = texts[numbers.index(False)]
         return (
@@ -516,7 +488,7 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Lit):
-        is_plain_number = value.datatype in NUMERIC and str(value_of(value, base.names)) == value.text
+        is_plain_number = value.datatype in rdf.NUMERIC and str(rdf.value_of(value, base.names)) == value.text
         return value.text if is_plain_number else write_term(value)
     return base.names.short(value)
 
@@ -652,7 +624,7 @@ class _Explainer:
         self.base, self.reasoning, self.tracer = base, reasoning, tracer
         self.triples: dict[Fact, Triple] = {}
         for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
-            for fact in facts_of([triple], base.names):
+            for fact in rdf.facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
 
     def derive(self, fact: Fact) -> Derivation:
@@ -666,8 +638,8 @@ class _Explainer:
             return self.tracer.derive(triple)
         fact = reader.fact(text)  # a value that the property cannot have is refused
         values = [value for s, p, value in self.tracer.known if (s, p) == triple[:2]]
-        texts = sorted(value_text(value_of(value, self.base.names)) for value in values)
-        name = "type" if triple[1] == RDF_TYPE else local_name(triple[1])
+        texts = sorted(value_text(rdf.value_of(value, self.base.names)) for value in values)
+        name = "type" if triple[1] == rdf.RDF_TYPE else local_name(triple[1])
         near = RuleQuestions(self.base).missing(triple, self.tracer.state)
         remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}"]
         remedies += (f"rule {each}" for each in near[:NEAREST])

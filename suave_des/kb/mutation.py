@@ -24,20 +24,11 @@ from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import Body, Probes
 from suave_des.kb.rule_tests import RuleTest, passes
 from suave_des.kb.space import Decide, PolicySpace, Situation, States, compare, difference
+from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import EXACT, OWL, RDF_TYPE, RDFS, XSD, Lit, memberships
-from suave_des.knowledge.rules import (
-    COMPARISON_OF,
-    COMPARISONS,
-    Atom,
-    Named,
-    Rule,
-    Term,
-    Variable,
-    mirrored,
-    write_atom,
-)
+from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable, write_atom
 from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.tables import Table
@@ -138,9 +129,9 @@ def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
             in_body = number < len(rule.body)
             if in_body and len(rule.body) > 1:
                 yield "atom dropped", rule, number, None
-            if in_body and atom.predicate in COMPARISONS:
-                for operator, sign in _signs(COMPARISONS[atom.predicate]):
-                    yield operator, rule, number, replace(atom, predicate=COMPARISON_OF[sign])
+            if in_body and atom.predicate in swrl.COMPARISONS:
+                for operator, sign in _signs(swrl.COMPARISONS[atom.predicate]):
+                    yield operator, rule, number, replace(atom, predicate=swrl.COMPARISON_OF[sign])
             for place, term in enumerate(atom.arguments):
                 operator = ""
                 others: Sequence[Term] = ()
@@ -166,7 +157,7 @@ def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
 
 def _signs(sign: str) -> Iterator[tuple[str, str]]:
     """Other signs for a comparison, by operator; the same sign where there is none."""
-    yield "comparison turned", {"=": "!=", "!=": "="}.get(sign) or mirrored(sign)
+    yield "comparison turned", {"=": "!=", "!=": "="}.get(sign) or swrl.mirrored(sign)
     if sign not in ("=", "!="):
         yield "comparison shifted", sign.removesuffix("=") if sign.endswith("=") else f"{sign}="
 

@@ -24,20 +24,9 @@ from typing import Any, Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, shown
 from suave_des.kb.states import LASTING, ManagingSettings
+from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology
-from suave_des.knowledge.rdf import (
-    C_STATUS,
-    HAS_QA_VALUE,
-    HAS_VALUE,
-    IS_QA_TYPE,
-    OWL,
-    RDF_TYPE,
-    RDFS,
-    TOMASYS,
-    Lit,
-    Triple,
-    reached,
-)
+from suave_des.knowledge.rdf import Lit, Triple
 from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, mirrored, texts_of
 from suave_des.knowledge.state import NO_GROUNDING, STAYS, Fact, KnowledgeState, Reasoning, exact
@@ -274,17 +263,17 @@ def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[t
             yield dict(zip(regions, values, strict=True)), words
 
 
-_CARRIED: Final = frozenset({IS_QA_TYPE, HAS_VALUE})
-_OF_VALUES: Final = _CARRIED | {HAS_QA_VALUE, TOMASYS + "hasQAestimation"}
+_CARRIED: Final = frozenset({rdf.IS_QA_TYPE, rdf.HAS_VALUE})
+_OF_VALUES: Final = _CARRIED | {rdf.HAS_QA_VALUE, rdf.TOMASYS + "hasQAestimation"}
 #: What a schema may say of these properties without relating values of one attribute to those of another.
 _HARMLESS: Final = frozenset(
     {
-        *((RDF_TYPE, OWL + kind) for kind in ("ObjectProperty", "DatatypeProperty")),
-        (RDFS + "domain", None),
-        (RDFS + "range", None),
+        *((rdf.RDF_TYPE, rdf.OWL + kind) for kind in ("ObjectProperty", "DatatypeProperty")),
+        (rdf.RDFS + "domain", None),
+        (rdf.RDFS + "range", None),
     }
 )
-_FUNCTIONAL: Final = frozenset((name, RDF_TYPE, OWL + "FunctionalProperty") for name in _CARRIED)
+_FUNCTIONAL: Final = frozenset((name, rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty") for name in _CARRIED)
 
 
 def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None = None) -> bool:
@@ -303,21 +292,21 @@ def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None =
         return True
     related = ("subPropertyOf", "inverseOf", "equivalentProperty")
     if any(
-        (predicate == IS_QA_TYPE and value == iri and functions is None)
+        (predicate == rdf.IS_QA_TYPE and value == iri and functions is None)
         or (predicate.endswith(related) and (subject in _CARRIED or value in _CARRIED))
         for subject, predicate, value in triples
     ):
         return True
     # The classes of the individual: QAvalue, what the domains of its properties say, and all above.
-    domains = {str(o) for s, p, o in triples if p == RDFS + "domain" and s in _CARRIED}
-    above = ((s, str(o)) for s, p, o in triples if p in (RDFS + "subClassOf", OWL + "equivalentClass"))
-    classes = reached({TOMASYS + "QAvalue", OWL + "Thing", *domains}, above)
+    domains = {str(o) for s, p, o in triples if p == rdf.RDFS + "domain" and s in _CARRIED}
+    above = ((s, str(o)) for s, p, o in triples if p in (rdf.RDFS + "subClassOf", rdf.OWL + "equivalentClass"))
+    classes = rdf.reached({rdf.TOMASYS + "QAvalue", rdf.OWL + "Thing", *domains}, above)
     return any(_can_match(rule, iri, measured, classes) for rule in base.content.enabled_rules)
 
 
 def has_expressions(base: Ontology) -> bool:
     """Whether the ontologies have class expressions."""
-    return any(f"<{OWL}{kind}>" in line for kind in ("Class", "Restriction") for line in base.content.structure)
+    return any(f"<{rdf.OWL}{kind}>" in line for kind in ("Class", "Restriction") for line in base.content.structure)
 
 
 def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> bool:
@@ -326,9 +315,9 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
     def could_hold(atom: Atom, term: Variable) -> bool:
         if atom.arguments[0] != term:
             return False
-        if atom.predicate == IS_QA_TYPE:
+        if atom.predicate == rdf.IS_QA_TYPE:
             return isinstance(atom.arguments[-1], Variable) or atom.arguments[-1] == Named(attribute)
-        return atom.predicate in classes if atom.kind == "class" else atom.predicate == HAS_VALUE
+        return atom.predicate in classes if atom.kind == "class" else atom.predicate == rdf.HAS_VALUE
 
     terms = {term for atom in rule.atoms for term in atom.arguments}
     if Named(measured) in terms or any(atom.kind in ("same", "different") for atom in rule.atoms):
@@ -423,7 +412,7 @@ class PolicySpace:
         attributes = tuple(name for name in measured_attributes(base, settings) if has_effect(base, name))
         functions = tuple(name for name in base.functions if base.designs(name))
         # What the thruster monitor reports, and what enabled rules ask for.
-        asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), C_STATUS)
+        asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), rdf.C_STATUS)
         statuses = tuple(sorted({*asked, FAILED, RECOVERED}))
         return cls(attributes, numbers_in(base), interchangeable_components(base), statuses, functions)
 
@@ -482,8 +471,8 @@ def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] 
 def _values(base: Ontology, attribute: str) -> set[Decimal]:
     """The numbers that the ontologies give of a quality attribute."""
     triples = base.content.triples
-    typed = {subject for subject, predicate, value in triples if predicate == IS_QA_TYPE and value == attribute}
-    values = (value for subject, predicate, value in triples if predicate == HAS_VALUE and subject in typed)
+    typed = {subject for subject, predicate, value in triples if predicate == rdf.IS_QA_TYPE and value == attribute}
+    values = (value for subject, predicate, value in triples if predicate == rdf.HAS_VALUE and subject in typed)
     return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
 
 
@@ -492,12 +481,12 @@ def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
     types = {
         atom.arguments[0]: atom.arguments[1].iri
         for atom in rule.body
-        if atom.predicate == IS_QA_TYPE and isinstance(atom.arguments[1], Named)
+        if atom.predicate == rdf.IS_QA_TYPE and isinstance(atom.arguments[1], Named)
     }
     read: dict[Term, list[_Side]] = {}
     for atom in rule.body:
         if atom.kind == "data":
-            here = types.get(atom.arguments[0], _ANY) if atom.predicate == HAS_VALUE else _ANY
+            here = types.get(atom.arguments[0], _ANY) if atom.predicate == rdf.HAS_VALUE else _ANY
             read.setdefault(atom.arguments[1], []).append(frozenset({here}))
     for term, sides in read.items():
         yield from itertools.combinations([*sides, *_number(term)], 2)
@@ -519,13 +508,13 @@ def _is_plain(base: Ontology) -> bool:
     """Whether nothing but rules that compare can relate a value to others: no axiom, and no rule that asserts one."""
     triples = base.content.triples
     schema = {(s, p, o) for s, p, o in triples if s in _OF_VALUES or o in _OF_VALUES} - _FUNCTIONAL
-    functional = {s for s, p, o in triples if p == RDF_TYPE and o == OWL + "FunctionalProperty"}
+    functional = {s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"}
     own = [(s, p) for s, p, o in triples if p in functional and isinstance(o, str)]
     atoms = [atom for rule in base.content.enabled_rules for atom in rule.atoms]
     heads = [atom for rule in base.content.enabled_rules for atom in rule.head]
     return not (
         any((p, None) not in _HARMLESS and (p, o) not in _HARMLESS for _, p, o in schema)
-        or any(p == SAME or o == OWL + "InverseFunctionalProperty" for _, p, o in triples)
+        or any(p == SAME or o == rdf.OWL + "InverseFunctionalProperty" for _, p, o in triples)
         or len({*own}) < len(own)
         or has_expressions(base)
         or any(base.model.own[measurement] for measurement in base.model.measurements.values())
