@@ -25,7 +25,6 @@ class Learned:
     Attributes:
         manager: its name, or module:Class.
         scenario: name of the scenario that it was trained on.
-        seed: seed of the training.
         missions: number of missions, runs 1 to that.
         inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
         learned: what the manager's hook `recall` was given, and has changed.

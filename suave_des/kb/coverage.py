@@ -32,10 +32,8 @@ class Goal:
     """Something that a test can cover.
 
     Attributes:
-        rule: name of the rule.
         atom: number of an atom of its body, in the order in which they are tried; -1 for the rule itself.
         outcome: "fires", "does not fire", "holds", "fails", or, of a comparison, "less", "equal" or "greater".
-        text: the atom.
         holds, fails: it is covered where one conjunction of atoms holds, which an empty one always does, and another
             one fails; None: no other one.
     """
@@ -48,7 +46,6 @@ class Goal:
     fails: Body | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
-        """As a list of what is not covered has it."""
         if self.atom < 0:
             return f"{self.rule} {self.outcome}"
         words = ORDERS[self.outcome][1] if self.outcome in ORDERS else self.outcome
@@ -87,7 +84,6 @@ class Coverage(NamedTuple):
     """What tests cover of all enabled rules.
 
     Attributes:
-        goals: all goals.
         covered: number of situations that cover each goal; none if it is missing.
         missing: goals that no situation covers, but that a state of the model reaches; further ones nothing reaches.
         proposed: states that would cover what is missing, few ones, each with what it would add.
@@ -132,12 +128,7 @@ class Coverage(NamedTuple):
 
 
 def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], max_failed: int) -> Coverage:
-    """Measure what situations cover.
-
-    Args:
-        knowledge: the knowledge base.
-        situations: of the tests.
-        max_failed: for the states that are proposed: at most so many components report anything.
+    """Measure what the situations of tests cover; in states that are proposed at most `max_failed` components report.
 
     Raises:
         InputError: there would be too many states.

@@ -105,7 +105,6 @@ class PolicyDifference:
         cells: a row for each kind of state that is decided differently: the columns of a policy's cases that tell it
             from others; `statuses` and what happens, `_then`, of both, with `_a` and `_b` at the end; one such `state`.
         reported: number of states in which they decide alike, but infer different statuses.
-        space: what the policies tell apart.
         functions: that have an objective.
         no_proof: why rules may do more than compare; if there are any reasons, the ranges are samples only.
     """
@@ -185,7 +184,6 @@ class PairedDifference(NamedTuple):
     """One metric of the same missions under two knowledge bases.
 
     Attributes:
-        metric: column of runs.csv.
         pairs: its values with one (`a`) and with the other (`b`), by run, where both are known.
         difference: mean of b - a, run by run, with its 95% interval (Student's t).
         changed: number of missions in which the metric differs.
@@ -201,7 +199,6 @@ class MissionDifference(NamedTuple):
     """Missions under two knowledge bases, with common random numbers.
 
     Attributes:
-        missions: number of pairs.
         changed: run numbers of the missions in which any column of runs.csv differs.
         metrics: search time, distance, and what else differs.
     """
@@ -244,9 +241,6 @@ def compare_missions(
         scenario: name or path.
         runs: number of missions with each knowledge base.
         one, other: ontologies, rules and values of the scenario, as load_scenario takes them.
-        seed: of everything that is random.
-        workers: processes.
-        on_progress: called when missions are done.
 
     Raises:
         InputError: something cannot be used, or missions fail.
@@ -268,11 +262,7 @@ def compare_missions(
 def firing_states(
     scenario: str, runs: int, one: Replacements, other: Replacements, *, seed: int, limit: TimeLimit
 ) -> tuple[int, int]:
-    """Count the states of missions with one knowledge base in which a rule fires that only one of the two has.
-
-    Args:
-        scenario, runs, one, other, seed: as of compare_missions.
-        limit: of Pellet's time for one state.
+    """Count the states of the first of compare_missions's missions in which a rule fires that only one of the two has.
 
     Returns:
         how many states, and of how many.

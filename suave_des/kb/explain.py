@@ -55,9 +55,7 @@ class Derivation:
     """How a fact follows.
 
     Attributes:
-        fact: what follows.
         source: "state" or "ontology" where it is asserted, "rule", or "axioms" where it follows from the schema.
-        rule: the rule's name.
         bindings: value of each of the rule's variables, by variable.
         axioms: the axioms of the schema that were used.
         premises: the facts of the rule's body, instantiated.
@@ -71,7 +69,6 @@ class Derivation:
     premises: tuple[Derivation, ...] = ()
 
     def __str__(self) -> str:
-        """As a tree of lines."""
         return "\n".join(self.lines())
 
     def lines(self, indent: str = "") -> Iterator[str]:
@@ -97,7 +94,6 @@ class Tracer:
     """Derives the facts of one state.
 
     Attributes:
-        state: whose facts are derived.
         pellet: made by `pellet_for`, for who asks about many states; None: one of its own.
     """
 
@@ -155,9 +151,8 @@ class Tracer:
         with one_at_a_time:
             for binding in matching.matches(rule, self._facts):
                 concluded = [triple for atom in rule.head if (triple := matching.stated(atom, binding)) is not None]
-                if all(
-                    canonical_triple(triple) in self._facts for triple in concluded
-                ):  # what is the same, Pellet knows
+                # What is the same, Pellet knows.
+                if all(canonical_triple(triple) in self._facts for triple in concluded):
                     facts = tuple(map(self._fact, sorted(concluded, key=str)))
                     yield matching.shown_bindings(binding, self.base.names), facts
 
@@ -211,7 +206,6 @@ class Tracer:
         return content.n_triples(rules)
 
     def _trace(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> Trace:
-        """What Pellet says that a triple follows from."""
         return trace_contradiction(self._text(facts, rules) + _denial(triple))
 
     def _axioms(self, trace: Trace) -> tuple[str, ...]:
@@ -265,19 +259,17 @@ _WORDS: Final = {
     "=": "equal to",
     "!=": "different from",
 }
+_OF_GROUNDINGS: Final = sorted(rdf.terms(rdf.TOMASYS, "FunctionGrounding typeFD solvesO"))
 #: What a state asserts, and how to give it where it is missing.
 _GIVEN_BY_STATES: Final[Mapping[str, str]] = {
-    rdf.TOMASYS + "FunctionGrounding": "; ground a function: --at FUNCTION=DESIGN",
-    rdf.TOMASYS + "typeFD": "; ground a function: --at FUNCTION=DESIGN",
-    rdf.TOMASYS + "solvesO": "; ground a function: --at FUNCTION=DESIGN",
+    **dict.fromkeys(_OF_GROUNDINGS, "; ground a function: --at FUNCTION=DESIGN"),
     rdf.C_STATUS: "; report a component: --at COMPONENT=FALSE",
     rdf.HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
     rdf.TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
 }
 #: All that states assert.
-_IN_STATES: Final = frozenset(
-    {*_GIVEN_BY_STATES, rdf.HAS_VALUE, rdf.IS_QA_TYPE, rdf.O_STATUS}
-    | {rdf.TOMASYS + name for name in ("QAvalue", "typeF", "o_always_improve")}
+_IN_STATES: Final = rdf.terms(rdf.TOMASYS, "QAvalue hasValue isQAtype typeF o_status o_always_improve").union(
+    _GIVEN_BY_STATES
 )
 
 
@@ -285,8 +277,7 @@ class WhyNot(NamedTuple):
     """Why a rule does not fire, or that it does.
 
     Attributes:
-        rule: its name.
-        answer: in one line, without the name.
+        answer: in one line, without the rule's name.
         fires: whether its whole body holds.
         failing: number of the atoms that do not hold there; 0 where the answer is not about atoms.
     """
@@ -297,16 +288,12 @@ class WhyNot(NamedTuple):
     failing: int = 0
 
     def __str__(self) -> str:
-        """As `kb why-not` prints it."""
         return f"{self.rule}: {self.answer}"
 
 
 @dataclass(frozen=True)
 class RuleQuestions:
     """Answers for the rules of one knowledge base.
-
-    Attributes:
-        base: ontologies and rules.
 
     Example:
         >>> questions = RuleQuestions(knowledge.base)
@@ -330,15 +317,10 @@ class RuleQuestions:
         return next((each for each in answers if each.fires), answers[0])
 
     def of(self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})) -> WhyNot:
-        """Say why a rule, which may have the name of another one, does not fire in a state.
-
-        Args:
-            start: what variables must stand for.
-        """
+        """Say why a rule, of several of its name, does not fire where variables stand for what `start` says."""
         if not rule.enabled:
-            return WhyNot(
-                rule.name, f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
-            )
+            answer = f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
+            return WhyNot(rule.name, answer)
         for problem in fatal_problems(rule, self.base.vocabulary):
             remedy = f"; {problem.remedy}" if problem.remedy else ""
             return WhyNot(rule.name, f"never fires: {problem.message}{remedy}")
@@ -365,14 +347,12 @@ class RuleQuestions:
 
     def missing(self, triple: Triple, state: KnowledgeState) -> list[WhyNot]:
         """Say why no rule concludes a fact, of each that could; those that lack least first."""
-        starts = (
-            (
-                rule,
-                next((start for head in rule.head if (start := matching.matched(head, triple, {})) is not None), None),
-            )
-            for rule in self.base.content.enabled_rules
-        )
-        found = [self.of(rule, state, start) for rule, start in starts if start is not None]
+        found = []
+        for rule in self.base.content.enabled_rules:
+            starts = (matching.matched(head, triple, {}) for head in rule.head)
+            start = next((each for each in starts if each is not None), None)
+            if start is not None:
+                found.append(self.of(rule, state, start))
         return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
 
     def _is_fixed(self, atom: Atom) -> bool:
@@ -385,9 +365,7 @@ class RuleQuestions:
     def _usable(self) -> Ontology:
         """The knowledge base without the rules that Pellet would drop."""
         known = self.base.vocabulary
-        return self.base.with_rules(
-            each for each in self.base.rules if not (each.enabled and fatal_problems(each, known))
-        )
+        return self.base.with_rules(one for one in self.base.rules if not (one.enabled and fatal_problems(one, known)))
 
     def _known(self, state: KnowledgeState) -> Facts | str:
         """All that follows in a state, or what contradicts what in it."""
@@ -423,13 +401,7 @@ class RuleQuestions:
 
 
 def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
-    """Describe why an atom does not hold.
-
-    Args:
-        atom: of the body of a rule.
-        binding: what variables stand for.
-        facts: all that follows.
-    """
+    """Describe why an atom of a rule's body does not hold, with a binding, in all that follows."""
     if atom.kind in FACT_KINDS:
         subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
         who, name = base.names.short(subject) if isinstance(subject, str) else "", local_name(atom.predicate)
@@ -466,9 +438,8 @@ def _compared(base: Ontology, atom: Atom, binding: Binding) -> str:
     numbers = [kind in rdf.NUMERIC for kind in kinds]
     if len(kinds) == 2 and numbers[0] != numbers[1]:
         text = texts[numbers.index(False)]
-        return (
-            f"{text} is text, and never compares with the number {texts[numbers.index(True)]}; write it without quotes"
-        )
+        number = texts[numbers.index(True)]
+        return f"{text} is text, and never compares with the number {number}; write it without quotes"
     return f"found {texts[0]}, needed {words} {texts[1]}"
 
 
@@ -524,7 +495,6 @@ class Candidate:
     because: tuple[Derivation, ...] = ()
 
     def __str__(self) -> str:
-        """Design, verdict and reason."""
         return f"{self.design}: {self.verdict}: {self.reason}"
 
 
@@ -573,18 +543,12 @@ class DecisionExplanation:
 
 @dataclass(frozen=True)
 class Explanation:
-    """The answer to a question about a state.
-
-    Attributes:
-        facts: how facts follow.
-        decisions: why functions get their designs.
-    """
+    """The answer to a question about a state: how facts follow, and why functions get their designs."""
 
     facts: tuple[Derivation, ...] = ()
     decisions: tuple[DecisionExplanation, ...] = ()
 
     def __str__(self) -> str:
-        """As `kb explain` prints it."""
         return "\n".join(self.lines())
 
     def lines(self) -> Iterator[str]:
@@ -646,7 +610,6 @@ class _Explainer:
         raise InputError(f"{fact} does not follow in this state", remedy="; ".join(remedies))
 
     def design(self, design: str) -> DecisionExplanation:
-        """What becomes of a function design, and why."""
         function = next((name for name in self.base.functions if design in self.base.designs(name)), None)
         if function is None:
             known = [each for name in self.base.functions for each in self.base.designs(name)]

@@ -123,9 +123,7 @@ class KnowledgeBase:
     def decide(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Reasoning:
         """Decide as a mission does: infer the terms on which decisions depend and those that rules assert, and plan.
 
-        Args:
-            state: the state.
-            facts: further assertions.
+        The facts are assertions in addition to those of the state.
 
         Raises:
             KnowledgeError: the state contradicts the ontologies, planning needs what they do not say, or the reasoner
@@ -191,7 +189,6 @@ class KnowledgeBase:
         """Explain why a fact or a decision follows in a state.
 
         Args:
-            state: the state.
             question: a fact such as "fg_status(fg_spiral_high, IN_ERROR_NFR)", "why fd_spiral_low?" or "why not
                 fd_spiral_high?"; empty: all that is inferred and decided.
 
@@ -214,9 +211,7 @@ class KnowledgeBase:
         """Decide every state, with at most `max_failed` components that report a status.
 
         Args:
-            max_failed: that many components at most.
-            on_count: called with the number of kinds of states that have been inferred so far, first 0, and how many
-                have to be.
+            on_count: called with how many kinds of states have been inferred, first 0, and how many have to be.
             space: what to tell apart; None: what can have an effect.
 
         Raises:

@@ -127,24 +127,17 @@ class Facts:
 
 
 def matches(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> list[Binding]:
-    """All bindings with which the whole body of a rule holds, in a fixed order.
-
-    Args:
-        start: what variables must stand for.
-    """
+    """All bindings with which the whole body of a rule holds, and which extend one, in a fixed order."""
     body = _canonical_body(rule)
     ways = _ways(body, testable_order(body), facts, start, iter(range(MOST_WAYS)))
     return sorted((binding for binding, _ in ways), key=str)
 
 
 def nearest_match(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> tuple[Binding, tuple[int, ...]]:
-    """Find the binding with the fewest atoms of a rule's body that fail, and their numbers.
+    """Find the extended binding with the fewest atoms of a rule's body that fail, and their numbers.
 
     Of several, one where a comparison fails comes before one where a value differs, and that before one where
     nothing is known. Atoms of which there is no fact at all fail in any case.
-
-    Args:
-        start: what variables must stand for.
     """
     body = _canonical_body(rule)
 
@@ -175,11 +168,7 @@ def _ways(
     tries: Iterator[int],
     allowed: int = 0,
 ) -> Iterator[tuple[Binding, tuple[int, ...]]]:
-    """Ways to match atoms, in an order, of which some are allowed to fail: the binding, and the numbers of those.
-
-    Args:
-        tries: ends when there have been enough.
-    """
+    """Ways to match atoms, in an order, of which some may fail: binding, and numbers of those; as many as `tries`."""
     if next(tries, None) is None:
         return
     if not order:
@@ -263,11 +252,7 @@ class Probes:
     Each is the body of a separate rule, whose head has an individual and a property that nothing else mentions, so that
     it changes nothing.
 
-        probes = Probes(base, TimeLimit(), [rule.body for rule in base.rules])
-        probes.holding(Situation(state))  # bodies of the rules that fire
-
     Args:
-        base: ontologies and rules.
         limit: of Pellet's time for one situation.
         bodies: the conjunctions; each must be safe, as the body of a rule is.
 

@@ -52,8 +52,7 @@ class Mutant:
     """A knowledge base with one change.
 
     Attributes:
-        operator: name of the kind of change.
-        old: the rule that is replaced.
+        operator: one of OPERATORS.
         new: the rule in its place; None where it is removed.
     """
 
@@ -81,7 +80,6 @@ class Mutant:
         return f"{before[at]} becomes {after[at]}" if len(before) == len(after) else f"{before[at]} is left out"
 
     def __str__(self) -> str:
-        """As reports have it."""
         return f"{self.name}: {self.operator}: {self.text}"
 
     def applied(self, base: Ontology) -> Ontology:
@@ -199,7 +197,6 @@ class MutantResult(NamedTuple):
     """What became of a mutant.
 
     Attributes:
-        mutant: which.
         result: "killed", "equivalent" or "survived".
         reason: the test that kills it, why it is equivalent, or what differs.
         state: for a survivor, a state that tells it apart.
@@ -256,8 +253,7 @@ def mutate(
 
     Args:
         knowledge: the knowledge base; all tests pass on it.
-        tests: to run.
-        mutants: of the knowledge base.
+        tests, mutants: of that knowledge base.
         max_failed: for the states that are compared: at most so many components report anything.
         on_result: called after each mutant.
 

@@ -101,7 +101,6 @@ def make_policy(
     """Tabulate what is decided in states.
 
     Args:
-        base, settings: ontologies and rules, and what is measured.
         states: of at most `max_failed` components that report.
         decided: what is decided in each of them, as decide_all says.
         decide: concludes anew, for contradictions, which are told with the values of the state.

@@ -27,12 +27,9 @@ _LABEL_LETTERS: Final = 52
 def draw_policy(policy: Policy, path: Path) -> None:
     """Draw the table of each function that has a choice, with a colour for the design that is in use afterwards.
 
-    Args:
-        policy: the policy.
-        path: .png, .pdf or .svg.
-
     Raises:
-        InputError: there is no choice to draw, or there are too many rows; or the file cannot be written.
+        InputError: there is no choice to draw, or there are too many rows; or the file is not a .png, .pdf or .svg that
+            can be written.
     """
     check_picture(path)
     found = {name: function_table(policy, name) for name in policy.functions}

@@ -1,15 +1,6 @@
 """Tests of rules: read from YAML files, run, and written, as JUnit XML or as new tests.
 
-    rules: [spare.swrl]
-    tests:
-    - name: a search that is too high for the visibility is in error
-      given:
-        groundings: {f_generate_search_path: fd_spiral_high}
-        measurements: {water_visibility: "< 3.25"}
-      follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
-      decides: {f_generate_search_path: fd_spiral_medium}
-
-The guide docs/guides/test-rules.md describes all keys.
+The guide docs/guides/test-rules.md has examples, and describes all keys.
 """
 
 from __future__ import annotations
@@ -87,7 +78,6 @@ class RuleTest:
 
     Attributes:
         name: what it says of the rules.
-        file, line: where it is.
         situations: one, or one for each region of measured values.
         follows: facts that must follow, or be asserted, each with its triple.
         follows_not: facts that must not.
@@ -347,10 +337,8 @@ def tests_text(
     """Write tests that expect what follows in states now.
 
     Args:
-        about: the knowledge base, as the file names it.
-        knowledge: the same, loaded.
+        about: the knowledge base, as the file names it; `knowledge` is the same, loaded.
         states: each with the name of its test.
-        comment: for the head of the file.
 
     Raises:
         KnowledgeError: the reasoner takes too long.

@@ -40,8 +40,7 @@ class Situation:
     """A situation in which a knowledge base decides.
 
     Attributes:
-        state: the knowledge state.
-        facts: additional assertions, as triples.
+        facts: assertions in addition to those of the state.
         ranges: words for the region that the state stands for; empty for a single state.
     """
 
@@ -69,7 +68,7 @@ class Outcome:
 
     @property
     def known(self) -> frozenset[Fact]:
-        """What was asserted or inferred."""
+        """What was asserted or inferred; nothing where the situation contradicts itself."""
         return self.inferred if self.reasoning is None else self.inferred | self.reasoning.inference.asserted
 
     @property
@@ -79,7 +78,7 @@ class Outcome:
 
     @cached_property
     def statuses(self) -> tuple[str, ...]:
-        """What is inferred of objectives and groundings, as text, sorted."""
+        """What is inferred of objectives and groundings, in words, sorted."""
         return () if self.reasoning is None else tuple(sorted(self.reasoning.inference.statuses))
 
     def choice(self, function: str) -> str:
@@ -131,18 +130,13 @@ _MISSING: Final = "not measured"
 class Scale:
     """The places that a measured value can have among numbers: 0 is no measurement, then ranges and numbers take turns.
 
-    Attributes:
-        numbers: ascending.
-
-    Example:
-        >>> Scale((Decimal("1.25"), Decimal("2.25"))).text(2, 3)
-        '1.25 <= . < 2.25'
+    >>> Scale((Decimal("1.25"), Decimal("2.25"))).text(2, 3)  # the numbers are ascending
+    '1.25 <= . < 2.25'
     """
 
     numbers: tuple[Decimal, ...]
 
     def __len__(self) -> int:
-        """Number of places."""
         return 2 * len(self.numbers) + 2
 
     def place(self, value: Decimal | None) -> int:
@@ -217,11 +211,7 @@ class Region(NamedTuple):
 
 
 def parse_region(text: str) -> Region | None:
-    """Read a region as `kb policy` writes it; None for what is none, such as a number.
-
-    Example:
-        >>> parse_region("1.25 <= . < 2.25").holds(Decimal(2))
-        True
+    """Read a region as `kb policy` writes it, such as "1.25 <= . < 2.25"; None for what is none, such as a number.
 
     Raises:
         InputError: there is no number in it.
@@ -248,12 +238,7 @@ def parse_region(text: str) -> Region | None:
 
 
 def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[tuple[dict[str, Decimal | None], str]]:
-    """Measured values, one for each kind that rules that only compare can tell apart, with words for them.
-
-    Args:
-        base: the ontologies, whose numbers divide the regions.
-        regions: by quality attribute type.
-    """
+    """Measured values in the regions of attributes, one for each kind that comparing rules tell apart, with words."""
     ends = {number for region in regions.values() for _, number in region.comparisons or ()}
     scale = Scale(tuple(sorted({*numbers_in(base), *ends})))
     inside = ([at for at in range(len(scale)) if region.holds(scale.value(at))] for region in regions.values())
@@ -359,13 +344,7 @@ class Reports(NamedTuple):
 
 
 def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int) -> Iterator[Reports]:
-    """All that components can report, up to an exchange of interchangeable ones, fewest reports first.
-
-    Args:
-        groups: of interchangeable components.
-        statuses: that a component can report.
-        most: at most so many components report at all.
-    """
+    """All that at most so many components can report, up to an exchange in their group, fewest reports first."""
     ways = (
         [
             each
@@ -530,9 +509,7 @@ class States:
     """Every kind of state that a space tells apart: any measured values, with any reports and any task.
 
     Attributes:
-        space: what is told apart.
         measured: (attribute, value) of those attributes that are measured.
-        reports: what components report.
         tasks: states with objectives and groundings only.
     """
 
@@ -569,7 +546,6 @@ class States:
         return cls(space, measured, reports, tasks)
 
     def __len__(self) -> int:
-        """Number of kinds."""
         return len(self.measured) * len(self.reports) * len(self.tasks)
 
     def __iter__(self) -> Iterator[KnowledgeState]:
@@ -650,8 +626,7 @@ def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount
         base: the ontologies and rules.
         states: to decide.
         decide: concludes what follows and is decided in a situation.
-        on_count: called with the number of kinds of states that have been inferred so far, first 0, and how many have
-            to be.
+        on_count: called with how many kinds of states have been inferred, first 0, and how many have to be.
 
     Returns:
         what is decided in each of the states; a contradiction is told with the values of another one of its kind.

@@ -216,14 +216,7 @@ class ManagingSettings:
 
 @dataclass
 class StateBuilder:
-    """Builds a state from parts whose names it checks. Later parts replace earlier ones.
-
-    Example:
-        >>> builder = StateBuilder(Ontology.load(), ManagingSettings())
-        >>> builder.add_words(["water_visibility=1.8"])
-        >>> builder.state().measurements
-        (('water_visibility', Decimal('1.8')),)
-    """
+    """Builds a state from parts whose names it checks. Later parts replace earlier ones."""
 
     base: Ontology
     settings: ManagingSettings
@@ -345,10 +338,9 @@ def state_dict(state: KnowledgeState) -> dict[str, Any]:
 
 
 def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
-    """Read the missions that recorded their states, with their folders.
+    """Read the missions that recorded their states, with their folders; the run of a mission of its own is 0.
 
-    Args:
-        folder: output folder of a mission, whose run is 0 then, or of a campaign, or a folder of such folders.
+    The folder is the output of a mission or of a campaign, or has such folders in it.
 
     Raises:
         InputError: there is none, or a file cannot be read.
@@ -383,9 +375,8 @@ def recorded_state(folder: Path, time: str | float, run: int = 0) -> KnowledgeSt
     """Return the last state that a mission recorded up to a time.
 
     Args:
-        folder: of the mission, or of its campaign.
         time: mission time, s.
-        run: of the campaign; 0: the mission has a folder of its own.
+        run: of the campaign whose folder it is; 0: the folder is the mission's own.
 
     Raises:
         InputError: there is no such mission, the first state was recorded later, or the time is no number.

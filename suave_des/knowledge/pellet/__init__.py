@@ -41,8 +41,6 @@ class TimeLimit:
 
     Java code cannot be stopped from outside: the thread continues until the process ends.
 
-        TimeLimit(10.0).run(lambda: reasoner.infer(state), "reasoning on a state")
-
     Args:
         seconds: the limit of each piece of work.
         option: of the command line, which allows more.
@@ -59,19 +57,14 @@ class TimeLimit:
         self._stuck: str | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
-        """Do a piece of work and return its result.
-
-        Args:
-            work: what to do.
-            doing: a description for the message: "reasoning on the state ...".
+        """Do a piece of work and return its result; what it is doing is for the message: "reasoning on the state ...".
 
         Raises:
             ReasonerTimeoutError: it took longer, or an earlier one still has not ended.
         """
         if self._stuck is not None:
-            raise ReasonerTimeoutError(
-                f"the reasoner is still {self._stuck}", remedy="restart the program with different rules"
-            )
+            remedy = "restart the program with different rules"
+            raise ReasonerTimeoutError(f"the reasoner is still {self._stuck}", remedy=remedy)
         if self._thread is None or self._process != os.getpid():  # a process that was forked has none of the threads
             self._thread, self._process = _ReasonerThread(), os.getpid()
             self._thread.start()

@@ -210,9 +210,6 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
 class InProcessPellet:
     """Pellet with one ontology loaded.
 
-        pellet = InProcessPellet(ontology)
-        pellet.infer(ontology.assertions(state))  # values and members, as triples
-
     Args:
         terms: what to read after an inference; None: what decisions depend on, and what rules assert.
 
@@ -242,11 +239,8 @@ class InProcessPellet:
     def infer(self, assertions: Sequence[Triple]) -> frozenset[Triple]:
         """Return all values of the properties to read, and members of the classes to read.
 
-        Args:
-            assertions: triples added to the ontologies.
-
         Raises:
-            KnowledgeError: they contradict one another, or the ontologies.
+            KnowledgeError: the assertions contradict one another, or the ontologies.
         """
         start()  # an error in a process that was forked since
         with one_at_a_time, _java_errors(self._ontology):
