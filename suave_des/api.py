@@ -33,10 +33,7 @@ _CALLER = 4
 
 @dataclass(frozen=True, repr=False)
 class RecordedMission(MissionResult):
-    """A mission with its record, which can be drawn.
-
-    Attributes:
-        loaded: its scenario.
+    """A mission with its record, which can be drawn, and its scenario (`loaded`).
 
     Example:
         mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
@@ -181,7 +178,6 @@ def resume_campaign(
     """Resume the campaign in a folder where it stopped, and return its rows as run_campaign does.
 
     Args:
-        folder: its output folder.
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.

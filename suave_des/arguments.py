@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, Final, ParamSpec, TypeVar
 
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, shown, unknown
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -56,15 +56,11 @@ def plain_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def check_names(function: str, given: Iterable[str], known: Collection[str]) -> None:
-    """Check that a function has the arguments that it is given.
-
-    Raises:
-        InputError: it has not.
-    """
-    if unknown := [name for name in given if name not in known]:
-        listed = [name for name in known if name not in ("self", "cls")]
-        remedy = did_you_mean(unknown[0], listed, "its arguments")
-        raise InputError(f"{function} has no argument {unknown[0]!r}", remedy=remedy)
+    """Raise an InputError if a function is given an argument that it does not have."""
+    for name in given:
+        if name not in known:
+            listed = [each for each in known if each not in ("self", "cls")]
+            raise unknown(f"{function} has no argument {name!r}", name, listed, "its arguments")
 
 
 def _check(name: str, value: Any, annotation: str) -> None:

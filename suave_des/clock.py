@@ -70,12 +70,7 @@ def stop_at(event: simpy.Event) -> None:
 
 
 class Alarm:
-    """Calls a function at a mission time; setting it again replaces the pending call.
-
-    Args:
-        env: the mission's clock.
-        callback: the function.
-    """
+    """Calls a function at a mission time; setting it again replaces the pending call."""
 
     def __init__(self, env: simpy.Environment, callback: Callable[[], None]) -> None:
         self._env = env

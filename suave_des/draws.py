@@ -36,7 +36,6 @@ class Draws(Streams):
     Where a scenario gives a plain number instead of a distribution, the number is the value.
 
     Args:
-        scenario: gives numbers or distributions.
         seed: the campaign's.
         run: number of the run, from 1.
         runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.

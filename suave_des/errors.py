@@ -162,13 +162,8 @@ class Finding:
         Finding(Level.WARN, "the rule never fires", "mine.swrl", line=3, rule="Low", column=12)
 
     Attributes:
-        level: its severity.
-        message: what is wrong.
-        file: where.
-        line: in the file.
         rule: name of the rule, if it is about one.
         column: in the line, for rules as text.
-        remedy: how to correct it.
     """
 
     level: Level

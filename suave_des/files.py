@@ -52,7 +52,7 @@ _Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None
 
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that the user named, to read it; what is no file, such as a pipe, is not waited for.
+    """Open a file that the user named; what is no file, such as a pipe, is not waited for.
 
     Raises:
         InputError: missing, a folder, not a regular file, or unreadable.
@@ -72,11 +72,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_bytes(path: Path, limit: int = LIMIT_BYTES) -> bytes:
-    """Read a file that the user named.
-
-    Raises:
-        InputError: as `opened`; or it is longer than `limit` bytes.
-    """
+    """Read a file that the user named; raises as `opened`, and if it is longer than `limit` bytes."""
     with opened(path) as stream:
         content = stream.read(limit + 1)
     if len(content) > limit:
@@ -109,11 +105,7 @@ def check_own(paths: Iterable[Path]) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file that the user named.
-
-    Raises:
-        InputError: as `opened`; or it is not JSON.
-    """
+    """Read a JSON file that the user named; raises as `opened`, and if it is not JSON."""
     content = decode(path, read_bytes(path))
     try:
         return json.loads(content)
@@ -122,11 +114,7 @@ def read_json(path: Path) -> Any:
 
 
 def decode(path: Path, content: bytes) -> str:
-    """Decode the content of a file as text; a byte order mark is dropped.
-
-    Raises:
-        InputError: not UTF-8, with the line.
-    """
+    """Decode the content of a file as text, without byte order mark; an InputError has the line that is not UTF-8."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -135,12 +123,7 @@ def decode(path: Path, content: bytes) -> str:
 
 
 def read_csv(path: Path, limit: int, remedy: str) -> tuple[list[str], Iterator[tuple[int, list[str]]], str]:
-    """Read a CSV file that the user named.
-
-    Args:
-        path: the file.
-        limit: bytes that it may have.
-        remedy: for a line that is not CSV.
+    """Read a CSV file of at most `limit` bytes that the user named; `remedy` is for a line that is not CSV.
 
     Returns:
         Its header, its rows, each with its line, read as they are requested and without empty ones, and its SHA-256.
@@ -209,9 +192,8 @@ def check_output_folder(
     """Check that results can go into a folder, without changing anything.
 
     Args:
-        folder: where they are to go.
-        family: their kind, a key of FAMILIES.
-        overwrite: whether it need not be empty.
+        family: the kind of results, a key of FAMILIES.
+        overwrite: whether the folder need not be empty.
         left_over: returns whether a file of that name does not count.
 
     Raises:
@@ -262,21 +244,13 @@ def _check(path: Path, *cases: tuple[object, str, str]) -> None:
 
 
 def make_output_folder(folder: Path) -> None:
-    """Make the folder if it is not there yet.
-
-    Raises:
-        InputError: it cannot be made.
-    """
+    """Make the folder if it is not there yet; an InputError if it cannot be made."""
     with _user_errors(folder):
         folder.mkdir(exist_ok=True)
 
 
 def remove_results(folder: Path, names: Collection[str]) -> None:
-    """Remove files that were made from a campaign that is replaced, those of these names among them.
-
-    Raises:
-        InputError: it cannot be removed.
-    """
+    """Remove files made from a campaign that is replaced, and those named; an InputError if one cannot be removed."""
     with _user_errors(folder):
         for name in (*names, *DERIVED):
             (folder / name).unlink(missing_ok=True)
@@ -291,8 +265,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
     """Write files under temporary names, and rename them when all are complete.
 
     Args:
-        folder: an existing folder.
-        files: content by name; text is written as UTF-8, pieces of text one after the other.
+        files: content by name, in an existing folder; text is written as UTF-8, pieces of it one after the other.
         stale: names of files of an earlier use of the folder, removed unless they are written anew.
 
     Raises:

@@ -91,11 +91,8 @@ def ends_at_once(limit_s: float, message: str) -> Iterator[None]:
     """End the process at once when the block takes longer than a time, or when a signal asks to stop.
 
     For a block that nothing is lost with, and that swallows exceptions or spends long in compiled code: evaluation of
-    regular expressions lets signals through, but not other threads.
-
-    Args:
-        limit_s: what the block may take.
-        message: printed when it takes longer; the exit status is then 2.
+    regular expressions lets signals through, but not other threads. When the time is over, the message is printed, and
+    the exit status is 2.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

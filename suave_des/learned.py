@@ -23,8 +23,7 @@ class Learned:
     """A file with a manager's training result.
 
     Attributes:
-        manager: its name, or module:Class.
-        scenario: name of the scenario that it was trained on.
+        scenario: name of the scenario that the manager was trained on.
         missions: number of missions, runs 1 to that.
         inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
         learned: what the manager's hook `recall` was given, and has changed.
@@ -38,11 +37,7 @@ class Learned:
     learned: dict[str, Any]
 
     def text(self) -> str:
-        """Write the file's content.
-
-        Raises:
-            InputError: what was learned cannot be written as JSON.
-        """
+        """Write the file's content; an InputError if what was learned cannot be written as JSON."""
         try:
             return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
         except (TypeError, ValueError) as error:
@@ -51,11 +46,7 @@ class Learned:
 
 
 def read_file(path: Path) -> Learned:
-    """Read the file that training wrote.
-
-    Raises:
-        InputError: it cannot be read, or is something else.
-    """
+    """Read the file that training wrote; an InputError if it cannot be read, or is something else."""
     with suppress(AttributeError, TypeError, ValueError, RecursionError):
         content = json.loads(read_bytes(path, _LIMIT_BYTES))
         if content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
@@ -64,11 +55,7 @@ def read_file(path: Path) -> Learned:
 
 
 def read_learned(path: Path) -> Mapping[str, Any]:
-    """Read a training result as immutable values, so that all missions find the same.
-
-    Raises:
-        InputError: as read_file.
-    """
+    """Read a training result as read_file does, with immutable values, so that all missions find the same."""
     return MappingProxyType({key: _frozen(value) for key, value in read_file(path).learned.items()})
 
 

@@ -84,8 +84,6 @@ def manager_names() -> tuple[str, ...]:
 def name_of(manager: ManagerLike) -> str:
     """The name of a manager: that which it is registered by, or module:Class.
 
-        name_of(Metacontrol)  # "metacontrol"
-
     Raises:
         InputError: it is not a manager, or a class that cannot be found by its name.
     """

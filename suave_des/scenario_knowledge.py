@@ -52,12 +52,7 @@ def open_base(loaded: LoadedScenario) -> Ontology:
 def read_base(
     scenario: Scenario, ontologies: Sequence[Path] | None = None, rules: Sequence[Path] | None = None
 ) -> Ontology:
-    """Read ontologies and rules with a scenario's values, and with what its revision assumes.
-
-    Args:
-        scenario: the scenario.
-        ontologies: files; None: those that the scenario names.
-        rules: files of rules as text; None: those that the scenario names.
+    """Read ontologies and files of rules, by default those that a scenario names, with its values and operators.
 
     Raises:
         KnowledgeError: the ontologies or rules cannot be read.

@@ -120,11 +120,7 @@ def _note(folder: Path, name: str) -> str:
 
 
 def check_campaign(campaign: Campaign) -> dict[str, str]:
-    """Check the inputs of a campaign, and return the SHA-256 of each further file that decides; runs the user's code.
-
-    Raises:
-        InputError: an input is invalid.
-    """
+    """Check the inputs of a campaign as check_inputs does, and return the SHA-256 of each further file that decides."""
     spec = campaign.spec
     with _located(campaign.file):
         check_drawn(campaign.loaded, campaign.variation)
@@ -145,7 +141,6 @@ def check_inputs(
 
     Args:
         scenarios: those of the missions; what differs between them is what managers and functions are set to.
-        managers: names, or module:Class.
         replacements: what the user gave instead of the scenario's own files, as of load_scenario.
 
     Returns:
@@ -354,7 +349,7 @@ def identity(decides: Mapping[str, Any]) -> str:
 
 
 def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
-    """Check that a campaign can be resumed: everything that determines results is unchanged, except for added runs.
+    """Check that everything that determines results is unchanged, except for added runs, so that a campaign can resume.
 
     Raises:
         InputError: something differs, with its name and both values.

@@ -22,7 +22,7 @@ import yaml
 from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
-from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
+from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown, unknown
 from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at, with_values
 from suave_des.scenario.models import LONGEST_S, Real, Scenario, mean, ordered
 from suave_des.scenario.modes import modes_of
@@ -55,11 +55,8 @@ class Key(NamedTuple):
     """A parameter of a node, or a key of an experiment.
 
     Attributes:
-        node: that has it.
-        name: of the parameter.
         path: key path of the scenario, or of the campaign file after CAMPAIGN; empty: nothing here corresponds to it.
         default: of the exemplar's code, None if there is none or it is not known; its type is the parameter's in ROS 2.
-        meaning: for people.
         since, until: first and last revision whose code reads it.
     """
 
@@ -108,8 +105,7 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
     if name is not None:
         if name in REVISIONS:
             return name, "as requested"
-        problem = f"there is no revision {shown(name)} of the exemplar"
-        raise InputError(problem, place="--revision", remedy=did_you_mean(name, REVISIONS))
+        raise unknown(f"there is no revision {shown(name)} of the exemplar", name, REVISIONS, place="--revision")
     fitting, telling = list(_ORDER), ""
     for each, (first, last) in _TELLING.items():
         if each in found:
@@ -154,7 +150,6 @@ class Imported:
     """The exemplar's configuration in our form.
 
     Attributes:
-        loaded: the scenario.
         base: name of the shipped scenario that it builds on.
         why: the reason for its revision.
         scenario: text of its file.
@@ -184,7 +179,7 @@ def import_config(
     Args:
         files: the exemplar's files, in any order; any revision's.
         out: path of the scenario to be, which determines how it names other files.
-        managers: names of the managers that can be run.
+        managers: those that can be run.
         revision: which the files are read as; None: the only one that they fit.
         campaign: path of the campaign to be; None: no campaign is imported.
         runner_seed: of the exemplar's own draws, which become the campaign's conditions; None: values are drawn anew.
@@ -246,9 +241,7 @@ class Parameter:
     """A parameter in one of the user's files.
 
     Attributes:
-        document: the file.
-        entry: the node as it is written there.
-        name: of the parameter.
+        entry: the node as it is written in the file.
         value: plain data.
         node: as in the table of keys; empty if it is none of them.
     """
@@ -336,11 +329,7 @@ class Value(NamedTuple):
 
 
 def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario, notes: list[str]) -> dict[str, Value]:
-    """The values that a mission has, by the scenario's key path; notes about those that are not imported.
-
-    Raises:
-        InputError: two parameters contradict one another.
-    """
+    """The values that a mission has, by key path, and notes about others; an InputError if two contradict."""
     found, unneeded = dict[str, Parameter](), list[str]()
     has_runner = any(each.node == RUNNER for each in parameters)
     # The runner passes what has a default to each mission, with or without a value in its file.
@@ -461,11 +450,7 @@ class Runner(NamedTuple):
 
 
 def _runner(parameters: Sequence[Parameter]) -> Runner | None:
-    """The runner, if there is one.
-
-    Raises:
-        InputError: a value is impossible, or it has no experiments.
-    """
+    """The runner, if there is one; an InputError if a value is impossible, or it has no experiments."""
     found = {each.name: each for each in parameters if each.node == RUNNER}
     if not found:
         return None
@@ -535,11 +520,7 @@ def _campaign(
     runner_seed: int | None,
     notes: list[str],
 ) -> Entries:
-    """The runner's parameters as content of a campaign file.
-
-    Raises:
-        InputError: there is nothing to run.
-    """
+    """The runner's parameters as content of a campaign file; an InputError if there is nothing to run."""
     runs, shared = dict[str, int](), runner.settings.random_interval
     for place, manager, number, *_ in experiments:
         if manager not in known:
@@ -652,7 +633,6 @@ def export_config(
     """Write a scenario and a campaign as the exemplar's mission and runner files. No file is written.
 
     Args:
-        loaded: the scenario.
         campaign: content of a campaign file: managers, runs, seed, runs_per_draw, perturbations, and others.
         revision: of the exemplar that reads the files; None: the scenario's.
 
@@ -725,11 +705,7 @@ def _value(loaded: LoadedScenario, path: str, default: Any) -> Any:
 
 
 def _runner_of(loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str) -> dict[str, Any]:
-    """The parameters of the runner that the scenario does not have.
-
-    Raises:
-        InputError: the exemplar has none of the managers.
-    """
+    """The parameters that only the runner has; an InputError if the exemplar has none of the managers."""
     drawn, found = campaign.get("perturbations") or {}, dict[str, Any]()
     for key in DRAWN:
         path = key.path.removeprefix(PERTURBED)

@@ -9,7 +9,7 @@ from typing import Any, TypedDict, Unpack
 
 from suave_des.arguments import plain_arguments
 from suave_des.domain import WATER_VISIBILITY
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, shown, unknown
 from suave_des.resources import hashes, shown_name
 from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
@@ -23,11 +23,7 @@ class LoadedScenario:
     It can be pickled, so that it travels to worker processes by value.
 
     Attributes:
-        scenario: the validated description.
-        path: the scenario's file.
         ontologies: ontology files, in the order given.
-        modes: functions and their modes.
-        modes_path: the modes file.
         tables: times (s) and values of each table signal, by the signal's name.
         inputs: SHA-256 of each file read, by its name as shown to the user.
         layer: content of the scenario's files, with its lines.
@@ -110,8 +106,7 @@ def load_scenario(
         return name
     reasoner, modes_file = replacements.get("reasoner"), replacements.get("modes_file")
     if reasoner is not None and reasoner not in REASONERS:
-        remedy = did_you_mean(reasoner, REASONERS)
-        raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
+        raise unknown(f"there is no reasoner {shown(reasoner)}", reasoner, REASONERS, place="--reasoner")
     files = InputFiles()
     layer = scenario_layer(files, name, over)
     scenario = validated(layer, Scenario)
@@ -120,15 +115,14 @@ def load_scenario(
     modes_layer = files.yaml(named, "scenarios", by, ("modes_file",))
     modes = modes_of(modes_layer)
     modes.check(scenario, layer)
-    ontologies = tuple(find_named(each, "ontology") for each in replacements.get("ontologies", ())) or tuple(
-        find_named(each, "ontology", layer, ("knowledge", "ontologies", index))
-        for index, each in enumerate(knowledge.ontologies)
-    )
-    remedy = "a file of rules as text, named relative to this"
-    rules = [
-        find_named(each, "ontology", layer, ("knowledge", "rules", index), remedy)
-        for index, each in enumerate(knowledge.rules)
-    ]
+
+    def in_scenario(key: str, remedy: str | None = None) -> list[Path]:
+        names = enumerate(getattr(knowledge, key))
+        return [find_named(each, "ontology", layer, ("knowledge", key, index), remedy) for index, each in names]
+
+    replaced = [find_named(each, "ontology") for each in replacements.get("ontologies", ())]
+    ontologies = tuple(replaced or in_scenario("ontologies"))
+    rules = in_scenario("rules", "a file of rules as text, named relative to this")
     rules += map(Path, replacements.get("rules", ()))
     inputs = files.inputs | hashes((*ontologies, *rules))
     tables = {}
@@ -174,7 +168,7 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
         slower = with_values(loaded, {"signals.water_visibility.period_s": 120})
 
     Args:
-        loaded: the scenario to start from; it is left as it is.
+        loaded: is left as it is.
         values: new values by key path, such as "signals.water_visibility.period_s" or "thruster_events.0.time_s"; the
             path of a distribution's own parameter ("calibration.altitude_error_m.mean") works where the scenario has
             one, and a whole distribution (a mapping) may stand for a number.

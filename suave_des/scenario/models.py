@@ -73,8 +73,6 @@ class Within:
     """Bounds of a number or of what a distribution in its place states; its spread is at most their distance.
 
     Attributes:
-        ge: least value.
-        le: greatest value.
         is_floor: whether a distribution must not be able to give values below `ge` either.
         draws_are_cut: whether values that are drawn below `ge` count as `ge`, so that they may be stated.
     """
@@ -305,7 +303,6 @@ def support(distribution: AnyDistribution) -> tuple[float, float]:
 # The vehicle, its start, pipeline, water, signals, battery, and failures.
 
 Positive = Annotated[Real, Field(gt=0, le=1e6)]
-Offset = Coordinate
 Component = Annotated[Real, Field(ge=-1, le=1)]
 
 
@@ -414,7 +411,7 @@ class Camera(Strict):
 class ThrusterDescription(Strict):
     """One thruster, in the body frame (x forward, y left, z up, origin at the centre of mass)."""
 
-    position_m: tuple[Offset, Offset, Offset]
+    position_m: tuple[Coordinate, Coordinate, Coordinate]
     """Where it is."""
     direction: tuple[Component, Component, Component]
     """Unit vector of its force at positive command."""
@@ -441,7 +438,7 @@ class VehicleDescription(Strict):
     """Volume of water that the submerged body displaces."""
     water_density_kg_per_m3: Positive
     """Density of the water."""
-    centre_of_buoyancy_m: Offset
+    centre_of_buoyancy_m: Coordinate
     """Height above the centre of mass at which buoyancy acts."""
     quadratic_drag: tuple[Positive, Positive, Positive, Positive, Positive, Positive]
     """Coefficients c of the drag -c |v| v: surge, sway, heave (N s^2/m^2), roll, pitch, yaw (N m s^2)."""
@@ -754,16 +751,12 @@ class MetacontrolRevision(Strict):
     """Whether diagnostics are ignored while there is no objective."""
 
 
-Timer = Literal["monitors", "metacontrol"]
-"""Periodic timers of nodes."""
-
-
 class Revision(Strict):
     """One revision of the exemplar's software."""
 
     name: str
     """Name in result files."""
-    timers_in_step: tuple[Timer, ...]
+    timers_in_step: tuple[Literal["monitors", "metacontrol"], ...]
     """Timers that start with guided mode; every other one has a random phase."""
     coordinator: CoordinatorRevision
     """The mission node."""

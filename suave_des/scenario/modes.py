@@ -28,9 +28,7 @@ class Mode:
     """One mode of a function.
 
     Attributes:
-        name: of the mode.
-        active: whether the function's lifecycle node is active in it.
-        parameters: what it sets on the node, such as spiral_altitude in m; empty when inactive.
+        parameters: what it sets on the function's node, such as spiral_altitude in m; empty when that is inactive.
     """
 
     name: str
@@ -65,22 +63,14 @@ class ModeTable:
         return self.table.get(function, {}).get(mode)
 
     def modes(self, function: str) -> tuple[str, ...]:
-        """Return the names of a function's modes, __DEFAULT__ among them.
-
-        Raises:
-            InputError: there is no such function.
-        """
+        """Return the names of a function's modes, __DEFAULT__ among them; an InputError if there is no function."""
         if function not in self.table:
             remedy = did_you_mean(function, self.table, f"functions in {self.source}")
             raise InputError(f"there is no function {shown(function)}", file=self.source, remedy=remedy)
         return tuple(self.table[function])
 
     def mode(self, function: str, mode: str) -> Mode:
-        """Return one mode of a function.
-
-        Raises:
-            InputError: there is no such function, or it has no such mode.
-        """
+        """Return one mode of a function; an InputError if there is no such function, or it has no such mode."""
         known = self.modes(function)
         if mode not in known:
             remedy = did_you_mean(mode, known, f"its modes in {self.source}")
@@ -88,14 +78,9 @@ class ModeTable:
         return self.table[function][mode]
 
     def check(self, scenario: Scenario, layer: Layer) -> None:
-        """Check that the file has the functions and modes that a mission and its scenario use.
+        """Raise an InputError if the file lacks a function or mode that a mission and its scenario use.
 
-        Args:
-            scenario: the scenario.
-            layer: its content, with lines.
-
-        Raises:
-            InputError: one is missing.
+        It has the line in `layer`, which is the scenario's content.
         """
         for function in scenario.needed_functions():
             if UNGROUND_MODE not in self.modes(function):

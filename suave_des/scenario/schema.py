@@ -14,7 +14,6 @@ from pydantic import BaseModel
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import models_within
 
-_WITH_NAMED_ENTRIES = (("Scenario", "signals"), ("KnowledgeSettings", "values"))
 _EVENT_TEXT = r"^\s*\(\s*[1-6]\s*,\s*(failure|recovery)\s*,[^,]+\)\s*$"
 
 
@@ -35,7 +34,7 @@ def scenario_schema() -> dict[str, Any]:
     definitions["ThrusterEvent"] = event
     for named in ("signals", "default_modes"):
         definitions["Scenario"]["properties"][named]["additionalProperties"] = False  # other names than are allowed
-    for name, key in _WITH_NAMED_ENTRIES:  # over a base, a null removes an entry
+    for name, key in (("Scenario", "signals"), ("KnowledgeSettings", "values")):  # over a base, a null removes an entry
         entries = definitions[name]["properties"][key]
         allowed = entries.get("patternProperties", entries)
         for each in ("additionalProperties",) if allowed is entries else tuple(allowed):

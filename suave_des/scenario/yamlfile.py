@@ -37,9 +37,6 @@ class Location(NamedTuple):
     file: Path
 
 
-Places = Mapping[KeyPath, Location]
-
-
 @dataclass(frozen=True)
 class Layer:
     """Plain data of one or several merged files, with the location of each key path.
@@ -51,7 +48,7 @@ class Layer:
     """
 
     data: dict[str, Any]
-    places: Places
+    places: Mapping[KeyPath, Location]
     above: KeyPath = ()
 
     @property
@@ -109,11 +106,7 @@ def read_yaml(path: Path | str) -> Layer:
 
 
 def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
-    """Parse the text of a YAML file, as read_yaml does.
-
-    Raises:
-        InputError: as of read_yaml.
-    """
+    """Parse the text of a YAML file; raises as read_yaml does."""
     try:
         root = _composed(text)
         if not isinstance(root, yaml.MappingNode):
@@ -234,11 +227,7 @@ _DEFAULT_VEHICLE = "bluerov2"
 
 
 class InputFiles:
-    """Finds files that the user or a file names, reads them, and keeps the hash of each, for a manifest.
-
-    Attributes:
-        inputs: SHA-256 of each file, in hex, by its name as shown to the user.
-    """
+    """Reads files that the user or a file names; `inputs` has the SHA-256 of each, in hex, by its name as shown."""
 
     def __init__(self) -> None:
         self.inputs: dict[str, str] = {}
@@ -246,12 +235,7 @@ class InputFiles:
     def yaml(
         self, name: object, kind: str = "", by: Layer | None = None, key_path: KeyPath = (), depth: int = 0
     ) -> Layer:
-        """Find a YAML file as find_named does, unless no kind is given, and read it as read_yaml does.
-
-        Args:
-            name, kind, by, key_path: as of find_named.
-            depth: of its places: 0 for a file that the user named, 1 for its base, and so on.
-        """
+        """Find a YAML file as find_named does, unless no kind is given, and read it as read_yaml does."""
         path = find_named(name, kind, by, key_path) if kind else Path(str(name))
         shown_as = shown_name(path)
         content = read_bytes(path, SIZE_LIMIT_BYTES)
@@ -266,8 +250,7 @@ def find_named(
     """Find a file that the user names, or that a layer names: beside the file in which its name is given, or shipped.
 
     Args:
-        name: a path, or the name of a shipped file.
-        kind: of the file, as of shipped_folder.
+        name, kind: as of find.
         by: the layer; None: the user.
         key_path: where the layer gives the name.
         remedy: if there is no such file.
@@ -291,7 +274,6 @@ def scenario_layer(files: InputFiles, name: str | Path, over: Layer | None = Non
     """Read a scenario file and merge it over its bases, with its revision and its vehicle written out in full.
 
     Args:
-        files: reads them.
         name: path of the scenario, or name of a shipped one.
         over: what differs from it; None: nothing.
 
@@ -398,20 +380,14 @@ def validated(layer: Layer, model: type[_T]) -> _T:
 
 
 def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any) -> tuple[KeyPath, str, str | None]:
-    """Return the first problem of data that are in no file: its key path, what is wrong, and what would be right.
-
-    Args:
-        error: what pydantic raised for the data.
-        data: what was validated.
-        model: the model, or other type, that they were to be.
-    """
+    """Return the first problem of data that are in no file: its key path, what is wrong, and what would be right."""
     path, first = _first_problem(error, Layer(data, {(): Location(0, 1, Path())}))
     path = (*path, *first.get("ctx", {}).get("keys", "").split()[:1])
     return path, *_texts(first, path, model)
 
 
 def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, ErrorDetails]:
-    """Return the problem to be told of, with its key path: the first in the user's own file, or else in its base."""
+    """Return the first problem in the user's own file, or else in its base, with its key path."""
     found = ((_key_path(each, layer), each) for each in error.errors(include_url=False))
     late = {"missing": 1, "too_short": 2}  # a misspelt key is also a missing one, a list with a wrong entry too short
     return min(found, key=lambda each: (late.get(each[1]["type"], 0), *layer.place(each[0])[:2]))
