@@ -83,8 +83,7 @@ def run_mission(
             made if its parent exists. None: no files.
         overwrite: whether results of the same kind in the folder are replaced.
         command: the command line, for mission.json.
-        replacements: ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options, as of
-            load_scenario.
+        replacements: as of load_scenario.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -121,8 +120,6 @@ def run_campaign(
     **options: Any,
 ) -> CampaignFrame:
     """Run missions of a scenario under each manager; a row for each mission, with the columns of runs.csv.
-
-    The data frame can be compared and drawn: `frame.compare()`, `frame.figure()`.
 
     The rows are the same for any number of workers. Columns scenario and manager are categories, the managers in the
     order given; run, seed and adaptations int64, pipeline_found bool, other metrics float64, nan if not measured.

@@ -50,7 +50,7 @@ def private_cache(kind: str) -> Path | None:
 
 
 def _private(folder: Path) -> Path:
-    """Make a folder that only this user may enter, or see that it is one, and no link or somebody else's: OSError."""
+    """Make a folder that only this user may enter, if need be; an OSError if it is a link, or somebody else's."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():

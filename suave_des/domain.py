@@ -15,7 +15,6 @@ GENERATE_RECHARGE_PATH = "generate_recharge_path"
 SURFACE, SURFACE_MODE = "f_surface", "fd_surface"
 """What a leak demands, and how it is done unless a managing subsystem has another design for it."""
 MOVING_FUNCTIONS = (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, SURFACE)
-"""Functions that send the vehicle somewhere."""
 MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 """Functions that the mission's two tasks need, so that a modes file must have them."""
 
@@ -23,7 +22,6 @@ DEFAULT_MODE, UNGROUND_MODE = "__DEFAULT__", "fd_unground"
 """The mode that a function's node starts with, and the one that a cancelled task sets; no function designs."""
 
 MANAGER_GROUP = "suave_des.managers"
-"""Entry point group in which packages register their managers."""
 
 WATER_VISIBILITY, BATTERY_LEVEL = "water_visibility", "battery_level"
 """Quality attributes that the exemplar's monitors measure."""

@@ -43,11 +43,6 @@ class Draws(Streams):
 
     Attributes:
         drawn: values that hold for the whole run, by key path.
-
-    Example:
-        >>> draws = Draws(load_scenario("seams2023").scenario, seed=1, run=7, runs_per_draw={}, numbers={})
-        >>> draws.value("calibration.altitude_error_m") == draws.drawn["calibration.altitude_error_m"]
-        True
     """
 
     def __init__(

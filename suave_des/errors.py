@@ -92,7 +92,6 @@ def line_error(file: Path, line: int, problem: str, remedy: str | None = None) -
 
 
 _WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}
-"""Python's spelling of a value, and YAML's."""
 
 
 def shown(value: object, limit: int = 60) -> str:
@@ -158,8 +157,6 @@ _NOUNS: Final = {Level.ERROR: "error", Level.WARN: "warning", Level.INFO: "note"
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One finding.
-
-        Finding(Level.WARN, "the rule never fires", "mine.swrl", line=3, rule="Low", column=12)
 
     Attributes:
         rule: name of the rule, if it is about one.

@@ -97,7 +97,7 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
 
     Args:
         found: nodes, node.parameter and launched packages in the files.
-        name: of the revision, if the user gave it.
+        name: if the user gave it.
 
     Raises:
         InputError: there is none of that name, or the files fit several, or none.
@@ -138,7 +138,7 @@ def node_of(entry: str, given: Collection[str], name: str) -> str:
 
 PARAMETERS = "ros__parameters"
 EXTENDED = "suave_extended"
-"""Name of the exemplar's mission with recharging."""
+"""The exemplar's mission with recharging."""
 TREES = {"suave_bt": "bt", "suave_bt_extended": "bt_extended"}
 """Manager by the name of the behaviour tree's executable."""
 _VISIBILITY = "signals.water_visibility."
@@ -177,7 +177,7 @@ def import_config(
     """Convert mission, campaign and System Modes files of the exemplar. Nothing is written.
 
     Args:
-        files: the exemplar's files, in any order; any revision's.
+        files: in any order; any revision's.
         out: path of the scenario to be, which determines how it names other files.
         managers: those that can be run.
         revision: which the files are read as; None: the only one that they fit.

@@ -63,7 +63,7 @@ class ModeTable:
         return self.table.get(function, {}).get(mode)
 
     def modes(self, function: str) -> tuple[str, ...]:
-        """Return the names of a function's modes, __DEFAULT__ among them; an InputError if there is no function."""
+        """Return the names of a function's modes, with __DEFAULT__; an InputError if there is no such function."""
         if function not in self.table:
             remedy = did_you_mean(function, self.table, f"functions in {self.source}")
             raise InputError(f"there is no function {shown(function)}", file=self.source, remedy=remedy)
@@ -78,10 +78,7 @@ class ModeTable:
         return self.table[function][mode]
 
     def check(self, scenario: Scenario, layer: Layer) -> None:
-        """Raise an InputError if the file lacks a function or mode that a mission and its scenario use.
-
-        It has the line in `layer`, which is the scenario's content.
-        """
+        """Raise an InputError, with its line in the scenario (layer), if a mission uses a mode that is not there."""
         for function in scenario.needed_functions():
             if UNGROUND_MODE not in self.modes(function):
                 remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
