@@ -7,32 +7,15 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Unpack
 
+from suave_des import files
 from suave_des.arguments import plain_arguments
-from suave_des.campaign.inputs import (
-    check_campaign,
-    check_inputs,
-    check_same,
-    check_trusted,
-    deciding,
-    identity,
-    note_own,
-    read_campaign,
-    trained_on,
-)
+from suave_des.campaign import inputs
 from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range, read_campaign_file
 from suave_des.campaign.workers import LocalWorkers, in_process
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
-from suave_des.files import (
-    check_output_file,
-    check_output_folder,
-    make_output_folder,
-    remove_parts,
-    remove_results,
-    write_files,
-)
 from suave_des.learned import Learned
 from suave_des.metrics.result import MissionMetrics
 from suave_des.records.mission_folder import provenance
@@ -75,10 +58,8 @@ def run_campaign(
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose arguments it has.
 
-    The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
-    mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
-    the others are kept. `on_progress` is called when missions are done; `settings_of` returns settings of the
-    campaign's managers, which a campaign file may name.
+    The result is the same however often the campaign was interrupted and resumed. `on_progress` is called when missions
+    are done; `settings_of` returns settings of the campaign's managers, which a campaign file may name.
 
     Raises:
         CampaignInterrupted: Ctrl-C; finished missions are kept.
@@ -92,7 +73,7 @@ def run_campaign(
     given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
     spec = CampaignSpec.of(named, **given, **options)
     if spec.out is not None:
-        check_output_folder(spec.out, "campaign", overwrite=spec.overwrite, left_over=is_left_over)
+        files.check_output_folder(spec.out, "campaign", overwrite=spec.overwrite, left_over=is_left_over)
         if not spec.overwrite and has_campaign(spec.out):
             remedy = f"--resume {spec.out} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
             raise InputError("the output folder is not empty: it has a campaign in it", file=spec.out, remedy=remedy)
@@ -100,7 +81,7 @@ def run_campaign(
     if settings := settings_of(spec.with_file(file).managers):
         spec = spec.model_copy(update={"replacements": {**spec.replacements, "manager_options": settings}})
     with ExitStack() as stack:
-        return _run(stack, spec.with_file(file), lambda: read_campaign(spec, file, loaded), None, on_progress)
+        return _run(stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded), None, on_progress)
 
 
 def resume_campaign(
@@ -116,11 +97,9 @@ def resume_campaign(
     """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it has.
 
     Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
-    `on_progress` is called when missions are done.
 
     Raises:
-        InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
-            difference is named.
+        InputError: the store is damaged or in use, or as suave_des.resume_campaign.
         WorkerError, StoreError, CampaignInterrupted: as run_campaign.
     """
     changed = {"runs": runs, "workers": workers, "scheduler": scheduler, "out": Path(folder)}
@@ -143,7 +122,7 @@ def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: 
     """
     changed = {"managers": tuple(managers)} if managers else {}
     with _stored(folder, changed, managers, confirmed=confirmed) as (_, campaign):
-        check_campaign(campaign)
+        inputs.check_campaign(campaign)
     return MissionRunner(campaign)
 
 
@@ -159,13 +138,13 @@ def _stored(
             stored = CampaignSpec.model_validate(store.about("request"))
             request = CampaignSpec.read({**stored.stored(), **changed})
             file = read_campaign_file(request.scenario)
-            campaign = read_campaign(request, file)
+            campaign = inputs.read_campaign(request, file)
         known = {*campaign.spec.managers, *campaign.code()}
         if unknown := [name for name in named if name not in known]:
             problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
             remedy = f"{did_you_mean(unknown[0], sorted(known), 'its managers')}; {_MORE_MANAGERS}"
             raise InputError(problem, file=folder, remedy=remedy)
-        check_trusted(campaign, named, folder, confirmed=confirmed)
+        inputs.check_trusted(campaign, named, folder, confirmed=confirmed)
         yield store, campaign
 
 
@@ -185,7 +164,7 @@ def _run(
     if spec.processes > 1 and spec.scheduler is None:  # at once: they import while this process reads and checks
         executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes
     campaign = read()
-    inputs = check_campaign(campaign)
+    decided_by = inputs.check_campaign(campaign)
     if spec.scheduler is not None:
         try:
             from suave_des.campaign.cluster import connected
@@ -194,17 +173,17 @@ def _run(
             raise InputError(problem, remedy="pip install 'suave-des[dask]'") from None
         executor = stack.enter_context(connected(spec.scheduler))
     folder, is_new = spec.out, store is None
-    decides = deciding(campaign, inputs)
-    about = {"request": campaign.request.stored(), "deciding": decides, "identity": identity(decides)}
+    decides = inputs.deciding(campaign, decided_by)
+    about = {"request": campaign.request.stored(), "deciding": decides, "identity": inputs.identity(decides)}
     if store is None:
         store = stack.enter_context(_new_store(folder, about))
         if folder is not None:
-            note_own(campaign, folder)
+            inputs.note_own(campaign, folder)
     elif folder is not None:
         with store.reading():
-            check_same(store.about("deciding"), decides, folder)
+            inputs.check_same(store.about("deciding"), decides, folder)
         check_no_link(folder)
-        remove_parts(folder, FILES)
+        files.remove_parts(folder, FILES)
         store.forget_passing_failures()
         for name, value in about.items():
             store.note(name, value)
@@ -217,9 +196,9 @@ def _run(
         raise StoreError(f"{stopped}{f'; what was kept before is safe: {command} runs the rest' if kept else ''}")
     try:
         with store.reading():
-            result = gather(campaign, store.outcomes, (*map(str, remarks), *trained_on(campaign)))
+            result = gather(campaign, store.outcomes, (*map(str, remarks), *inputs.trained_on(campaign)))
             if folder is not None:
-                hashes = {**inputs, **(campaign.file.inputs if campaign.file else {})}
+                hashes = {**decided_by, **(campaign.file.inputs if campaign.file else {})}
                 made = provenance(campaign.loaded, hashes, campaign.spec.command)
                 result.write({**made, "campaign_sha256": about["identity"]})
     except (KeyboardInterrupt, InputError) as error:
@@ -246,12 +225,12 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
         return
     was_there = folder.exists()
     try:
-        make_output_folder(folder)
+        files.make_output_folder(folder)
         check_no_link(folder)
         store = Store(folder / STORE_FILE, replace=True)
         try:
-            remove_parts(folder, FILES)
-            remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
+            files.remove_parts(folder, FILES)
+            files.remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
             store.begin(about)
             yield store
         finally:
@@ -327,9 +306,6 @@ def train(
         scenario: path of a scenario file, or name of a shipped one.
         manager: name, or module:Class; it keeps what it learns in the dict that its hook `recall` is given.
         missions: how many: runs 1 to that.
-        out: file to write.
-        seed: of everything that is random.
-        overwrite: whether the file may exist.
         on_mission: called with the metrics of each mission.
         replacements: as of load_scenario.
 
@@ -339,11 +315,11 @@ def train(
     """
     from suave_des.simulation.simulator import Simulator  # with the compiler, which campaigns load in their workers
 
-    check_output_file(Path(out), overwrite=overwrite)
+    files.check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)
     check_range("seed", seed, 0, SEED_LIMIT)
     loaded = load_scenario(scenario, **replacements)
-    inputs = check_inputs([loaded], [manager], {})
+    hashes = inputs.check_inputs([loaded], [manager], {})
     learned: dict[str, Any] = {}
     simulator = Simulator(loaded, training={manager: learned})
     for run in range(1, missions + 1):
@@ -351,7 +327,7 @@ def train(
     if not learned:
         remedy = "keep what it learns in the dict that the hook recall is given"
         raise InputError(f"manager {manager} has learned nothing", remedy=remedy)
-    read = dict(sorted({**loaded.inputs, **inputs}.items()))
+    read = dict(sorted({**loaded.inputs, **hashes}.items()))
     result = Learned(manager, loaded.scenario.name, seed, missions, read, learned)
-    write_files(Path(out).parent, {Path(out).name: result.text()})
+    files.write_files(Path(out).parent, {Path(out).name: result.text()})
     return result

@@ -15,7 +15,6 @@ from itertools import chain, repeat
 
 _UPDATE_PERIOD_S = 0.25
 _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
-_FIRST_TIME = "(the first run compiles the mission code: 20 to 60 s)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +96,7 @@ class _Text:
         """Return missions that are done and failed, their rate, and the time that is left."""
         progress = self.progress
         if progress is None:
-            return f"{self.label}: starting, {_time(self.age_s)} {_FIRST_TIME}"
+            return f"{self.label}: starting, {_time(self.age_s)} (the first run compiles the mission code: 20 to 60 s)"
         parts = [f"{progress.done} of {progress.total} missions"]
         if progress.failed:
             parts.append(f"{progress.failed} failed")

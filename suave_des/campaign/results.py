@@ -14,20 +14,10 @@ from suave_des.campaign.missions import Campaign
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
 from suave_des.files import csv_text, json_text
+from suave_des.records import store
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
-from suave_des.records.store import (
-    ENSEMBLE_FILE,
-    MANIFEST_FILE,
-    RUNS_FILE,
-    SUMMARY_FILE,
-    Content,
-    MissionFailure,
-    MissionKey,
-    Outcome,
-    runs_pieces,
-    write_campaign,
-)
+from suave_des.records.store import Content, MissionFailure, MissionKey, Outcome
 
 if TYPE_CHECKING:
     import pandas
@@ -91,9 +81,8 @@ class CampaignResult:
     def frame(self) -> pandas.DataFrame:
         """Return the rows as a data frame with the columns of runs.csv.
 
-        Its types do not depend on the rows. Columns scenario and manager are categories, the managers in the campaign's
-        order; run, seed and adaptations int64; pipeline_found bool; other metrics float64. A parameter that a sweep
-        varies has the type that pandas finds for it.
+        Its types, which suave_des.run_campaign lists, do not depend on the rows, but for a parameter that a sweep
+        varies: it has the type that pandas finds for it.
         """
         import pandas
 
@@ -152,18 +141,19 @@ class CampaignResult:
             "runs": spec.runs,
             "seed": spec.seed,
         }
+        columns = (*SUMMARY_COLUMNS, *sweep.parameters)
         files: dict[str, Content] = {
-            RUNS_FILE: runs_pieces(self.columns, self.stream()),
-            SUMMARY_FILE: csv_text((*SUMMARY_COLUMNS, *sweep.parameters), [(*row.values(),) for row in self.summary]),
-            MANIFEST_FILE: json_text({**about, **self._varied(), **self.report(), **provenance}),
+            store.RUNS_FILE: store.runs_pieces(self.columns, self.stream()),
+            store.SUMMARY_FILE: csv_text(columns, [(*row.values(),) for row in self.summary]),
+            store.MANIFEST_FILE: json_text({**about, **self._varied(), **self.report(), **provenance}),
         }
         if self.campaign.variation.ensemble is not None:
             columns = (*ENSEMBLE_COLUMNS, *sweep.parameters)
             rows = ([each[name] for name in columns] for each in self.differences())
-            files[ENSEMBLE_FILE] = csv_text(columns, rows)
+            files[store.ENSEMBLE_FILE] = csv_text(columns, rows)
         if spec.record_knowledge:
             files[CAMPAIGN_KNOWLEDGE_FILE] = self._knowledge_lines()
-        write_campaign(self.folder, files, dict(self._suave_files()) if spec.suave_format else {})
+        store.write_campaign(self.folder, files, dict(self._suave_files()) if spec.suave_format else {})
 
     def _varied(self) -> dict[str, Any]:
         """Return what varies, for the manifest."""

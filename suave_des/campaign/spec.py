@@ -72,10 +72,7 @@ class CampaignSettings(CampaignKeys):
 
 
 class CampaignSpec(CampaignKeys):
-    """The specification of a campaign. Make one with `of`, which leaves missing values to the campaign file.
-
-    spec = CampaignSpec.of("seams2023", managers=["none", "metacontrol"], runs=100, out="results")
-    """
+    """The specification of a campaign. Make one with `of`, which leaves missing values to the campaign file."""
 
     scenario: str
     """A scenario or campaign file, or a shipped scenario."""

@@ -1,8 +1,7 @@
 """Differences between a campaign's missions apart from manager and run: a sweep, each run's draws, and an ensemble.
 
-An ensemble has parameter sets that fit the real runs equally well: unknown parameters of the real vehicle and its
-software are not noise, but the same in all its missions. Each run has one of its members, the same under all managers,
-so that a difference between managers can be analysed member by member.
+Unknown parameters of the real vehicle and its software are not noise, but the same in all its missions. So each run has
+one member of an ensemble, the same under all managers, and a difference between these can be analysed by member.
 """
 
 from __future__ import annotations
@@ -241,11 +240,7 @@ def _sweep(given: Mapping[str, Any]) -> tuple[Sweep, dict[str, str]]:
 
 
 def check_drawn(loaded: LoadedScenario, variation: Variation) -> None:
-    """Check that perturbations are drawn once per run, unlike latencies and noise, which are drawn at each use.
-
-    Raises:
-        InputError: one is not; its place is its key path within what was given.
-    """
+    """Raise an InputError about a perturbation that is drawn at each use, like latencies and noise, not once a run."""
     drawn = short_mission(loaded).drawn if variation.drawn else {}
     for path, name in variation.drawn.items():
         if path not in drawn:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from suave_des.campaign import progress
-from suave_des.cli.console import TEXT_WIDTH, errors, number, output, print_table, print_timeline
+from suave_des.cli.console import TEXT_WIDTH, errors, output, print_table, print_timeline
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -120,7 +120,7 @@ def _summary(result: CampaignResult) -> Table:
     def figures(cells: Mapping[str, Any], metric: str) -> tuple[str, str]:
         mean, low, high, std = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std"))
         half = "" if low is None or high is None else f" ± {(high - low) / 2.0:.2f}"
-        return f"{number(mean)}{half}", number(std)
+        return "" if mean is None else f"{mean:.2f}{half}", "" if std is None else f"{std:.2f}"
 
     parameters = result.campaign.variation.sweep.parameters
     rows = []

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -16,9 +15,7 @@ from rich.progress import Progress
 from rich.segment import Segment
 from rich.text import Text
 
-from suave_des.errors import InputError
-from suave_des.files import check_output_file, write_files
-from suave_des.tables import Table, Written
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.metrics.result import MissionMetrics, MissionResult
@@ -61,8 +58,6 @@ class PlainConsole(Console):
 
 _PLAIN_WIDTH = 120
 _NOT_FOUND = "not found: the time limit counts"
-_ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
-"""Forms of a result by the ending of a file's name."""
 _UNITS = {"_m2": " m2", "_s": " s"}
 """Of further metrics, by the end of a column."""
 
@@ -91,30 +86,6 @@ def counted(what: str, console: Console) -> Iterator[Callable[[int, int], None]]
 def print_table(console: Console, table: Table) -> None:
     """Print a table under its title, long names in it broken so that they fit."""
     console.print(Text(table.title, "bold"), table.text(console.width), sep="\n")
-
-
-def check_written(out: Path | None) -> None:
-    """Raise an InputError if a file is given whose ending is none of a table, or that cannot be written."""
-    if out is not None:
-        if out.suffix.lower() not in _ENDINGS:
-            problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
-            raise InputError(problem, file=out, remedy=f"one of {', '.join(_ENDINGS)}")
-        check_output_file(out, overwrite=True)
-
-
-def emit(result: Written, form: str, out: Path | None = None) -> None:
-    """Print a result in a form, or write it into a file, whose ending says the form."""
-    if out is not None:
-        text = result.written(_ENDINGS[out.suffix.lower()])
-        write_files(out.parent, {out.name: text})
-        print(f"compared in {out}")
-    else:
-        print(result.written(form, min(output().width, TEXT_WIDTH)), end="")
-
-
-def number(value: object) -> str:
-    """Two decimals, as in the paper's table; empty for None."""
-    return f"{value:.2f}" if isinstance(value, float) else ""
 
 
 def print_timeline(console: Console, result: MissionResult) -> None:

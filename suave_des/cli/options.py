@@ -100,11 +100,7 @@ Given = dict[str, Any]
 class Fields:
     """Options for fields of CampaignSpec: the annotation of a command's parameter, which takes what is given of them.
 
-        options: Annotated[Given, Fields("runs", "seed", default={"runs": "200"})]
-
-    Attributes:
-        help: of a field that means something else here than in a campaign.
-        default: as shown, if it is another one here than in a campaign.
+    `help` and `default`, as shown, are of fields for which they differ here from a campaign's.
     """
 
     names: tuple[str, ...]

@@ -9,7 +9,7 @@ import typer
 
 from suave_des.campaign import progress
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.console import check_written, emit, output, print_table
+from suave_des.cli.console import TEXT_WIDTH, output, print_table
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 
 CompareFormat = Literal["table", "csv", "json", "markdown", "latex"]
+_ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
+"""Forms of a comparison by the ending of a file's name."""
 FigureKind = Literal["auto", "map", "timeline", "distributions", "differences", "sweep", "heatmap"]
 """As in results.figures, which is not imported for --help."""
 
@@ -85,7 +87,11 @@ def compare(
     from suave_des.results.compare import compare_assisted, compare_groups
     from suave_des.results.groups import grouped
 
-    check_written(out)
+    if out is not None:
+        if out.suffix.lower() not in _ENDINGS:
+            problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
+            raise InputError(problem, file=out, remedy=f"one of {', '.join(_ENDINGS)}")
+        check_output_file(out, overwrite=True)
     names, columns, points = map(comma_separated, (managers, metrics, by))
     if (assisted_by is None) != (population is None):
         remedy = "give both: suave-des campaign makes them"
@@ -101,7 +107,11 @@ def compare(
         comparison = compare_assisted(groups)
     else:
         comparison = compare_groups(groups, against=against, half_widths=half_width or (), unpaired=unpaired)
-    emit(comparison, as_format, out)
+    if out is None:
+        print(comparison.written(as_format, min(output().width, TEXT_WIDTH)), end="")
+    else:
+        write_files(out.parent, {out.name: comparison.written(_ENDINGS[out.suffix.lower()])})
+        print(f"compared in {out}")
 
 
 # Validation
@@ -153,7 +163,7 @@ def validate(
     With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
     from suave_des import __version__
-    from suave_des.results.real import CONDITION, read_conditions, read_real, targets_of
+    from suave_des.results.real import CONDITION, PAPERS_RUNS, published_for, read_conditions, read_real, targets_of
     from suave_des.results.validation import FILES
     from suave_des.results.validation import validate as compare
 
@@ -163,7 +173,8 @@ def validate(
         check_no_use(files.given, "with --runs-file", "leave one of them out")
     wants_conditions = runs_file is None or scenario is not None
     conditions = read_conditions(name, **files.replacements) if wants_conditions else None
-    real = read_real(_data_files(name, data), conditions)
+    data = data or [str(published_for(name) or PAPERS_RUNS)]
+    real = read_real([find(each, "scenarios/published") for each in data], conditions)
     chosen = real.choose(comma_separated(managers))
     shares, limits, targets_paths = targets_of(real, targets)
     word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
@@ -218,15 +229,6 @@ def validate(
         exit_telling_failures(result)
     if strict and not validation.all_met:
         raise typer.Exit(TARGETS_NOT_MET)
-
-
-def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
-    """Return the files of real missions: those given, or those published for the scenario, or the paper's."""
-    from suave_des.results.real import PAPERS_RUNS, published_for
-
-    if given:
-        return [find(each, "scenarios/published") for each in given]
-    return [published_for(scenario) or find(PAPERS_RUNS, "scenarios/published")]
 
 
 def _shown(path: Path) -> str:

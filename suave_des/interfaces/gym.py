@@ -59,7 +59,6 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         render_mode: "rgb_array": `render` draws the vehicle's way so far and the pipeline, from above.
 
     Attributes:
-        observation_names: names of the observation's entries.
         mode_names: functions with a choice, in the order of an action, and their modes in the order of its values.
 
     Raises:
@@ -131,7 +130,11 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             raise InputError(f"action {shown(action)} is not possible", remedy=remedy)
         wanted = chosen.tolist()
         if wanted != self._requested:
-            self._request(mission, wanted)
+            for (function, modes), choice in zip(self.mode_names.items(), wanted, strict=True):
+                if function in self._needed:
+                    mission.change_mode(function, modes[choice])
+            self._requested = wanted
+            self._read_modes(mission)
         self._time_s += self._period_s
         if not mission.is_over:
             mission.advance(self._time_s)
@@ -168,13 +171,6 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         if self._mission is not None:
             self._mission.close()
             self._mission = None
-
-    def _request(self, mission: Mission, wanted: list[int]) -> None:
-        for (function, modes), choice in zip(self.mode_names.items(), wanted, strict=True):
-            if function in self._needed:
-                mission.change_mode(function, modes[choice])
-        self._requested = wanted
-        self._read_modes(mission)
 
     def _read_modes(self, mission: Mission) -> None:
         """Look up the indices of the modes that were requested last."""

@@ -21,9 +21,6 @@ class PyTreesManager(ManagingSubsystem):
     The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick whose outcome differs from that of
     the one before is in the timeline of a recorded mission.
 
-    Attributes:
-        root: of the tree.
-
     Example:
         >>> class Mine(PyTreesManager):
         ...     def make_tree(self):

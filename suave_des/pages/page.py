@@ -16,8 +16,6 @@ from typing import Any
 
 from suave_des.files import write_files
 
-_COMPRESSION = 6
-
 
 @cache
 def asset(name: str) -> str:
@@ -33,7 +31,7 @@ def data_text(content: Any) -> str:
 
 def compressed(text: str) -> str:
     """Compress text for a page, which expands it with the browser's own DecompressionStream."""
-    return base64.b64encode(gzip.compress(text.encode(), _COMPRESSION, mtime=0)).decode()
+    return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
 def page(name: str, title: str, content: Any, styles: Sequence[str], scripts: Sequence[str], **blocks: str) -> str:

@@ -94,11 +94,7 @@ def plotly_script() -> str:
 
 
 def _results(missions: Missions) -> dict[str, Any]:
-    """Compare missions, and prepare what follows for the page.
-
-    Raises:
-        InputError: they cannot be compared.
-    """
+    """Compare missions, and prepare what follows for the page."""
     found = compare_groups(grouped(missions))
     return {
         "conclusion": found.conclusion,
@@ -186,13 +182,8 @@ def _made(folder: Path) -> dict[str, Any]:
 def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[str, Any]:
     """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
 
-    `runs` is how many runs of each manager: 0 for none.
-
-    Returns:
-        pipeline: vertices, x and y in m; paths: in the order of groups and runs; note: why there are none, or empty. A
-        path has group (its number), run, t_s, x_m, y_m, altitude_m (above the sea bed), visibility_m (as measured),
-        modes (times at which the mode of the function that moves it changed, with its name), and events (times of mode
-        requests, component reports and the first sight, with kind and detail).
+    `runs` is how many runs of each manager: 0 for none. A path's altitude is that above the sea bed, its visibility as
+    measured; its modes are those of the function that moves the vehicle, with the times at which they changed.
     """
     ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": ""}
     if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():

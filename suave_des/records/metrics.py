@@ -65,11 +65,6 @@ class Metric:
     short: str = ""
 
     @property
-    def kind(self) -> str:
-        """Type of its values: "float", "int" or "bool"."""
-        return COLUMN_TYPES.get(self.name, "float")
-
-    @property
     def heading(self) -> str:
         """Title and unit, as tables and axes have it."""
         return f"{self.title} ({self.unit})" if self.unit else self.title

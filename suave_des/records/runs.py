@@ -119,11 +119,7 @@ class Runs:
         return (f"{self.path}: line{'s' * (len(self.averages) > 1)} {lines} left out: averages, not missions",)
 
     def check_simulated(self, managers: Sequence[str] = ()) -> None:
-        """Check that these missions are of one scenario, and that there are some of each manager.
-
-        Raises:
-            InputError: they are not, or there are none.
-        """
+        """Raise an InputError unless these missions are of one scenario, and some of them of each manager."""
         names = [name for name in self.frame["scenario"].unique() if name]
         if len(names) > 1:
             problem = f"has missions of several scenarios: {names[0]} and {names[1]}"

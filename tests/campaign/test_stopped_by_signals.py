@@ -124,7 +124,7 @@ class TestInterruptedAtAnAwkwardMoment:
     @pytest.mark.parametrize(
         "moment",
         [
-            "suave_des.campaign.campaign.make_output_folder",
+            "suave_des.files.make_output_folder",
             "suave_des.campaign.campaign.Store.__init__",
             "suave_des.campaign.campaign.Store._check",
             "suave_des.campaign.campaign.Store.begin",
@@ -164,7 +164,7 @@ class TestInterruptedAtAnAwkwardMoment:
     def test_while_files_are_written_it_says_how_to_have_them(self, scenario, tmp_path, monkeypatch):
         out = tmp_path / "out"
         with monkeypatch.context() as patch:
-            patch.setattr("suave_des.campaign.results.write_campaign", ctrl_c)
+            patch.setattr("suave_des.records.store.write_campaign", ctrl_c)
             with pytest.raises(KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"):
                 run_campaign(scenario, ["none"], 2, 1, out=out)
         assert resume_campaign(out).done == 2
