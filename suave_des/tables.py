@@ -103,12 +103,9 @@ class Table:
         return "\n".join(lines)
 
     def latex(self, over: Sequence[str] = (), *, label: str = "", note: str = "") -> str:
-        """Write the table for LaTeX with booktabs, its title as caption.
+        """Write the table for LaTeX with booktabs, its title as caption, with a label for references and a note below.
 
-        Args:
-            over: headings over as many columns each, all but the first.
-            label: for references; empty: none.
-            note: text below the table.
+        Headings `over` those of the table are over as many columns each, all but the first.
         """
         columns = len(self.headings)
         lines = [r"\begin{table}", r"  \centering", rf"  \caption{{{latex_text(self.title)}}}"]

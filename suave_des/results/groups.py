@@ -10,20 +10,11 @@ import numpy as np
 import pandas
 
 from suave_des.errors import InputError, shown, unknown
-from suave_des.records.metrics import (
-    DISTANCE,
-    FOUND,
-    METRICS,
-    PAPER_METRICS,
-    REACTION_TIME,
-    SEARCH_TIME,
-    Metric,
-    metric_of,
-)
+from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
 from suave_des.records.missions import SHARING, Missions
 from suave_des.results.real import matched
 
-_USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
+_USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
 """More make tables that nobody reads, and thousands of tests."""
 _MEMBER = "ensemble_member"
@@ -280,8 +271,8 @@ def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.
     """Average rows of the same seed and run.
 
     A mean over other points, or other runs of a draw, than that of another manager would compare these points and not
-    the managers. So a metric is missing where not all of the wanted rows have a value, of which a run has so many; a
-    row is left out where a whole mission is missing.
+    the managers. So a metric is missing where fewer rows of a run than wanted have a value; a row is left out where a
+    whole mission is missing.
     """
     numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
     by_run = frame.groupby(["seed", "run"], sort=False, observed=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle, groupby, pairwise
 from string import ascii_uppercase
@@ -57,16 +57,21 @@ def details(record: MissionRecord, event: str) -> list[tuple[float, str]]:
     return list(zip(own["t_s"].astype(float), own["detail"], strict=True))
 
 
+def _spans(changes: Iterable[tuple[float, str, str]], end_s: float) -> dict[str, list[Span]]:
+    """Return the spans between changes, each with its time, of what it is, and to what; by what they are of."""
+    by_name: dict[str, list[tuple[float, str]]] = {}
+    for t_s, name, what in changes:
+        by_name.setdefault(name, []).append((t_s, what))
+    return {
+        name: [Span(begin_s, until_s, what) for (begin_s, what), (until_s, _) in pairwise([*own, (end_s, "")])]
+        for name, own in by_name.items()
+    }
+
+
 def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of each function's modes."""
-    changes: dict[str, list[tuple[float, str]]] = {}
-    for t_s, detail in details(record, "mode_set"):
-        function, _, mode = detail.partition(" = ")
-        changes.setdefault(function, []).append((t_s, mode))
-    return {
-        function: [Span(begin_s, end_s, mode) for (begin_s, mode), (end_s, _) in pairwise([*own, (record.end_s, "")])]
-        for function, own in changes.items()
-    }
+    changes = ((t_s, detail.partition(" = ")) for t_s, detail in details(record, "mode_set"))
+    return _spans(((t_s, function, mode) for t_s, (function, _, mode) in changes), record.end_s)
 
 
 def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]]:
@@ -81,14 +86,9 @@ def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]
 
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of failures, by failed component."""
-    spans: dict[str, list[Span]] = {}
-    for t_s, component, is_failed in component_changes(record):
-        own = spans.setdefault(component, [])
-        if is_failed:
-            own.append(Span(t_s, record.end_s, FAILED))
-        else:
-            own[-1] = own[-1]._replace(end_s=t_s)
-    return spans
+    changes = ((t_s, name, FAILED if is_failed else "") for t_s, name, is_failed in component_changes(record))
+    spans = _spans(changes, record.end_s)
+    return {name: [span for span in own if span.what == FAILED] for name, own in spans.items()}
 
 
 def task_spans(record: MissionRecord) -> list[Span]:
@@ -320,7 +320,7 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
     _draw_way(axes, record, colours, "t_s", altitude_m)
     _draw_adaptations(axes, record, colours, "t_s", "altitude_m")
     tallest = max(altitude_m.max(), way["visibility_m"].max())
-    rows = _letter_rows(marks, record.end_s)
+    rows = _letter_rows([mark.t_s for mark in marks], 0.028 * record.end_s)
     top = tallest * (1.06 + _LETTER_ROW_SHARE * (max(rows, default=0) + 1))
     for mark, row in zip(marks, rows, strict=True):
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
@@ -342,14 +342,13 @@ def draw_thresholds(axes: Axes, record: MissionRecord) -> None:
         axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
 
 
-def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:
+def _letter_rows(times_s: Sequence[float], near_s: float) -> list[int]:
     """Return the row of each letter over time: one that would touch another goes into the next row."""
-    near_s = 0.028 * end_s
     last_s: list[float] = []
     rows = []
-    for mark in marks:
-        row = next((row for row, t_s in enumerate(last_s) if mark.t_s - t_s >= near_s), len(last_s))
-        last_s[row : row + 1] = [mark.t_s]
+    for time_s in times_s:
+        row = next((row for row, t_s in enumerate(last_s) if time_s - t_s >= near_s), len(last_s))
+        last_s[row : row + 1] = [time_s]
         rows.append(row)
     return rows
 
@@ -423,10 +422,8 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     axes.set_ylabel("altitude; visibility (m)")
     axes.set_ylim(0.0, axes.get_ylim()[1] * 1.12)  # with room for the letters above the curves
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=2.4)
-    last_s, row = -1e9, 0
-    for letter, each in zip(ascii_uppercase, listed, strict=False):
-        row = row + 1 if each.t_s - last_s < 0.022 * record.end_s else 0
-        last_s = each.t_s
+    rows = _letter_rows([each.t_s for each in listed], 0.022 * record.end_s)
+    for letter, each, row in zip(ascii_uppercase, listed, rows, strict=False):
         place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
         place |= {"ha": "center", "va": "top", "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5}}
         axes.annotate(letter, (each.t_s, 1.0), (0, -2 - 8 * row), fontsize=7, weight="bold", **place)

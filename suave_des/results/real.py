@@ -53,7 +53,6 @@ class Share(Strict):
     """A share of a manager's missions that is compared."""
 
     manager: str
-    """Managing subsystem."""
     name: Annotated[str, Field(min_length=1, max_length=100)]
     """What is counted, in words."""
     of: Literal["runs", "detections"] = "runs"

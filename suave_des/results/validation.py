@@ -30,7 +30,7 @@ from suave_des.results.real import CONDITION, PAPERS_RUNS, ConditionLimits, Regi
 from suave_des.results.statistics import SIGNIFICANCE, Sample
 from suave_des.tables import Table, markdown_text, rows_of
 
-COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
+COMPARED = (*PAPER_METRICS, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
 _LEAST_AGREEMENT = 0.5
 _TARGET = ("kind", "subject", "what", "value", "low", "high")
@@ -137,7 +137,7 @@ def validate(
         print(found.targets[found.targets["met"] != True])
 
     Args:
-        published: a row for each mission, with the columns of records.runs.COLUMNS; likewise simulated.
+        published: a row for each mission, with at least the columns of records.runs.COLUMNS; likewise simulated.
         managers: those to compare; each must have missions on both sides.
         shares: regions to count.
         limits: targets by metric for what is compared condition by condition.
