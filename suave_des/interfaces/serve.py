@@ -10,7 +10,7 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from http import HTTPStatus
@@ -49,6 +49,17 @@ class Session:
         self._simulator, self._factor = simulator, real_time_factor
         self._run, self._seed = run, seed
         self._lock = threading.Lock()
+        self._paths: dict[tuple[str, str], Callable[[Any], Json]] = {
+            ("GET", "/monitor"): lambda _: self._monitor(),
+            ("PUT", "/execute"): self._execute,
+            ("GET", "/adaptation_options"): lambda _: self._options(),
+            ("GET", "/monitor_schema"): lambda _: self._monitor_schema(),
+            ("GET", "/execute_schema"): lambda _: self._execute_schema(),
+            ("GET", "/adaptation_options_schema"): lambda _: self._options_schema(),
+            ("POST", "/advance"): self._advance,
+            ("POST", "/start"): self._start,
+            ("GET", "/metrics"): lambda _: asdict(self._mission.metrics()),
+        }
         self._begin(run, seed)
 
     def answer(self, method: str, path: str, content: Any) -> Json:
@@ -63,20 +74,6 @@ class Session:
             if (serve := self._paths.get((method, path))) is None:
                 raise LookupError(path)
             return serve(content)
-
-    @property
-    def _paths(self) -> Mapping[tuple[str, str], Callable[[Any], Json]]:
-        return {
-            ("GET", "/monitor"): lambda _: self._monitor(),
-            ("PUT", "/execute"): self._execute,
-            ("GET", "/adaptation_options"): lambda _: self._options(),
-            ("GET", "/monitor_schema"): lambda _: self._monitor_schema(),
-            ("GET", "/execute_schema"): lambda _: self._execute_schema(),
-            ("GET", "/adaptation_options_schema"): lambda _: self._options_schema(),
-            ("POST", "/advance"): self._advance,
-            ("POST", "/start"): self._start,
-            ("GET", "/metrics"): lambda _: asdict(self._mission.metrics()),
-        }
 
     def _begin(self, run: int, seed: int) -> None:
         self._mission = Mission(self._simulator, run=run, seed=seed)
@@ -238,9 +235,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class Server(ThreadingHTTPServer):
-    """Serves a session at an address until it is shut down; 127.0.0.1 is reachable only from this machine.
-
-    Port 0 is any that is free.
+    """Serves a session until it is shut down: at 127.0.0.1 only to this machine, at port 0 on any that is free.
 
     Raises:
         InputError: the address cannot be used.

@@ -50,12 +50,11 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
     """Return a mission as the page plays it; times in s, lengths in m.
 
     Returns:
-        name: scenario, manager, run and seed; metrics: its row of runs.csv; track: columns of trajectory.csv; modes: by
-        function, times at which they took effect, with their names; thrusters: times of reports, with the number from 1
-        and whether it works; adaptations: their times; events: time, source, event and detail; inspected: times at
-        which points of the way along the pipeline were reached, with the point's number and the distance until then;
-        way: that way from the point seen first, x and y; seen: time, x and y of the first sight, or None; cycles: see
-        explain_cycles.
+        metrics: its row of runs.csv; track: columns of trajectory.csv; modes: by function, times at which they took
+        effect, with their names; thrusters: times of reports, with the number from 1 and whether it works; adaptations:
+        their times; inspected: times at which points of the way along the pipeline were reached, with the point's
+        number and the distance until then; way: that way from the point seen first, x and y; seen: time, x and y of the
+        first sight, or None; cycles: see explain_cycles.
     """
     metrics, track = mission.metrics, mission.trajectory.round(_DECIMALS)
     modes = {function: [(span.begin_s, span.what) for span in spans] for function, spans in mode_spans(mission).items()}

@@ -47,8 +47,7 @@ class Metric:
         less: a sentence about who has less: "finds the pipeline {} sooner than"; likewise more.
         most: phrase for the best mean: "finds the pipeline soonest"; empty if none is better.
         half_width: of the intervals for which the number of runs is given, if none is asked for; 0: 5% of the mean.
-        decimals: of its values in tables and sentences.
-        interval_decimals: of its intervals in tables.
+        decimals, interval_decimals: of its values and of its intervals, in tables and sentences.
         short: of its heading, where there is little room; empty: the title.
     """
 

@@ -31,7 +31,6 @@ class Missions:
     Attributes:
         frame: with `source`, the columns of records.runs.COLUMNS, further metrics, and what a sweep varies; with
             `runs_sharing_draw` where that is known.
-        swept: columns that a sweep varies.
         notes: what readers of the comparison should know about the files.
         folders: of the campaigns that can be run again, by source.
     """
