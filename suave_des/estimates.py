@@ -107,9 +107,8 @@ def mean_of(values: Sequence[float], groups: Sequence[int] | None = None) -> Est
 def _half_width_over(groups: Sequence[int], values: Sequence[float], mean: float) -> float:
     """Return half the width of the 95% interval of a mean over groups of values; nan for fewer than two.
 
-    The interval is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t, of
-    as many degrees of freedom as there are groups but one; of groups of one size, that of the groups' means. A few
-    groups may have equal means by chance, so `mean_of` never takes it to be narrower than that of independent values.
+    It is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t. A few groups
+    may have equal means by chance, so `mean_of` never takes it to be narrower than that of independent values.
     """
     totals = dict.fromkeys(groups, 0.0)
     for value, group in zip(values, groups, strict=True):

@@ -315,8 +315,7 @@ def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str]
 def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
     way = record.trajectory
     altitude_m = way["z_m"].to_numpy() - SEA_BED_Z_M
-    draw_thresholds(axes, record)
-    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY)
+    _draw_visibility(axes, record)
     _draw_way(axes, record, colours, "t_s", altitude_m)
     _draw_adaptations(axes, record, colours, "t_s", "altitude_m")
     tallest = max(altitude_m.max(), way["visibility_m"].max())
@@ -336,10 +335,11 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
         beside.spines["right"].set_visible(True)
 
 
-def draw_thresholds(axes: Axes, record: MissionRecord) -> None:
-    """Draw the thresholds of the visibility over time."""
+def _draw_visibility(axes: Axes, record: MissionRecord) -> None:
     for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
         axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
+    way = record.trajectory
+    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY, label="visibility; dotted: thresholds")
 
 
 def _letter_rows(times_s: Sequence[float], near_s: float) -> list[int]:
@@ -408,8 +408,7 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
 def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptation]) -> None:
     """Draw visibility and its thresholds, the requested altitude and that flown, and letters for adaptations."""
     way = record.trajectory
-    draw_thresholds(axes, record)
-    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY, label="visibility; dotted: thresholds")
+    _draw_visibility(axes, record)
     times_s, asked_m = _altitude_asked_for(record)
     axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, label="requested altitude")
     axes.plot(way["t_s"], way["z_m"] - SEA_BED_Z_M, color=style.BLUE, lw=1.3, label="altitude flown")

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
-from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -179,17 +178,13 @@ Test = dict[str, Any]
 """Columns of a comparison: test, p (two-sided), p_less (one-sided: that the first is not less than the second),
 p_greater, effect_name, and effect with the ends of its interval; None for what a test does not have."""
 
-_NONE = Estimate()
+_PS_OF_EQUAL = (1.0, 1.0, 1.0)
 
 
-def _test(name: str, found: Sequence[Any], effect: Estimate = _NONE) -> Test:
-    """Return the columns of a test, from what each of _ALTERNATIVES gives."""
-    ps = dict(zip(("p", "p_less", "p_greater"), (float(each.pvalue) for each in found), strict=True))
-    return {"test": name, **ps, "effect_name": effect.method, **effect.columns("effect")}
-
-
-_SAME = (SimpleNamespace(pvalue=1.0),) * 3
-"""What the alternatives give for equal samples."""
+def _test(name: str, ps: Sequence[float], effect: Estimate) -> Test:
+    """Return the columns of a test, from the p of each of _ALTERNATIVES."""
+    named = dict(zip(("p", "p_less", "p_greater"), map(float, ps), strict=True))
+    return {"test": name, **named, "effect_name": effect.method, **effect.columns("effect")}
 
 
 def signed_rank_test(first: Sample, second: Sample) -> Test:
@@ -202,11 +197,11 @@ def signed_rank_test(first: Sample, second: Sample) -> Test:
 
     differing = int(np.count_nonzero(first != second))
     if differing == 0:
-        return _test(WILCOXON, _SAME, Estimate(0.0, method=RANK_BISERIAL))
+        return _test(WILCOXON, _PS_OF_EQUAL, Estimate(0.0, method=RANK_BISERIAL))
     with _quiet():
         found = [wilcoxon(first, second, alternative=each) for each in _ALTERNATIVES]
     effect = 4.0 * float(found[-1].statistic) / (differing * (differing + 1)) - 1.0
-    return _test(WILCOXON, found, Estimate(effect, method=RANK_BISERIAL))
+    return _test(WILCOXON, [each.pvalue for each in found], Estimate(effect, method=RANK_BISERIAL))
 
 
 def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asymptotic"] = "auto") -> Test:
@@ -218,10 +213,10 @@ def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asympto
     from scipy.stats import mannwhitneyu
 
     if np.ptp(np.concatenate([first, second])) == 0.0:
-        return _test(MANN_WHITNEY, _SAME, Estimate(0.5, method=A12))
+        return _test(MANN_WHITNEY, _PS_OF_EQUAL, Estimate(0.5, method=A12))
     found = [mannwhitneyu(first, second, alternative=each, method=method) for each in _ALTERNATIVES]
     effect = Estimate(float(found[0].statistic) / (len(first) * len(second)), method=A12)
-    return _test(MANN_WHITNEY, found, effect)
+    return _test(MANN_WHITNEY, [each.pvalue for each in found], effect)
 
 
 def rank_sum_test(first: Sample, second: Sample) -> Test:
@@ -239,7 +234,7 @@ def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Test:
     from scipy.stats import fisher_exact
 
     table = [[count, n - count] for count, n in (first, second)]
-    return _test(FISHER, [fisher_exact(table, alternative=each) for each in _ALTERNATIVES])
+    return _test(FISHER, [fisher_exact(table, alternative=each).pvalue for each in _ALTERNATIVES], Estimate())
 
 
 def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Test:
