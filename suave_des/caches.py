@@ -65,10 +65,6 @@ def _private(folder: Path) -> Path:
 class SharedEntries:
     """Values by key, in a file that several processes extend without locks.
 
-        entries = SharedEntries(private_cache("inferences"), digest)
-        entries.add("some state", ["what follows"])
-        dict(entries.read())  # {"some state": ["what follows"]}
-
     Each entry is a line of JSON with a checksum, appended with a single write: a line that two processes mangled, or
     that was cut short, is left out when it is read. Nothing in a file is ever executed.
 

@@ -52,11 +52,7 @@ def open_base(loaded: LoadedScenario) -> Ontology:
 def read_base(
     scenario: Scenario, ontologies: Sequence[Path] | None = None, rules: Sequence[Path] | None = None
 ) -> Ontology:
-    """Read ontologies and files of rules, by default those that a scenario names, with its values and operators.
-
-    Raises:
-        KnowledgeError: the ontologies or rules cannot be read.
-    """
+    """Read ontologies and files of rules as open_base does, by default those that a scenario names."""
     knowledge, values = scenario.knowledge, _values(scenario)
     named = [find(each, "ontology") for each in knowledge.ontologies] if ontologies is None else ontologies
     texts = [find(each, "ontology") for each in knowledge.rules] if rules is None else rules

@@ -16,7 +16,7 @@ from suave_des.errors import InputError, shown
 from suave_des.registry import is_built_in, manager_class
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.models import Real, Strict
-from suave_des.scenario.yamlfile import InputFiles, Layer, find_named, problem_and_remedy, validated
+from suave_des.scenario.yamlfile import Layer, find_named, problem_and_remedy, read_input, validated
 
 RUNS_LIMIT = 1_000_000
 SEED_LIMIT = 2**63 - 1
@@ -195,8 +195,8 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
     Raises:
         InputError: it cannot be read, is of another version, or has an impossible value.
     """
-    files = InputFiles()
-    layer = files.yaml(name, "scenarios")
+    inputs: dict[str, str] = {}
+    layer = read_input(inputs, name, "scenarios")
     if "campaign" not in layer.data:
         return None
     settings = validated(layer, CampaignSettings)
@@ -204,4 +204,4 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
         ensemble = find_named(settings.ensemble, "scenarios/ensembles", layer, ("ensemble",))
         settings = settings.model_copy(update={"ensemble": str(ensemble)})
     scenario = find_named(settings.scenario, "scenarios", layer, ("scenario",))
-    return CampaignFile(settings, scenario, files.inputs, layer)
+    return CampaignFile(settings, scenario, inputs, layer)

@@ -93,11 +93,7 @@ _TELLING = {row["name"]: (row["since"], row["until"]) for row in _REVISIONS_TABL
 
 
 def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
-    """Tell which revision files are of, and why.
-
-    Args:
-        found: nodes, node.parameter and launched packages in the files.
-        name: if the user gave it.
+    """Tell which revision files with these nodes, node.parameters and launched packages are of, and why.
 
     Raises:
         InputError: there is none of that name, or the files fit several, or none.
@@ -242,7 +238,6 @@ class Parameter:
 
     Attributes:
         entry: the node as it is written in the file.
-        value: plain data.
         node: as in the table of keys; empty if it is none of them.
     """
 

@@ -13,7 +13,7 @@ from suave_des.errors import InputError, did_you_mean, shown, unknown
 from suave_des.resources import hashes, shown_name
 from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
-from suave_des.scenario.yamlfile import InputFiles, Layer, Location, find_named, scenario_layer, validated
+from suave_des.scenario.yamlfile import Layer, Location, find_named, read_input, scenario_layer, validated
 
 
 @dataclass(frozen=True)
@@ -107,12 +107,12 @@ def load_scenario(
     reasoner, modes_file = replacements.get("reasoner"), replacements.get("modes_file")
     if reasoner is not None and reasoner not in REASONERS:
         raise unknown(f"there is no reasoner {shown(reasoner)}", reasoner, REASONERS, place="--reasoner")
-    files = InputFiles()
-    layer = scenario_layer(files, name, over)
+    inputs: dict[str, str] = {}
+    layer = scenario_layer(inputs, name, over)
     scenario = validated(layer, Scenario)
     knowledge = scenario.knowledge
     named, by = (scenario.modes_file, layer) if modes_file is None else (modes_file, None)
-    modes_layer = files.yaml(named, "scenarios", by, ("modes_file",))
+    modes_layer = read_input(inputs, named, "scenarios", by, ("modes_file",))
     modes = modes_of(modes_layer)
     modes.check(scenario, layer)
 
@@ -124,7 +124,7 @@ def load_scenario(
     ontologies = tuple(replaced or in_scenario("ontologies"))
     rules = in_scenario("rules", "a file of rules as text, named relative to this")
     rules += map(Path, replacements.get("rules", ()))
-    inputs = files.inputs | hashes((*ontologies, *rules))
+    inputs |= hashes((*ontologies, *rules))
     tables = {}
     remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
     for signal_name, signal in scenario.signals.items():
@@ -229,11 +229,7 @@ def _keys(data: dict[str, Any], path: str) -> list[str]:
 
 
 def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
-    """The mapping or list that holds the value at a key path of a scenario as plain data, and its key there.
-
-    Raises:
-        InputError: the path leads nowhere.
-    """
+    """The mapping or list with the value at a key path of plain data, and its key; an InputError if there is none."""
     here, parts = data, _keys(data, path)
     for depth, part in enumerate(parts):
         if isinstance(here, list):

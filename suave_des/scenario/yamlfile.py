@@ -102,7 +102,7 @@ def read_yaml(path: Path | str) -> Layer:
         InputError: with the line: the file cannot be read, is not YAML, has a tag, a duplicate key or several
             documents, or has another top level.
     """
-    return InputFiles().yaml(path)
+    return read_input({}, path, kind="")
 
 
 def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
@@ -128,11 +128,7 @@ def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
 
 
 def read_value(text: str, option: str) -> Any:
-    """Read a value that is given on the command line, as it would be read in a file.
-
-    Raises:
-        InputError: it is not YAML, or not plain data; its place is the option.
-    """
+    """Read a value of the command line as one in a file; an InputError, with the option, if it is not plain data."""
     try:
         root = _composed(text)
         return None if root is None else _Reading(Path(option), 0).plain(root, ())
@@ -226,22 +222,19 @@ _PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
 _DEFAULT_VEHICLE = "bluerov2"
 
 
-class InputFiles:
-    """Reads files that the user or a file names; `inputs` has the SHA-256 of each, in hex, by its name as shown."""
+def read_input(
+    inputs: dict[str, str], name: object, kind: str, by: Layer | None = None, key_path: KeyPath = (), depth: int = 0
+) -> Layer:
+    """Find a YAML file as find_named does, unless the kind is empty, and read it as read_yaml does.
 
-    def __init__(self) -> None:
-        self.inputs: dict[str, str] = {}
-
-    def yaml(
-        self, name: object, kind: str = "", by: Layer | None = None, key_path: KeyPath = (), depth: int = 0
-    ) -> Layer:
-        """Find a YAML file as find_named does, unless no kind is given, and read it as read_yaml does."""
-        path = find_named(name, kind, by, key_path) if kind else Path(str(name))
-        shown_as = shown_name(path)
-        content = read_bytes(path, SIZE_LIMIT_BYTES)
-        self.inputs[shown_as] = hashlib.sha256(content).hexdigest()
-        text = decode(path, content)
-        return parse_yaml(text, path, depth)
+    Its SHA-256, in hex, goes into `inputs` by its name as shown to the user.
+    """
+    path = find_named(name, kind, by, key_path) if kind else Path(str(name))
+    shown_as = shown_name(path)
+    content = read_bytes(path, SIZE_LIMIT_BYTES)
+    inputs[shown_as] = hashlib.sha256(content).hexdigest()
+    text = decode(path, content)
+    return parse_yaml(text, path, depth)
 
 
 def find_named(
@@ -270,10 +263,11 @@ def find_named(
         raise by.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
 
 
-def scenario_layer(files: InputFiles, name: str | Path, over: Layer | None = None) -> Layer:
+def scenario_layer(inputs: dict[str, str], name: str | Path, over: Layer | None = None) -> Layer:
     """Read a scenario file and merge it over its bases, with its revision and its vehicle written out in full.
 
     Args:
+        inputs: gets the SHA-256 of each file.
         name: path of the scenario, or name of a shipped one.
         over: what differs from it; None: nothing.
 
@@ -283,18 +277,18 @@ def scenario_layer(files: InputFiles, name: str | Path, over: Layer | None = Non
     Raises:
         InputError: a file that cannot be read, or is its own base; a revision that is not known.
     """
-    own = files.yaml(name, "scenarios")
+    own = read_input(inputs, name, "scenarios")
     if "campaign" in own.data and "scenario" in own.data:
         remedy = f"suave-des campaign {own.path} --out DIR runs it; its scenario is {own.data['scenario']}"
         raise own.error("this is a campaign file, not a scenario", ("campaign",), remedy)
     stem = re.sub(r"[^A-Za-z0-9_.-]", "_", own.path.stem)[:90]
     title = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
-    layer = _over_its_base(files, _with_named_parts(own), "scenarios", (own.path,))
+    layer = _over_its_base(inputs, _with_named_parts(own), "scenarios", (own.path,))
     layer = layer if over is None else merge(layer, _with_named_parts(over))
     layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
     for part, kind in _PARTS.items():
         if "base" in (layer.data.get(part) or ()):
-            whole = _over_its_base(files, layer.below(part), kind, (layer.place((part,)).file,))
+            whole = _over_its_base(inputs, layer.below(part), kind, (layer.place((part,)).file,))
             places = {(part, *path): place for path, place in whole.places.items()}
             layer = Layer({**layer.data, part: whole.data}, {**layer.places, **places})
     return Layer({**layer.data, "name": title}, layer.places)
@@ -310,16 +304,16 @@ def _with_named_parts(layer: Layer) -> Layer:
     return Layer(data, places)
 
 
-def _over_its_base(files: InputFiles, layer: Layer, kind: str, chain: tuple[Path, ...]) -> Layer:
+def _over_its_base(inputs: dict[str, str], layer: Layer, kind: str, chain: tuple[Path, ...]) -> Layer:
     """Merge a layer over the file that it names as its base, if any; `chain` is how that was reached."""
     if "base" not in layer.data:
         return layer
-    below = files.yaml(layer.data["base"], kind, layer, ("base",), len(chain))
+    below = read_input(inputs, layer.data["base"], kind, layer, ("base",), len(chain))
     chain = (*chain, below.path)
     if len({each.resolve() for each in chain}) < len(chain):
         names = " -> ".join(each.name for each in chain)
         raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
-    below = _over_its_base(files, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
+    below = _over_its_base(inputs, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
     own = {key: value for key, value in layer.data.items() if key != "base"}
     return merge(below, Layer(own, layer.places))
 
@@ -365,11 +359,7 @@ _T = TypeVar("_T")
 
 
 def validated(layer: Layer, model: type[_T]) -> _T:
-    """Return the data of a layer as a model, or another type that pydantic validates.
-
-    Raises:
-        InputError: they are not valid: the first problem, with file and line, and how many more there are.
-    """
+    """Return a layer's data as a model; an InputError has the first problem with its line, and the number of others."""
     try:
         return TypeAdapter(model).validate_python(layer.data)
     except ValidationError as error:
