@@ -464,13 +464,13 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
     return base.names.short(value)
 
 
-def _list(base: Ontology, values: list[str | Lit], most: int = 3) -> str:
+def _list(base: Ontology, values: list[str | Lit]) -> str:
     texts = sorted({_show(base, value) for value in values})
-    return ", ".join(texts[:most]) + (f" and {len(texts) - most} more" if len(texts) > most else "")
+    return ", ".join(texts[:_MOST]) + (f" and {len(texts) - _MOST} more" if len(texts) > _MOST else "")
 
 
-#: Rules that are named for a fact that does not follow.
-NEAREST: Final = 3
+#: How many rules are named for a fact that does not follow, and values where another one is needed.
+_MOST: Final = 3
 _WHY: Final = re.compile(r"why\s+(?:not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
 _FORMS: Final = (
     'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
@@ -606,7 +606,7 @@ class _Explainer:
         name = "type" if triple[1] == rdf.RDF_TYPE else local_name(triple[1])
         near = RuleQuestions(self.base).missing(triple, self.tracer.state)
         remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}"]
-        remedies += (f"rule {each}" for each in near[:NEAREST])
+        remedies += (f"rule {each}" for each in near[:_MOST])
         raise InputError(f"{fact} does not follow in this state", remedy="; ".join(remedies))
 
     def design(self, design: str) -> DecisionExplanation:

@@ -63,12 +63,7 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """What checks look at.
-
-    Attributes:
-        subject: what is to be checked.
-        base: the ontologies and rules, with the operators that the revision assumes.
-    """
+    """What checks look at: the subject, and its ontologies and rules with the operators that the revision assumes."""
 
     subject: Subject
     base: Ontology
@@ -118,9 +113,7 @@ class Material:
 def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[Finding]:
     """Find what needs no reasoner, which takes some 10 ms, in files that may have errors.
 
-    Args:
-        subject: what to check.
-        sources: its ontologies and their imports.
+    The sources are the subject's ontologies and their imports.
 
     Raises:
         InputError: a file of rules cannot be read at all; the scenario names a value or a rule that is not there.
@@ -147,12 +140,7 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
 
 
 def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
-    """Find what needs no reasoner in a knowledge base that has been opened.
-
-    Args:
-        base: the ontologies and rules, with the operators that the revision assumes.
-        subject: what it was opened from, and what missions have to do with it.
-    """
+    """Find what needs no reasoner in a knowledge base that has been opened from a subject."""
     material = Material(subject, base)
     return [finding for check in CHECKS for finding in check(material)]
 

@@ -449,10 +449,7 @@ class Ontology:
     def merged(
         cls, sources: Sequence[OntologyFile], values: Mapping[str, Decimal], operators: Mapping[str, str]
     ) -> Ontology:
-        """Merge ontologies that have been read with their imports; nothing else is checked.
-
-        Args:
-            sources, values, operators: as of load.
+        """Merge ontologies that have been read with their imports, as `load` does; nothing else is checked.
 
         Raises:
             KnowledgeError: two functions, designs, components or quality attribute types share a name.
@@ -490,7 +487,6 @@ class Ontology:
         Args:
             files: in the order in which they are given.
             rules: those rules of each file that can be used.
-            disabled_rules: names.
         """
         found, replaced = list(self.rules), list[tuple[Rule, Rule]]()
         for group in rules:

@@ -58,8 +58,6 @@ class OntologyFile:
     """An ontology file that has been read and parsed.
 
     Attributes:
-        path: where it is.
-        content: its bytes.
         iris: the IRIs of the ontology (empty for an anonymous one), without a trailing '#'.
         base: xml:base of the document, if it has one.
         imports: (imported IRI, line) in the order of the file.
@@ -148,11 +146,7 @@ def text_of(content: bytes, errors: str = "strict") -> str:
 
 
 def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
-    """Read and check one ontology file.
-
-    Args:
-        path: where it is.
-        content: its content, if it is not to be read from the file.
+    """Read and check one ontology file, or content that is to be in it.
 
     Raises:
         InputError: missing, a folder, or too large.

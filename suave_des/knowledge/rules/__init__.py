@@ -69,7 +69,6 @@ class Atom:
     Attributes:
         kind: what the predicate is used as.
         predicate: IRI of a class, property, datatype or builtin; as the parser returns it, perhaps a bare name.
-        arguments: in order.
         places: of the predicate and of each argument; empty when it was not read from text.
     """
 

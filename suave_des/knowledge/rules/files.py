@@ -53,13 +53,7 @@ class Vocabulary:
     def of(
         cls, triples: Iterable[rdf.Triple], individuals: Iterable[str], enumerations: Mapping[str, frozenset[str]]
     ) -> Vocabulary:
-        """Collect the names in triples.
-
-        Args:
-            triples: of the ontologies.
-            individuals: further ones, that exist only in states.
-            enumerations: the values that data properties can have, where their ranges list them.
-        """
+        """Collect the names in triples of ontologies; the individuals are further ones, that exist only in states."""
         kinds: dict[str, set[str]] = defaultdict(set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}})
         ranges: dict[str, set[str]] = defaultdict(set)
         for subject, predicate, value in triples:
@@ -115,11 +109,7 @@ _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, 
 
 
 def about_rule(
-    rule: Rule,
-    message: str,
-    place: Place | None = None,
-    remedy: str | None = None,
-    level: Level = Level.ERROR,
+    rule: Rule, message: str, place: Place | None, remedy: str | None, level: Level = Level.ERROR
 ) -> Finding:
     """Make a finding about a rule, at the place of an atom or an argument of it, or at the line where it begins."""
     line, column = place or (rule.line, None)
@@ -303,8 +293,6 @@ class RulesFile:
     """A file of rules as text.
 
     Attributes:
-        path: where it is.
-        text: all of it.
         parsed: its rules, before their names are looked up.
         errors: one for each rule that cannot be read.
     """
