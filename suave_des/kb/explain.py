@@ -26,13 +26,7 @@ from suave_des.kb.states import FactReader
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology, Terms
 from suave_des.knowledge.pellet import TimeLimit
-from suave_des.knowledge.pellet.in_process import (
-    InProcessPellet,
-    Trace,
-    entailed,
-    one_at_a_time,
-    trace_contradiction,
-)
+from suave_des.knowledge.pellet.in_process import InProcessPellet, Trace, entailed, one_at_a_time, trace_contradiction
 from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import COMPARISONS, Atom, AtomKind, Rule, Variable, write_atom, write_term

@@ -21,14 +21,7 @@ from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.space import Decide, Outcome, Region, Situation, measurements_in, parse_region
-from suave_des.kb.states import (
-    FactReader,
-    StateBuilder,
-    StateContent,
-    recorded_missions,
-    recorded_state,
-    state_dict,
-)
+from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_missions, recorded_state, state_dict
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import Triple

@@ -138,8 +138,7 @@ def why_not(
     ] = None,
     at: At = None,
     facts: Annotated[
-        list[str] | None,
-        typer.Option("--fact", metavar="FACT", help='Additional fact, such as "Binding(b1)".'),
+        list[str] | None, typer.Option("--fact", metavar="FACT", help='Additional fact, such as "Binding(b1)".')
     ] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:

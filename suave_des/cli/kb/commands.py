@@ -142,9 +142,7 @@ def try_(
     on: Annotated[
         Path,
         typer.Option(
-            "--on",
-            metavar="DIR",
-            help="Folder of run, of a campaign that recorded its knowledge, or of such folders.",
+            "--on", metavar="DIR", help="Folder of run, of a campaign that recorded its knowledge, or of such folders."
         ),
     ],
     rule: Annotated[
@@ -182,10 +180,7 @@ class MissionOptions:
 def diff(
     options: ReasonerOptions,
     mission_options: MissionOptions,
-    one: Annotated[
-        Path,
-        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add."),
-    ],
+    one: Annotated[Path, typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add.")],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
     max_failed: MaxFailed = 2,
 ) -> None:

@@ -38,8 +38,7 @@ class TestOptions(KnowledgeFiles):
     """Options that replace or add to what the files of tests say of their knowledge base."""
 
     scenario: Annotated[
-        str | None,
-        typer.Option("--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name."),
+        str | None, typer.Option("--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name.")
     ] = None
     time_limit: TimeLimitS = 60.0
 
@@ -64,15 +63,13 @@ class MutationOptions:
     """Options of mutation testing."""
 
     mutate: Annotated[
-        bool,
-        typer.Option("--mutate", help="Make small mistakes in rules; report those that no test notices."),
+        bool, typer.Option("--mutate", help="Make small mistakes in rules; report those that no test notices.")
     ] = False
     mutants: Annotated[
         int | None, typer.Option("--mutants", min=1, metavar="N", help="Number of mutants; by default all.")
     ] = None
     only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable."),
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable.")
     ] = None
     max_failed: MaxFailed = 1
 
@@ -102,10 +99,7 @@ def test(
         Path | None,
         typer.Option("--from-mission", metavar="DIR", help="Write a recorded mission's decisions as tests."),
     ] = None,
-    write: Annotated[
-        Path | None,
-        typer.Option("--write", metavar="FILE", help="File for the tests."),
-    ] = None,
+    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="File for the tests.")] = None,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
 
