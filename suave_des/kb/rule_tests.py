@@ -21,12 +21,13 @@ from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.space import Decide, Outcome, Region, Situation, measurements_in, parse_region
-from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_missions, recorded_state, state_dict
+from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_state, state_dict
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import Triple
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
+from suave_des.records.mission_folder import RecordedMission
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 from suave_des.scenario.yamlfile import Layer, read_yaml, validated
 
@@ -362,26 +363,15 @@ def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, Any]:
     return {**follows, "decides": {each.function: outcome.choice(each.function) for each in state.objectives}}
 
 
-def mission_states(folder: Path, knowledge: KnowledgeBase) -> Iterator[tuple[str, KnowledgeState]]:
-    """Return the states of a recorded mission, named, one for each kind that the rules can tell apart.
-
-    Raises:
-        InputError: there is no recorded mission.
-    """
-    regions = regions_of(knowledge.base)
-    _, mission = next(recorded_missions(folder))
+def mission_states(mission: RecordedMission, base: Ontology) -> Iterator[tuple[float, KnowledgeState]]:
+    """The states of a recorded mission, each with its time in s, one for each kind that the rules can tell apart."""
+    regions = regions_of(base)
     kinds = {regions.key(record.state): record for record in reversed(mission.records)}
-    for record in sorted(kinds.values(), key=lambda record: record.t_s):
-        yield f"{folder.name} at {record.t_s:.2f} s", record.state
+    return ((record.t_s, record.state) for record in sorted(kinds.values(), key=lambda record: record.t_s))
 
 
-def mission_knowledge(folder: Path) -> Tested:
-    """The knowledge base of a recorded mission, as a file of tests names it.
-
-    Raises:
-        InputError: there is no recorded mission.
-    """
-    _, mission = next(recorded_missions(folder))
+def mission_knowledge(mission: RecordedMission) -> Tested:
+    """The knowledge base of a recorded mission, as a file of tests names it."""
     scenario, knowledge = mission.scenario, mission.scenario.knowledge
     try:
         find(scenario.name, "scenarios")

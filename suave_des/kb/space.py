@@ -251,13 +251,9 @@ def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[t
 _CARRIED: Final = frozenset({rdf.IS_QA_TYPE, rdf.HAS_VALUE})
 _OF_VALUES: Final = _CARRIED | {rdf.HAS_QA_VALUE, rdf.TOMASYS + "hasQAestimation"}
 #: What a schema may say of these properties without relating values of one attribute to those of another.
-_HARMLESS: Final = frozenset(
-    {
-        *((rdf.RDF_TYPE, rdf.OWL + kind) for kind in ("ObjectProperty", "DatatypeProperty")),
-        (rdf.RDFS + "domain", None),
-        (rdf.RDFS + "range", None),
-    }
-)
+_HARMLESS: Final = {(rdf.RDF_TYPE, kind) for kind in rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty")} | {
+    (name, None) for name in rdf.terms(rdf.RDFS, "domain range")
+}
 _FUNCTIONAL: Final = frozenset((name, rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty") for name in _CARRIED)
 
 

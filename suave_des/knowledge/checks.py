@@ -147,10 +147,9 @@ def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
 
 # The model, and what missions have to do with it.
 
-_ABOUT_CLASSES: Final = frozenset(rdf.RDFS + name for name in ("subClassOf", "domain", "range")) | {
-    rdf.OWL + "equivalentClass",
-    rdf.OWL + "disjointWith",
-}
+_ABOUT_CLASSES: Final = rdf.terms(rdf.RDFS, "subClassOf domain range") | rdf.terms(
+    rdf.OWL, "equivalentClass disjointWith"
+)
 _PROPERTIES: Final = ("object property", "data property", "annotation property")
 
 
@@ -369,13 +368,15 @@ def dead_rules(material: Material) -> list[tuple[Rule, Atom]]:
     dead rule is returned.
     """
     content, model = material.content, material.base.model
-    leads = tuple(rdf.RDFS + name for name in ("subClassOf", "subPropertyOf", "domain", "range"))
-    both_ways = tuple(rdf.OWL + name for name in ("equivalentClass", "equivalentProperty", "inverseOf"))
+    leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
+    both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
     related = [(one, name, str(other)) for one, name, other in content.triples]
     steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
     steps += [(other, one) for one, name, other in related if name in (*both_ways, rdf.RDFS + "subPropertyOf")]
-    in_states = ("Objective", "FunctionGrounding", "typeF", "typeFD", "solvesO", "o_always_improve")
-    held = {rdf.OWL + "Thing", swrl.EXPRESSION, rdf.C_STATUS, rdf.O_STATUS, *(rdf.TOMASYS + name for name in in_states)}
+    held = {rdf.OWL + "Thing", swrl.EXPRESSION}
+    held |= rdf.terms(
+        rdf.TOMASYS, "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status"
+    )
     held |= {*(name for _, name in rdf.memberships(content.triples)), *(name for _, name, _ in content.triples)}
     held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
     held |= {rdf.HAS_QA_VALUE} if any(model.estimated.values()) else set()

@@ -140,10 +140,12 @@ def test(
 def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
     from suave_des.kb.rule_tests import mission_knowledge, mission_states, tests_text
+    from suave_des.kb.states import recorded_missions
 
-    about = options.apply(mission_knowledge(folder))
+    _, mission = next(recorded_missions(folder))
+    about = options.apply(mission_knowledge(mission))
     knowledge = options.load(about)
-    states = list(mission_states(folder, knowledge))
+    states = [(f"{folder.name} at {t_s:.2f} s", state) for t_s, state in mission_states(mission, knowledge.base)]
     comment = f"Decisions of the mission recorded in {folder}, one for each kind of state in it."
     text = tests_text(about, knowledge, states, comment)
     if file is None:
