@@ -69,7 +69,6 @@ def _goals(rules: Iterable[Rule]) -> Iterator[Goal]:
 
 
 def _covering(knowledge: KnowledgeBase, goals: Sequence[Goal]) -> Callable[[Situation], frozenset[Goal]]:
-    """Make a function that finds the goals that a situation covers."""
     bodies = (body for goal in goals for body in (goal.holds, goal.fails) if body)
     probes = Probes(knowledge.base, knowledge.limit, bodies)
 

@@ -168,7 +168,6 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
 
 
 def _choice(base: Ontology, function: str, words: str) -> str:
-    """What may happen to a function's grounding."""
     if function not in base.functions:
         raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions))
     known, choice = (*base.designs(function), STAYS, NONE_LEFT), words.strip()

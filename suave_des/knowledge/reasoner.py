@@ -209,7 +209,6 @@ def _decide(ontology: Ontology, inference: Inference, function: str, trigger: st
 
 
 def _rejection_reasons(inference: Inference, design: str, function: str) -> Iterator[str]:
-    """Yield the reasons why a function design must not be chosen now."""
     objective = objective_name(function)
     if False in inference.values(design, "fd_realisability"):
         yield "not realisable"

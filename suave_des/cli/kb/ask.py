@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,12 +21,7 @@ if TYPE_CHECKING:
     from suave_des.knowledge.state import Reasoning
 
 
-class TableFormat(StrEnum):
-    """How to print a table."""
-
-    TEXT = "text"
-    CSV = "csv"
-    JSON = "json"
+TableFormat = Literal["text", "csv", "json"]
 
 
 def infer(options: ReasonerOptions, at: At = None) -> None:
@@ -108,7 +102,7 @@ def query(
     ],
     at: At = None,
     inferred: Annotated[bool, typer.Option("--inferred", help="Include what Pellet infers.")] = False,
-    form: Annotated[TableFormat, typer.Option("--format", help="Output format.")] = TableFormat.TEXT,
+    form: Annotated[TableFormat, typer.Option("--format", help="Output format.")] = "text",
 ) -> None:
     """Query the knowledge base in SPARQL.
 
@@ -121,10 +115,10 @@ def query(
         found = knowledge.query(text, state, inferred=inferred)
     for name in found.unknown:
         errors().print(f"suave-des: the knowledge base does not have {name}")
-    if form is TableFormat.JSON:
+    if form == "json":
         rows_by_name = [dict(zip(found.columns, row, strict=True)) for row in found.rows]
         print(json.dumps(rows_by_name, indent=2, ensure_ascii=False))
-    elif form is TableFormat.CSV:
+    elif form == "csv":
         print(csv_text(found.columns, found.rows), end="")
     else:
         rows = [[cell or "" for cell in row] for row in found.rows]

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, replace
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import typer
 
@@ -26,30 +25,16 @@ FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
 OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak is the previous version.")]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
-
-
-class FindingsFormat(StrEnum):
-    """How to print findings."""
-
-    TEXT = "text"
-    JSON = "json"
-
-
-class FailOn(StrEnum):
-    """The least level that counts as failure."""
-
-    ERROR = "error"
-    WARN = "warn"
+FindingsFormat = Literal["text", "json"]
+FailOn = Literal["error", "warn"]
 
 
 def check(
     options: KnowledgeOptions,
     modes: Modes = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")] = (
-        FailOn.ERROR
-    ),
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")] = "error",
     time_limit: TimeLimitS = 60.0,
-    form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = FindingsFormat.TEXT,
+    form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = "text",
 ) -> None:
     """Check ontologies and rules.
 
@@ -65,7 +50,7 @@ def check(
     findings = run_checks(replace(subject_of(loaded), time_limit_s=time_limit))
     useless = (Finding(Level.WARN, words, shown_name(loaded.path)) for words in loaded.scenario.without_effect())
     findings = ordered([*findings, *useless])
-    if form is FindingsFormat.JSON:
+    if form == "json":
         print(json.dumps(list(map(asdict, findings)), indent=2, ensure_ascii=False))
     else:
         print(*map(str, findings), summary(findings), sep="\n")

@@ -251,7 +251,6 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
 
 
 def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
-    """Show which mutants of each knowledge base the tests kill."""
     from suave_des.kb.mutation import mutants_of, mutate, mutation_lines, mutation_table, sample
 
     for suite in suites:

@@ -132,18 +132,15 @@ class _Builder:
     """Builds rules while lark parses: each method gets the parts of what it is named after in the grammar."""
 
     def begin(self, file: Path | None) -> None:
-        """Forget what was collected."""
         self.rules: list[Rule] = []
         self.failed_at = 0
         self._file = file
         self._prefixes = dict(PREFIXES)
 
     def prefix(self, parts: Sequence[Token]) -> None:
-        """Declare a prefix."""
         self._prefixes[parts[1]] = self._iri(parts[2], "a prefix needs an IRI in angle brackets")
 
     def rule(self, parts: Sequence[Any]) -> None:
-        """Collect a rule."""
         disabled, (place, name), body, head = parts  # no body: a rule that always holds
         begins = self._place(disabled) if disabled else place
         self.rules.append(Rule(name, body or (), head, not disabled, self._file or Path(), begins.line))
@@ -161,7 +158,6 @@ class _Builder:
         return tuple(parts)
 
     def atom(self, parts: Sequence[Any]) -> Atom:
-        """A predicate with its arguments."""
         (place, predicate), *terms = parts
         return Atom("", predicate, tuple(term for _, term in terms), (place, *(where for where, _ in terms)))
 
