@@ -262,7 +262,7 @@ def compare_missions(
 def firing_states(
     scenario: str, runs: int, one: Replacements, other: Replacements, *, seed: int, limit: TimeLimit
 ) -> tuple[int, int]:
-    """Count the states of the first of compare_missions's missions in which a rule fires that only one of the two has.
+    """Count the states of missions with one knowledge base in which a rule fires that only one of the two has.
 
     Returns:
         how many states, and of how many.

@@ -311,7 +311,7 @@ class RuleQuestions:
         return next((each for each in answers if each.fires), answers[0])
 
     def of(self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})) -> WhyNot:
-        """Say why a rule, of several of its name, does not fire where variables stand for what `start` says."""
+        """Say why a rule, which may share its name, does not fire where variables stand for what `start` says."""
         if not rule.enabled:
             answer = f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
             return WhyNot(rule.name, answer)
