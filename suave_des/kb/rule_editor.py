@@ -10,11 +10,11 @@ from __future__ import annotations
 import re
 import stat
 from collections.abc import Callable, Sequence
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 from xml.parsers import expat
+from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
@@ -23,15 +23,16 @@ from suave_des.files import write_files
 from suave_des.kb.states import read_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
-from suave_des.knowledge.rdf import RDF, RDF_TYPE, RDFS, SWRL, SWRLA, XSD, Lit, local_name, namespace
+from suave_des.knowledge.rdf import RDF, RDF_TYPE, RDFS, SWRL, SWRLA, XSD, Lit, Triple, local_name
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
 _PREFIXES: Final = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
-_VARIABLE, _BUILTIN = SWRL + "Variable", SWRL + "Builtin"
-_TYPE, _RESOURCE, _ABOUT, _NODE_ID = (f"{{{RDF}}}{name}" for name in ("type", "resource", "about", "nodeID"))
+_DECLARED: Final = " ".join(f'xmlns:{prefix}="{iri}"' for prefix, iri in _PREFIXES.items())
+_TYPE, _VARIABLE, _BUILTIN = f"{{{RDF}}}type", SWRL + "Variable", SWRL + "Builtin"
+_NODE_ID: Final = f"{{{RDF}}}nodeID"
 _Span = tuple[int, int]
 
 
@@ -91,9 +92,9 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
     for start, end in sorted(spans, reverse=True):
         changed, marks = _MARK.subn(rb"\g<1>" + word, content[start:end])
         if not marks and (tag := _TAG.match(changed)):
-            declared = f'xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF}" rdf:datatype="{XSD}boolean"'
-            mark = f"<swrla:isRuleEnabled {declared}>".encode() + word + b"</swrla:isRuleEnabled>"
-            changed = changed[: tag.end()] + mark + changed[tag.end() :]
+            declared = f'<swrla:isRuleEnabled xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF}"'
+            mark = _property_xml(ENABLED, _truth(enabled), {}).replace("<swrla:isRuleEnabled", declared, 1)
+            changed = changed[: tag.end()] + mark.encode() + changed[tag.end() :]
         content = content[:start] + changed + content[end:]
     _replace(file, content, lambda rules: [replace(r, enabled=enabled) if r.name == name else r for r in rules])
     return True
@@ -152,45 +153,56 @@ def _spans(content: bytes) -> list[_Span]:
 
 
 def _is_rule(element: etree._Element) -> bool:
-    types = (child.get(_RESOURCE) for child in element.iterfind(_TYPE))
+    types = (child.get(f"{{{RDF}}}resource") for child in element.iterfind(_TYPE))
     return element.tag == f"{{{SWRL}}}Imp" or SWRL + "Imp" in types
 
 
 def _name(element: etree._Element) -> str | None:
     """The label of a rule, or the last part of its IRI; None where it has neither."""
     label = element.findtext(f"{{{RDFS}}}label", element.get(f"{{{RDFS}}}label"))
-    iri = element.get(_ABOUT) or element.get(f"{{{RDF}}}ID")
+    iri = element.get(f"{{{RDF}}}about") or element.get(f"{{{RDF}}}ID")
     return local_name(iri) if label is None and iri else label
 
 
 def _rule_xml(rule: Rule) -> str:
     """The element of a rule. Its variables and built-ins are declared where it uses them, so that they go with it."""
-    triples, builtins = triples_of(rule), {atom.predicate for atom in rule.body if atom.kind == "builtin"}
+    triples = triples_of(rule)
     start = triples[0][0]
-    disabled = [] if rule.enabled else [(start, ENABLED, Lit("false", XSD + "boolean"))]
-    every = [*disabled, *triples, *((name, RDF_TYPE, _BUILTIN) for name in builtins)]
-    nodes = {subject: etree.Element(f"{{{RDF}}}Description", nsmap=_PREFIXES) for subject, _, _ in every}
-    for subject, node in nodes.items():
-        if not subject.startswith("_:"):
-            node.set(_ABOUT, subject)
-    inside: list[tuple[etree._Element, str]] = []
-    for subject, predicate, value in every:
-        element = etree.SubElement(nodes[subject], f"{{{namespace(predicate)}}}{local_name(predicate)}")
-        if isinstance(value, Lit):
-            element.text = value.text
-            if value.datatype.startswith("@"):
-                element.set("{http://www.w3.org/XML/1998/namespace}lang", value.datatype[1:])
-            elif predicate != RDFS + "label":
-                element.set(f"{{{RDF}}}datatype", value.datatype)
-        elif value in nodes:
-            inside.append((element, value))
-        else:
-            element.set(_RESOURCE, value)
-    for element, value in inside:  # variables and built-ins more than once
-        element.append(nodes[value] if value.startswith("_:") else deepcopy(nodes[value]))
-    text = etree.tostring(nodes[start], encoding="unicode")
-    text = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", text)
-    return f"    {text.removesuffix('</rdf:Description>')}\n    </rdf:Description>\n"
+    declared = {triple[0]: _VARIABLE for triple in triples if triple[2] == _VARIABLE}
+    builtins = {atom.predicate: _BUILTIN for atom in rule.body if atom.kind == "builtin"}
+    of: dict[str, list[Triple]] = {start: []}
+    if not rule.enabled:
+        of[start].append((start, ENABLED, _truth(False)))
+    for triple in triples:
+        of.setdefault(triple[0], []).append(triple)
+    for name, kind in (*declared.items(), *builtins.items()):
+        of[name] = [(name, RDF_TYPE, kind)]
+    order = [start]
+    for node in order:  # a list nests as deep as it is long, which is too deep for a recursion
+        order += [str(value) for _, predicate, value in of[node] if value in of and predicate != RDF_TYPE]
+    texts: dict[str, str] = {}
+    for node in reversed(order):
+        texts[node] = "".join(_property_xml(predicate, value, texts) for _, predicate, value in of[node])
+    inside = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", texts[start])
+    return f"    <rdf:Description {_DECLARED}>{inside}\n    </rdf:Description>\n"
+
+
+def _property_xml(predicate: str, value: str | Lit, texts: dict[str, str]) -> str:
+    """The element of a property; `texts` are the contents of the nodes that are written inside."""
+    name = next(f"{prefix}:{predicate[len(iri) :]}" for prefix, iri in _PREFIXES.items() if predicate.startswith(iri))
+    if isinstance(value, Lit):
+        in_language = value.datatype.startswith("@")
+        kind = f' xml:lang="{value.datatype[1:]}"' if in_language else f" rdf:datatype={quoteattr(value.datatype)}"
+        kind = "" if predicate == RDFS + "label" else kind
+        return f"<{name}{kind}>{escape(value.text)}</{name}>"
+    if value not in texts:
+        return f"<{name} rdf:resource={quoteattr(value)}/>"
+    about = "" if value.startswith("_:") else f" rdf:about={quoteattr(value)}"
+    return f"<{name}><rdf:Description{about}>{texts[value]}</rdf:Description></{name}>"
+
+
+def _truth(value: bool) -> Lit:
+    return Lit(str(value).lower(), XSD + "boolean")
 
 
 def _replace(file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]) -> None:
