@@ -144,10 +144,7 @@ def prepare(folder: Path, cache: Path) -> None:
 
 def rows(only: str, rounds: int) -> list[str]:
     """Measure the commands that contain a text; lines of a Markdown table."""
-    lines = [
-        "| `suave-des ...` | first, s | later, s | memory, MB |",
-        "| --- | ---: | ---: | ---: |",
-    ]
+    lines = ["| `suave-des ...` | first, s | later, s | memory, MB |", "| --- | ---: | ---: | ---: |"]
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder, filled = Path(name) / "work", Path(name) / "cache"
         folder.mkdir()

@@ -31,12 +31,7 @@ class InputError(SuaveDesError):
     """
 
     def __init__(
-        self,
-        problem: str,
-        *,
-        file: Path | str | None = None,
-        place: str | None = None,
-        remedy: str | None = None,
+        self, problem: str, *, file: Path | str | None = None, place: str | None = None, remedy: str | None = None
     ) -> None:
         self.problem = problem
         self.file = None if file is None else str(file)

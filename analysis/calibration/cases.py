@@ -16,15 +16,7 @@ from suave_des import InputError, find, load_scenario, read_real, with_values
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Variation, vary
 from suave_des.resources import shipped_folder
-from suave_des.results.real import (
-    CONDITION,
-    PAPERS_RUNS,
-    Conditions,
-    Share,
-    count,
-    published_for,
-    targets_of,
-)
+from suave_des.results.real import CONDITION, PAPERS_RUNS, Conditions, Share, count, published_for, targets_of
 from suave_des.scenario.loader import LoadedScenario
 
 FOLDER = Path(__file__).parent

@@ -198,15 +198,11 @@ class KnowledgeBase:
         """
         reasoning = self.infer(state)
         return self.limit.run(
-            lambda: explain(self.base, question, reasoning, self._tracing_pellet),
-            f"explaining the state {state}",
+            lambda: explain(self.base, question, reasoning, self._tracing_pellet), f"explaining the state {state}"
         )
 
     def policy(
-        self,
-        max_failed: int = 2,
-        on_count: OnCount = lambda done, total: None,
-        space: PolicySpace | None = None,
+        self, max_failed: int = 2, on_count: OnCount = lambda done, total: None, space: PolicySpace | None = None
     ) -> Policy:
         """Decide every state, with at most `max_failed` components that report a status.
 
@@ -228,10 +224,7 @@ class KnowledgeBase:
         return PolicySpace.of(self.base, self.settings)
 
     def diff(
-        self,
-        other: KnowledgeBase,
-        max_failed: int = 2,
-        on_count: OnCount = lambda done, total: None,
+        self, other: KnowledgeBase, max_failed: int = 2, on_count: OnCount = lambda done, total: None
     ) -> PolicyDifference:
         """Find the states that another knowledge base decides differently, over all states that either distinguishes.
 

@@ -161,12 +161,7 @@ def nearest_match(rule: Rule, facts: Facts, start: Binding = MappingProxyType({}
 
 
 def _ways(
-    body: Sequence[Atom],
-    order: Sequence[int],
-    facts: Facts,
-    binding: Binding,
-    tries: Iterator[int],
-    allowed: int = 0,
+    body: Sequence[Atom], order: Sequence[int], facts: Facts, binding: Binding, tries: Iterator[int], allowed: int = 0
 ) -> Iterator[tuple[Binding, tuple[int, ...]]]:
     """Ways to match atoms, in an order, of which some may fail: binding, and numbers of those; as many as `tries`."""
     if next(tries, None) is None:

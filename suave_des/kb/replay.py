@@ -97,11 +97,7 @@ def _times(cycles: Sequence[ReplayedCycle]) -> str:
 
 
 def try_rules(
-    folder: Path,
-    rule: str | None = None,
-    *,
-    disabled: str | None = None,
-    limit_s: float = TIME_LIMIT_S,
+    folder: Path, rule: str | None = None, *, disabled: str | None = None, limit_s: float = TIME_LIMIT_S
 ) -> Iterator[MissionReplay]:
     """Try adding or disabling rules on recorded missions, one after the other.
 

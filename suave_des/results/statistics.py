@@ -295,11 +295,7 @@ def sign_of(p_less: float, p_greater: float) -> int:
 
 
 def agreement(
-    sign: int,
-    samples: Sequence[Sample],
-    sizes: Sequence[int],
-    rng: np.random.Generator,
-    subsamples: int = SUBSAMPLES,
+    sign: int, samples: Sequence[Sample], sizes: Sequence[int], rng: np.random.Generator, subsamples: int = SUBSAMPLES
 ) -> float:
     """Return the share of random subsamples of two samples that lead to a conclusion, a sign as of sign_of.
 

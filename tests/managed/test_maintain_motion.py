@@ -25,11 +25,7 @@ class Motion:
         self.restored: list[tuple[float, int]] = []
         bus.subscribe(self.published.append)
         self.node = MaintainMotion(
-            self.env,
-            bus,
-            revision(name).recovery,
-            SimpleNamespace(recover=self.recover),
-            lambda: 10.0,
+            self.env, bus, revision(name).recovery, SimpleNamespace(recover=self.recover), lambda: 10.0
         )
 
     def recover(self, thruster: int) -> bool:

@@ -133,10 +133,7 @@ ALTITUDE = {
         [0.5, 2.0],
     ),
     "no mismatch if put right before the next message": ([*CLEAR, flies(10.5, 1.0), flies(11.0, 3.0)], [0.5]),
-    "nor if the next message finds it fitting": (
-        [*CLEAR, flies(11.5, 2.0), sees(12.2, 3.2), flies(13.0, 2.0)],
-        [0.5],
-    ),
+    "nor if the next message finds it fitting": ([*CLEAR, flies(11.5, 2.0), sees(12.2, 3.2), flies(13.0, 2.0)], [0.5]),
     "below all thresholds none is asked for": ([sees(0.2, 1.0), flies(1.2, 1.0), flies(2.2, 2.0)], []),
     "while following too": (
         [*CLEAR, ends(10.0, SEARCH), begins(10.0, "f_follow_pipeline"), sees(12.2, 3.2), flies(50.2, 2.0)],

@@ -213,10 +213,7 @@ def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(camp
     assert str(comparison).count(f"suave-des replay {campaign} --run {apart.abs().idxmax()} --managers bt,none") == 1
     frame = compare_frame(pandas.read_csv(campaign / "runs.csv"))
     assert frame.largest.rows and "replay" not in str(frame)
-    for unpaired in (
-        compare_folders([PUBLISHED]),
-        compare_folders([campaign], unpaired=True),
-    ):
+    for unpaired in (compare_folders([PUBLISHED]), compare_folders([campaign], unpaired=True)):
         assert not unpaired.largest.rows
 
 

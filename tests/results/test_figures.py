@@ -84,11 +84,7 @@ def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path):
     figure = draw_sweep(missions)
     frame = result.frame()
     panel = figure.axes[0]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
-        "none",
-        "random",
-        "95% interval of the mean",
-    ]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["none", "random", "95% interval of the mean"]
     for manager, container in zip(("none", "random"), panel.containers, strict=True):
         own = frame[frame["manager"] == manager].groupby("visibility.period_s")["search_time_s"].mean()
         assert list(container[0].get_ydata()) == pytest.approx(list(own))
