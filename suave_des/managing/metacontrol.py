@@ -6,6 +6,7 @@ design's name. Source of what revisions do differently: kas-lab/suave with its r
 """
 
 from collections.abc import Callable, Collection, Hashable
+from functools import partial
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
@@ -94,10 +95,15 @@ class Metacontrol(ManagingSubsystem):
         # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
         if self._longest_s < self.period_s and self._changes_nothing(reasoning):
             return None
+        return self.execute(reasoning, self._latency_s(self.system.now_s))
+
+    def _latency_s(self, began_s: float) -> float:
+        """Draw how long the cycle that began at a mission time takes to infer."""
         latency = self.system.scenario.latencies.inference_s
-        if not isinstance(latency, float):  # from the cycle's own stream: a recorded mission goes through more cycles
-            latency = draw(latency, self.system.stream(f"metacontrol/inference/{self.system.now_s}"))
-        return self.execute(reasoning, latency)
+        if isinstance(latency, float):
+            return latency
+        # From the cycle's own stream: a recorded mission goes through more cycles.
+        return draw(latency, self.system.stream(f"metacontrol/inference/{began_s}"))
 
     def monitor(self) -> None:
         """Read the measured values; components report by themselves, see `diagnostic`."""
@@ -204,11 +210,31 @@ class Metacontrol(ManagingSubsystem):
 
     def _remove_objectives(self, functions: tuple[str, ...]) -> None:
         self.monitor()  # later measurements may be ignored
+        if self._revision.executes_plans_of_removed_objectives:
+            self._execute_plan_under_way(functions)
         self._cancelled.update(functions)
         for function in functions:
             self.objectives.pop(function, None)
             self.groundings.pop(function, None)
             self.system.change_mode(function, UNGROUND_MODE)
+
+    def _execute_plan_under_way(self, functions: tuple[str, ...]) -> None:
+        """Have the modes requested all the same that the cycle under way, if any, chooses for functions.
+
+        So a search goes on although its task is over, and disturbs what follows. Cycles that change nothing are left
+        out (see `depends_on`), so the plan is made here.
+        """
+        env, passed_s = self.system.env, self.system.now_s - self.starts_s
+        began_s = self.starts_s + passed_s // self.period_s * self.period_s
+        ends_s = began_s + self._latency_s(began_s)
+        if not self.objectives or passed_s < 0.0 or env.now >= ends_s:
+            return
+        for decision in self._analyze_and_plan().plan.decisions:
+            if decision.function in functions and decision.design is not None:
+                call_at(env, ends_s, partial(self._request, decision.function, decision.design))
+
+    def _request(self, function: str, design: str) -> None:
+        self.system.change_mode(function, design)
 
     # Queries of the loop.
 

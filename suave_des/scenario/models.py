@@ -749,6 +749,8 @@ class MetacontrolRevision(Strict):
     """Whether an objective is also adapted when a measured value exceeds what its current design expects."""
     ignores_diagnostics_without_objective: bool
     """Whether diagnostics are ignored while there is no objective."""
+    executes_plans_of_removed_objectives: bool = False
+    """Whether a cycle that is under way when objectives are removed requests their modes all the same."""
 
 
 class Revision(Strict):

@@ -97,6 +97,25 @@ def test_a_plan_comes_as_much_later_as_the_inference_takes(latency_s):
     assert modes(later, SEARCH)[1][0] == pytest.approx(modes(at_once, SEARCH)[1][0] + latency_s)
 
 
+@pytest.mark.parametrize("executes", [True, False])
+def test_a_plan_under_way_is_executed_though_its_objective_is_removed(executes):
+    """In revision 2023 the search then goes on while the pipeline is followed."""
+    goes_on = set()
+    for run in range(1, 9):
+        values = {"revision.metacontrol.executes_plans_of_removed_objectives": executes}
+        found = mission({**visibility(3.5), **values}, run=run, limit_s=150.0)
+        cycle_ends_s = modes(found, MOTION)[0][0]  # 1 s after it began; the next one begins a second later
+        removed_s = next(t_s for t_s, mode in modes(found, SEARCH) if mode == "fd_unground")
+        again = [(t_s, mode) for t_s, mode in modes(found, SEARCH) if removed_s < t_s < 149.0]
+        under_way_s = (removed_s - cycle_ends_s) % 2.0 - 1.0
+        if executes and under_way_s >= 0.0:
+            assert again == [(pytest.approx(removed_s + 1.0 - under_way_s), "fd_spiral_high")]
+        else:
+            assert again == []
+        goes_on.add(bool(again))
+    assert goes_on == ({True, False} if executes else {False})
+
+
 def test_revision_15_waits_for_the_first_measurement():
     late = {"signals.water_visibility": {"kind": "constant", "value": 1.5, "publishing_period_s": 30.0}}
     first_message_s = next(
