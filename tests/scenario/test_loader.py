@@ -33,8 +33,9 @@ def test_release15_is_the_same_vehicle_in_other_software():
     assert ours.revision.name == "1.5"
     assert ours.managers.random.adaptation_period_s == 30
     assert ours.managers.metacontrol.reasoning_period_s == 1.5
-    of_2023_alone = ("altitude_error_m", "origin_y_m")
-    shared = other.calibration.model_copy(update=dict.fromkeys(of_2023_alone, 0.0))
+    of_2025 = load_scenario("planta_exp1").scenario.calibration
+    of_2023_alone = ("altitude_error_m", "origin_y_m", "reasoning_slowdown")
+    shared = other.calibration.model_copy(update={name: getattr(of_2025, name) for name in of_2023_alone})
     assert (ours.calibration, ours.start, ours.pipeline) == (shared, other.start, other.pipeline)
 
 
