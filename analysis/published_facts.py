@@ -1,6 +1,6 @@
 """What the published runs themselves show: how fast missions follow, when the search ends, and which failures are lost.
 
-Three mechanisms rest on these figures (docs/background/fidelity.md): the reasoner slows the simulator down, the search
+Three mechanisms rest on these figures (docs/background/fidelity.md): the reasoner slows the simulator of 2025 down, the search
 begins some time after its first activation, and early failures are without effect. Writes speeds.csv,
 search_times.csv, and failures.csv, which has simulated missions too.
 
