@@ -1,7 +1,7 @@
 """What the published runs themselves show: how fast missions follow, when the search ends, and which failures are lost.
 
-Three mechanisms rest on these figures (docs/background/fidelity.md): the reasoner slows the simulator of 2025 down, the search
-begins some time after its first activation, and early failures are without effect. Writes speeds.csv,
+Mechanisms that rest on these figures (docs/background/fidelity.md): what slows metacontrol's inspections down, when the
+search begins after its first activation, and that early failures are without effect. Writes speeds.csv,
 search_times.csv, and failures.csv, which has simulated missions too.
 
     python analysis/published_facts.py [--out DIR]

@@ -123,15 +123,17 @@ def published_speeds_m_per_s(manager: str) -> list[float]:
     return [distance_m / time_s for distance_m, time_s in pairs if distance_m > 10.0]
 
 
-# With one dead thruster, which none keeps, the vehicle is slower than the real one (docs/background/fidelity.md).
+# None keeps a failed thruster; the search goes on during some of metacontrol's inspections, and slows them down.
 @pytest.mark.parametrize(("manager", "tolerance"), [("none", 0.15), ("metacontrol", 0.08)])
 def test_metres_inspected_for_each_second_after_the_detection(manager, tolerance):
     simulator = Simulator(load_scenario("seams2023"))
-    results = [simulator.run(manager, run, seed=1).metrics for run in range(1, 41)]
+    results = [simulator.run(manager, run, seed=1).metrics for run in range(1, 201)]
     speeds = [
         each.distance_inspected_m / (each.mission_duration_s - each.search_time_s)
         for each in results
         if each.distance_inspected_m > 10.0
     ]
     published = published_speeds_m_per_s(manager)
-    assert statistics.median(speeds) == pytest.approx(statistics.median(published), rel=tolerance)
+    assert statistics.quantiles(speeds)[2] == pytest.approx(statistics.quantiles(published)[2], rel=tolerance)
+    slow, published_slow = (sum(speed < 0.26 for speed in each) / len(each) for each in (speeds, published))
+    assert manager == "none" or slow == pytest.approx(published_slow, abs=0.21)  # half the interval of 7 of 20
