@@ -146,7 +146,8 @@ def keys(model: type[BaseModel], names: Iterable[str] = (), prefix: str = "") ->
         if not is_below(field):
             yield f"- `{key}` ({'; '.join(filter(None, (value_text(field), default_text(field))))}): {texts[name]}"
         elif model is not Scenario:
-            yield f"- `{key}`: {texts[name]}"
+            if model is not ManagerSettings:  # whose keys are the managers' names
+                yield f"- `{key}`: {texts[name]}"
             (inner,) = models_in(field.annotation)
             yield from keys(inner, prefix=f"{key}{entry(field)}.")
 
