@@ -24,7 +24,7 @@ Exit status:
 
 - 0: done
 - 1: done, but `kb check` found errors, a test of `kb test` fails, or `validate --strict` missed a target
-- 2: bad input; one line says file, place, what is wrong and what would be right; nothing was written
+- 2: bad input; one line says file, place, problem and remedy; nothing was written
 - 3: done, but some missions failed
 - 130, 143: interrupted with Ctrl-C or by a plain `kill`; finished missions are kept
 
