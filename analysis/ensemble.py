@@ -180,7 +180,7 @@ def main() -> None:
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
 
-    conditions = len(read_conditions("planta_exp1_campaign") or ())
+    conditions = len(read_conditions("planta_exp1_campaign"))
     data = {
         "seams2023": problem_of("seams2023", "seams2023", chosen.runs),
         # What random does differs from run to run by far more than with any parameter.

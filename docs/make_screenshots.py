@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from suave_des.campaign.campaign import run_campaign
-from suave_des.pages.recorded import missions_run
-from suave_des.pages.replay import replay_page
+from suave_des.pages.replay import missions_run, replay_page
 from suave_des.pages.report import report_page
 from suave_des.scenario.loader import load_scenario
 

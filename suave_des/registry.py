@@ -50,13 +50,6 @@ _FAMILIES = {
 """Managers with an argument after a colon: module and function that make the class, and what the argument is."""
 _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
-_HOOKS = {
-    "ManagingSubsystem": (
-        *("__init__", "check", "input_files", "recall", "mission_started", "mission_ended"),
-        *("task_requested", "task_cancelled", "diagnostic", "adapt"),
-    ),
-    "CustomFunction": ("__init__", "configure", "activated", "deactivated"),
-}
 _MAY_YIELD = ("adapt", "input_files")
 _checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
 
@@ -225,7 +218,8 @@ def _imported(what: str, module: str) -> ModuleType:
 
 def _check_hooks(what: str, kind: type, root: type) -> None:
     """Check that hooks can be called as hooks are called, and that no method is most likely a misspelt one."""
-    forms = {name: _form(root, name) for name in _HOOKS[root.__name__]}
+    own = {name: each for base in root.__mro__[:-1] for name, each in vars(base).items() if inspect.isroutine(each)}
+    forms = {name: _form(root, name) for name in own if name == "__init__" or not name.startswith("_")}
     for hook, form in forms.items():
         function = getattr(kind, hook)
         never_runs = inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function)

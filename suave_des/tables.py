@@ -7,7 +7,6 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -133,20 +132,8 @@ class Table:
         """Write the table as CSV."""
         return csv_text(self.headings, self.rows)
 
-    def html(self) -> str:
-        """Write the table as HTML, its title as caption."""
-
-        def line(tag: str, cells: Sequence[str]) -> str:
-            sides = ("" if side == "l" else ' style="text-align: right"' for side in self._alignment)
-            inner = (f"<{tag}{side}>{escape(cell)}</{tag}>" for cell, side in zip(cells, sides, strict=False))
-            return f"<tr>{''.join(inner)}</tr>"
-
-        caption = f"<caption>{escape(self.title)}</caption>" if self.title else ""
-        body = "".join(line("th" if len(row) == 1 else "td", row) for row in self.rows)
-        return f"<table>{caption}<thead>{line('th', self.headings)}</thead><tbody>{body}</tbody></table>"
-
-    def _repr_html_(self) -> str:
-        return self.html()
+    def _repr_markdown_(self) -> str:
+        return f"{markdown_text(self.title)}\n\n{self.markdown()}"
 
 
 class Section(NamedTuple):

@@ -60,11 +60,11 @@ def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing():
     ]
 
 
-def test_csv_and_html_have_the_same_cells():
+def test_csv_and_a_notebook_have_the_same_cells():
     table = Table(("name", "n"), [('<i>"a", b</i>', "1")], "t & u")
     assert table.csv() == 'name,n\n"<i>""a"", b</i>",1\n'
-    assert "<caption>t &amp; u</caption>" in table.html()
-    assert "<td>&lt;i&gt;&quot;a&quot;, b&lt;/i&gt;</td>" in table.html()
+    assert table._repr_markdown_().startswith("t & u\n\n| name | n |\n")
+    assert '| &lt;i&gt;"a", b&lt;/i&gt; | 1 |' in table._repr_markdown_()
 
 
 def test_names_break_after_separators_and_before_capitals_and_numbers_keep_their_sign():

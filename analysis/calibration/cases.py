@@ -16,7 +16,7 @@ from suave_des import InputError, find, load_scenario, read_real, with_values
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Variation, vary
 from suave_des.resources import shipped_folder
-from suave_des.results.real import CONDITION, PAPERS_RUNS, Conditions, Share, count, published_for, targets_of
+from suave_des.results.real import CONDITION, PAPERS_RUNS, Share, conditions_of, count, published_for, targets_of
 from suave_des.scenario.loader import LoadedScenario
 
 FOLDER = Path(__file__).parent
@@ -115,7 +115,7 @@ def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
         loaded, real = variation.scenario(loaded, 0), read_real(files)
         conditions: dict[int, dict[str, Any]] = {ONLY_CONDITION: {}}
     else:
-        real = read_real(files, Conditions.of(variation.sweep))
+        real = read_real(files, conditions_of(variation.sweep))
         conditions = {
             number: {variation.paths[name]: value for name, value in values.items()}
             for number, values in enumerate(points, 1)

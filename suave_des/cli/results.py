@@ -163,7 +163,16 @@ def validate(
     With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
     from suave_des import __version__
-    from suave_des.results.real import CONDITION, PAPERS_RUNS, published_for, read_conditions, read_real, targets_of
+    from suave_des.results.real import (
+        CONDITION,
+        PAPERS_RUNS,
+        condition_numbers,
+        condition_text,
+        published_for,
+        read_conditions,
+        read_real,
+        targets_of,
+    )
     from suave_des.results.validation import FILES
     from suave_des.results.validation import validate as compare
 
@@ -171,8 +180,7 @@ def validate(
     out, seed, overwrite = options.get("out"), options.get("seed", 1), "overwrite" in options
     if runs_file is not None:
         check_no_use(files.given, "with --runs-file", "leave one of them out")
-    wants_conditions = runs_file is None or scenario is not None
-    conditions = read_conditions(name, **files.replacements) if wants_conditions else None
+    conditions = read_conditions(name, **files.replacements)
     data = data or [str(published_for(name) or PAPERS_RUNS)]
     real = read_real([find(each, "scenarios/published") for each in data], conditions)
     chosen = real.choose(comma_separated(managers))
@@ -188,7 +196,7 @@ def validate(
     if runs_file is not None:
         from suave_des.records.runs import read_runs
 
-        recorded = read_runs(runs_file, () if conditions is None else conditions.names)
+        recorded = read_runs(runs_file, list(conditions.columns))
         recorded.check_simulated(chosen)
         if out is not None:
             check_output_folder(out, "campaign", overwrite=overwrite)
@@ -198,7 +206,7 @@ def validate(
     else:
         from suave_des.campaign.campaign import run_campaign
 
-        runs = -(-_RUNS // len(conditions or "1"))
+        runs = -(-_RUNS // max(1, len(conditions)))
         settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
         with progress.shown(name, quiet=quiet) as show:
             result = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
@@ -206,13 +214,12 @@ def validate(
         sources |= {"scenario": result.campaign.loaded.scenario.name, "runs": settings["runs"]}
         if not set(result.campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
             exit_telling_failures(result)
-    if conditions is not None:
-        simulated = simulated.assign(**{CONDITION: conditions.numbers(simulated)})
+    if len(conditions):
+        simulated = simulated.assign(**{CONDITION: condition_numbers(conditions, simulated)})
     validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
     console = output()
-    notes = list(real.notes)
-    if conditions is not None:
-        notes += [f"Condition {number}: {conditions.text(number)}" for number in range(1, len(conditions) + 1)]
+    texts = (f"Condition {number}: {condition_text(conditions, number)}" for number in range(1, len(conditions) + 1))
+    notes = [*real.notes, *texts]
     for line in [*notes, ""] if notes else ():
         console.print(line)
     for table in validation.tables(word):
@@ -263,7 +270,7 @@ def figure(
     from suave_des.results.figures import draw_results
 
     def rules_of(record: MissionRecord) -> Rules:
-        from suave_des.pages.recorded import adaptation_rules
+        from suave_des.pages.replay import adaptation_rules
 
         return adaptation_rules(record)
 
@@ -305,8 +312,7 @@ def replay(
     It needs no network, and shows the vehicle, what its camera sees, and what its manager knew, inferred and decided.
     """
     from suave_des.pages.page import write_page
-    from suave_des.pages.recorded import missions_in, missions_run
-    from suave_des.pages.replay import replay_page
+    from suave_des.pages.replay import missions_in, missions_run, replay_page
     from suave_des.scenario.loader import load_scenario
 
     folders = folders or []

@@ -118,83 +118,63 @@ def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
 # Conditions
 
 
-@dataclass(frozen=True)
-class Conditions:
-    """The conditions of a campaign: names of the parameters that differ, and for each condition their values.
+def conditions_of(sweep: Sweep) -> pandas.DataFrame:
+    """Return the points of a sweep as conditions: a row for each, with a column for each parameter.
 
     Example:
-        conditions = Conditions.of(Sweep(zip={"start.y_m": [2.5, 2.8], "thruster_events.0.time_s": [146.4, 91.2]}))
+        conditions = conditions_of(Sweep(zip={"start.y_m": [2.5, 2.8], "thruster_events.0.time_s": [146.4, 91.2]}))
     """
+    points = [[*map(cell_of, sweep.values(point).values())] for point in range(sweep.points)]
+    return pandas.DataFrame(points, columns=list(sweep.parameters), dtype=object)
 
-    names: tuple[str, ...]
-    values: tuple[tuple[Any, ...], ...]
 
-    @classmethod
-    def of(cls, sweep: Sweep) -> Conditions:
-        """Return the points of a sweep as conditions."""
-        points = (sweep.values(point) for point in range(sweep.points))
-        return cls(sweep.parameters, tuple(tuple(map(cell_of, each.values())) for each in points))
+def condition_text(conditions: pandas.DataFrame, number: int) -> str:
+    """Return a condition's values, such as "start.y_m=2.455"."""
+    return ", ".join(f"{name}={value}" for name, value in conditions.iloc[number - 1].items())
 
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self.values)
 
-    def text(self, number: int) -> str:
-        """Return a condition's values, such as "start.y_m=2.455"."""
-        return ", ".join(f"{name}={value}" for name, value in zip(self.names, self.values[number - 1], strict=True))
+def condition_numbers(conditions: pandas.DataFrame, runs: pandas.DataFrame) -> NDArray[np.int64]:
+    """Return the number of each mission's condition, from 1, shape (n,).
 
-    def numbers(self, runs: pandas.DataFrame) -> NDArray[np.int64]:
-        """Return the number of each mission's condition, from 1, shape (n,).
+    Of columns named like the parameters, those that are there must agree; without any, one of NUMBER_COLUMNS has the
+    numbers; without that, missions are in order, as the exemplar's runner makes them: equally many of each condition.
 
-        Of columns named like the parameters, those that are there must agree; without any, one of NUMBER_COLUMNS has
-        the numbers; without that, missions are in order.
+    Raises:
+        InputError: about a row, counted from 0 as its place: it is of no condition, or of several; or, without a place,
+            a manager's missions do not divide evenly.
+    """
+    if named := [str(name) for name in conditions if name in runs]:
+        return _by_values(conditions, runs, named)
+    column = next((name for name in NUMBER_COLUMNS if name in runs), None)
+    if column is None:
+        return _in_order(runs["manager"], len(conditions))
+    numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
+    for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(conditions) + 1)))[:1]:
+        problem = f"{column}: there is no condition {runs[column].iloc[row]}"
+        raise InputError(problem, place=str(row), remedy=f"the campaign has {len(conditions)}, counted from 1")
+    return numbers.astype(np.int64)
 
-        Raises:
-            InputError: about a row, counted from 0 as its place: it is of no condition, or of several.
-        """
-        if named := [name for name in self.names if name in runs]:
-            return self._by_values(runs, named)
-        column = next((name for name in NUMBER_COLUMNS if name in runs), None)
-        if column is None:
-            return self.in_order(runs["manager"])
-        numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
-        for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(self) + 1)))[:1]:
-            problem = f"{column}: there is no condition {runs[column].iloc[row]}"
-            raise InputError(problem, place=str(row), remedy=f"the campaign has {len(self)}, counted from 1")
-        return numbers.astype(np.int64)
 
-    def _by_values(self, runs: pandas.DataFrame, named: Sequence[str]) -> NDArray[np.int64]:
-        places = [self.names.index(name) for name in named]
-        fits = np.array(
-            [
-                np.all([_same(runs[name], values[place]) for name, place in zip(named, places, strict=True)], axis=0)
-                for values in self.values
-            ]
-        )
-        for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
-            given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
-            fitting = ", ".join(str(number) for number in 1 + np.flatnonzero(fits[:, row])) or "none"
-            shown = "; ".join(map(self.text, range(1, min(len(self), 8) + 1)))
-            problem = f"conditions of the campaign that have {given}: {fitting}"
-            raise InputError(problem, place=str(row), remedy=f"name one; the campaign has {shown}")
-        return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
+def _by_values(conditions: pandas.DataFrame, runs: pandas.DataFrame, named: Sequence[str]) -> NDArray[np.int64]:
+    points = conditions[named].itertuples(index=False, name=None)
+    fits = np.array([np.all([*map(_same, (runs[name] for name in named), values)], axis=0) for values in points])
+    for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
+        given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
+        fitting = ", ".join(str(number) for number in 1 + np.flatnonzero(fits[:, row])) or "none"
+        shown = "; ".join(condition_text(conditions, number) for number in range(1, min(len(conditions), 8) + 1))
+        problem = f"conditions of the campaign that have {given}: {fitting}"
+        raise InputError(problem, place=str(row), remedy=f"name one; the campaign has {shown}")
+    return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
 
-    def in_order(self, managers: pandas.Series[str]) -> NDArray[np.int64]:
-        """Number missions by their order, as the exemplar's runner makes them: equally many runs of each condition.
 
-        Returns:
-            From 1, shape (n,), by the manager of each mission.
-
-        Raises:
-            InputError: a manager's missions do not divide evenly.
-        """
-        by_manager = managers.groupby(managers, sort=False)
-        places, sizes = by_manager.cumcount().to_numpy(), by_manager.transform("size").to_numpy()
-        for row in np.flatnonzero(sizes % len(self))[:1]:
-            own = f"{number_of(int(sizes[row]), 'mission')} of manager {managers.iloc[row]}"
-            remedy = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
-            raise InputError(f"has {own}, which {len(self)} conditions do not share evenly", remedy=remedy)
-        return np.asarray(1 + places // (sizes // len(self)), dtype=np.int64)
+def _in_order(managers: pandas.Series[str], conditions: int) -> NDArray[np.int64]:
+    by_manager = managers.groupby(managers, sort=False)
+    places, sizes = by_manager.cumcount().to_numpy(), by_manager.transform("size").to_numpy()
+    for row in np.flatnonzero(sizes % conditions)[:1]:
+        own = f"{number_of(int(sizes[row]), 'mission')} of manager {managers.iloc[row]}"
+        remedy = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
+        raise InputError(f"has {own}, which {conditions} conditions do not share evenly", remedy=remedy)
+    return np.asarray(1 + places // (sizes // conditions), dtype=np.int64)
 
 
 def _same(column: pandas.Series[Any], value: Any) -> NDArray[np.bool_]:
@@ -241,7 +221,7 @@ class RealRuns:
 
 
 @plain_arguments
-def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None) -> RealRuns:
+def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None = None) -> RealRuns:
     """Read real missions.
 
     Example:
@@ -250,9 +230,10 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
 
     Args:
         paths: of files such as read_runs takes; the exemplar writes one for each manager.
-        conditions: of the campaign in which the missions were made. Which one a mission is of follows from columns that
-            are named like the campaign's parameters, or `condition` or `block` with its number from 1, or else by
-            order: equally many missions of each, one condition after the other, as the exemplar's runner makes them.
+        conditions: of the campaign in which the missions were made, as of conditions_of. Which one a mission is of
+            follows from columns that are named like the campaign's parameters, or `condition` or `block` with its
+            number from 1, or else by order: equally many missions of each, one condition after the other, as the
+            exemplar's runner makes them.
 
     Raises:
         InputError: with file and line: a file cannot be read, two are the same, or a condition cannot be determined.
@@ -264,10 +245,10 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
                 raise InputError(f"has the same content as {other.path}", file=file.path, remedy="give each file once")
     notes = [f"{note}." for file in files for note in file.notes]
     frame = pandas.concat([file.frame for file in files], ignore_index=True)
-    if conditions is not None:
-        named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
+    if conditions is not None and len(conditions):
+        named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
         try:
-            numbers = conditions.numbers(frame)
+            numbers = condition_numbers(conditions, frame)
         except InputError as error:
             if error.place is not None:
                 lines = [(file.path, int(line)) for file in files for line in file.frame.index]
@@ -286,7 +267,7 @@ def matched(
 ) -> tuple[pandas.DataFrame, pandas.DataFrame]:
     """Return real and simulated missions with the numbers of their conditions, the points of a sweep of these names.
 
-    Conditions of real missions are found as by Conditions.numbers; simulated ones are in the order of the points.
+    Conditions of real missions are found as by condition_numbers; simulated ones are in the order of the points.
 
     Raises:
         InputError: nothing is swept, or the real missions are not of these conditions.
@@ -294,10 +275,8 @@ def matched(
     if not names:
         remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
-    points = simulated[list(names)].drop_duplicates()
-    conditions = Conditions(tuple(names), tuple(points.itertuples(index=False, name=None)))
     try:
-        numbers = conditions.numbers(real)
+        numbers = condition_numbers(simulated[list(names)].drop_duplicates().astype(object), real)
     except InputError as error:
         raise InputError(error.problem, place="real missions", remedy=error.remedy) from None
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
@@ -312,22 +291,22 @@ def matched(
     return real, simulated
 
 
-def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
-    """Read the conditions that a campaign file sweeps; None of a scenario file, or if it sweeps none.
+def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:
+    """Read the conditions that a campaign file sweeps, as of conditions_of; none if it sweeps none, or is a scenario.
 
     Raises:
         InputError: a file cannot be used.
     """
     file = read_campaign_file(campaign)
     if file is None or not file.settings.sweep:
-        return None
+        return pandas.DataFrame()
     loaded, settings = load_scenario(file.scenario, **replacements), file.settings
     try:
         varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw)
         check_drawn(*varied)
     except InputError as error:
         raise file.located(error) from None
-    return Conditions.of(varied[1].sweep)
+    return conditions_of(varied[1].sweep)
 
 
 def published_for(scenario: str | Path) -> Path | None:
