@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -84,6 +85,15 @@ KeyPath = tuple[str | int, ...]
 def line_error(file: Path, line: int, problem: str, remedy: str | None = None) -> InputError:
     """Make the error for a line of a file."""
     return InputError(problem, file=file, place=f"line {line}", remedy=remedy)
+
+
+@contextmanager
+def located(before: str = "", file: Path | str | None = None, place: str | None = None) -> Iterator[None]:
+    """Give errors of the block a file or a place, in place of their own, and begin their problems with a text."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{before}{error.problem}", file=file, place=place, remedy=error.remedy) from None
 
 
 _WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}

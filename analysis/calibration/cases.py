@@ -126,7 +126,7 @@ def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
         frame[CONDITION] = ONLY_CONDITION
     made = {number: values for number, values in conditions.items() if number in set(frame[CONDITION])}
     shares = _counted([share for share in targets_of(real)[0] if share.manager in own], frame)
-    digests = {file.path.name: file.sha256 for file in real.files}
+    digests = {path.name: digest for path, digest in real.files.items()}
     name = Path(given).stem.removesuffix("_campaign")
     return Case(name, loaded, frame, made, shares, base, digests, real.notes)
 

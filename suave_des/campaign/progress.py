@@ -7,7 +7,7 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import timedelta
@@ -43,12 +43,17 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
     if quiet or sys.stderr is None:
         yield None
         return
-    text, over, live = _Text(label), threading.Event(), is_live()
+    label = "".join(char if char.isprintable() else "?" for char in label)
+    over, live, began_s, told = threading.Event(), is_live(), time.monotonic(), list[tuple[float, Progress]]()
     waits_s: Iterable[float] = repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
 
+    def take(progress: Progress) -> None:
+        told[1:] = [(time.monotonic(), progress)]  # beside the first one
+
     def draw(*, end: str = "") -> None:
+        text = f"{label}: {_text(told, time.monotonic() - began_s)}"
         width = shutil.get_terminal_size().columns - 1
-        line = f"\r{text.line()[:width]:<{width}}{end}" if live else f"suave-des: {text.line()}\n"
+        line = f"\r{text[:width]:<{width}}{end}" if live else f"suave-des: {text}\n"
         with suppress(OSError):  # nobody reads it any more
             print(line, end="", file=sys.stderr, flush=True)
 
@@ -62,50 +67,33 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
     drawer = threading.Thread(target=draw_until_over, daemon=True)
     drawer.start()
     try:
-        yield text.take
+        yield take
     finally:
         over.set()
         drawer.join()
         if live:
             draw(end="\n")
-        elif text.progress is not None and text.age_s > _FIRST_LINE_S:  # else it had no line so far
+        elif told and time.monotonic() - began_s > _FIRST_LINE_S:  # else it had no line so far
             draw()
 
 
-class _Text:
-    """What is known of a campaign's progress, as a line of text."""
+def _text(told: Sequence[tuple[float, Progress]], age_s: float) -> str:
+    """Return missions that are done and failed, their rate, and the time left, from the first and the last progress.
 
-    def __init__(self, label: str) -> None:
-        self.label = "".join(char if char.isprintable() else "?" for char in label)
-        self.progress: Progress | None = None
-        self._began_s = self._first_s = self._last_s = time.monotonic()
-        self._before = 0
-        """Missions that were done at first, as those of a campaign that is resumed."""
-
-    def take(self, progress: Progress) -> None:
-        self._last_s = time.monotonic()
-        if self.progress is None:
-            self._first_s, self._before = self._last_s, progress.done
-        self.progress = progress
-
-    @property
-    def age_s(self) -> float:
-        return time.monotonic() - self._began_s
-
-    def line(self) -> str:
-        """Return missions that are done and failed, their rate, and the time that is left."""
-        progress = self.progress
-        if progress is None:
-            return f"{self.label}: starting, {_time(self.age_s)} (the first run compiles the mission code: 20 to 60 s)"
-        parts = [f"{progress.done} of {progress.total} missions"]
-        if progress.failed:
-            parts.append(f"{progress.failed} failed")
-        done, took_s, left = progress.done - self._before, self._last_s - self._first_s, progress.total - progress.done
-        if done and took_s > 0.0:
-            rate = done / took_s
-            parts.append(f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s")
-            parts += [f"{_time(left / rate)} left"] if left else []
-        return f"{self.label}: {', '.join(parts)}"
+    Missions that were done at first are not counted in the rate: those of a campaign that is resumed.
+    """
+    if not told:
+        return f"starting, {_time(age_s)} (the first run compiles the mission code: 20 to 60 s)"
+    (first_s, first), (last_s, progress) = told[0], told[-1]
+    parts = [f"{progress.done} of {progress.total} missions"]
+    if progress.failed:
+        parts.append(f"{progress.failed} failed")
+    done, took_s, left = progress.done - first.done, last_s - first_s, progress.total - progress.done
+    if done and took_s > 0.0:
+        rate = done / took_s
+        parts.append(f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s")
+        parts += [f"{_time(left / rate)} left"] if left else []
+    return ", ".join(parts)
 
 
 def _time(seconds: float) -> str:

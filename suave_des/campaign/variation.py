@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import combinations, groupby, islice, product
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, line_error, number_of, shown
+from suave_des.errors import InputError, line_error, located, number_of, shown
 from suave_des.estimates import known, mean_of, t_quantile
 from suave_des.files import as_number, read_csv
 from suave_des.metrics.result import MissionResult
@@ -173,11 +172,9 @@ class Variation:
             named |= self.ensemble.values(member)
         if not named:
             return loaded
-        try:
+        at = ", ".join(f"{name}={shown(value)}" for name, value in named.items())
+        with located(f"at {at}: ", loaded.path):
             return with_values(loaded, {self.paths.get(name, name): value for name, value in named.items()})
-        except InputError as error:
-            at = ", ".join(f"{name}={shown(value)}" for name, value in named.items())
-            raise InputError(f"at {at}: {error.problem}", file=error.file, remedy=error.remedy) from None
 
 
 def vary(
@@ -193,7 +190,7 @@ def vary(
 
     def path_of(place: str, name: str) -> str:
         path = full_path(dict(loaded.scenario), name)
-        with _at(place):
+        with located(place=place):
             value_at(loaded, path)
             if path in varied:
                 raise InputError(f"varies {path}, as {varied[path]} does", remedy="vary each key once")
@@ -202,7 +199,7 @@ def vary(
 
     drawn = {path_of(f"perturbations.{name}", name): name for name in perturbations}
     for path, name in drawn.items():
-        with _at(f"perturbations.{name}"):
+        with located(place=f"perturbations.{name}"):
             if not isinstance(distribution := perturbations[name], Mapping):
                 remedy = "such as {distribution: normal, mean: 1, std: 2}"
                 raise InputError(f"expected a distribution, got {shown(distribution)}", remedy=remedy)
@@ -210,19 +207,10 @@ def vary(
     found, places = _sweep(sweep)
     paths = {name: path_of(places[name], name) for name in found.parameters}
     variation = Variation(found, drawn, paths, runs_per_draw)
-    with _at(next(iter(places.values())) if len(places) == 1 else "sweep"):
+    with located(place=next(iter(places.values())) if len(places) == 1 else "sweep"):
         for point in islice(found.each_value(), _CHECKED_POINTS):
             variation.scenario(loaded, point)
     return loaded, variation
-
-
-@contextmanager
-def _at(place: str) -> Iterator[None]:
-    """Give errors a key path within what was given as their place."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(error.problem, place=place, remedy=error.remedy) from None
 
 
 def _sweep(given: Mapping[str, Any]) -> tuple[Sweep, dict[str, str]]:
@@ -304,11 +292,8 @@ def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemb
                 raise InputError(problem, file=path, remedy="vary each key once")
     found = replace(variation, ensemble=ensemble)
     for member in range(1, len(ensemble.members) + 1):
-        try:
+        with located(f"member {member} does not fit scenario {loaded.scenario.name}: ", path):
             found.scenario(loaded, 0, member)
-        except InputError as error:
-            problem = f"member {member} does not fit scenario {loaded.scenario.name}: {error.problem}"
-            raise InputError(problem, file=path, remedy=error.remedy) from None
     return found
 
 

@@ -185,11 +185,11 @@ def validate(
     real = read_real([find(each, "scenarios/published") for each in data], conditions)
     chosen = real.choose(comma_separated(managers))
     shares, limits, targets_paths = targets_of(real, targets)
-    word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
+    word = "published" if all(map(_is_shipped, real.files)) else "real"
 
     result: CampaignResult | None = None
     sources: dict[str, object] = {
-        "data": [{"file": _shown(file.path), "sha256": file.sha256} for file in real.files],
+        "data": [{"file": _shown(path), "sha256": digest} for path, digest in real.files.items()],
         "targets": [_shown(path) for path in targets_paths],
         "seed": seed,
     }
@@ -197,12 +197,13 @@ def validate(
         from suave_des.records.runs import read_runs
 
         recorded = read_runs(runs_file, list(conditions.columns))
-        recorded.check_simulated(chosen)
+        recorded.check_simulated()
+        recorded.choose(chosen)
         if out is not None:
             check_output_folder(out, "campaign", overwrite=overwrite)
             make_output_folder(out)
         simulated = recorded.frame
-        sources |= {"runs_file": {"file": _shown(recorded.path), "sha256": recorded.sha256}}
+        sources |= {"runs_file": {"file": _shown(runs_file), "sha256": recorded.files[runs_file]}}
     else:
         from suave_des.campaign.campaign import run_campaign
 
@@ -219,7 +220,7 @@ def validate(
     validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
     console = output()
     texts = (f"Condition {number}: {condition_text(conditions, number)}" for number in range(1, len(conditions) + 1))
-    notes = [*real.notes, *texts]
+    notes = [*(f"{note}." for note in real.notes), *texts]
     for line in [*notes, ""] if notes else ():
         console.print(line)
     for table in validation.tables(word):

@@ -20,7 +20,7 @@ import pandas
 from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, line_error, number_of, shown
+from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
 from suave_des.files import csv_pieces, read_csv
 from suave_des.records.metrics import COLUMN_TYPES, DISTANCE, FOUND, REACTION_TIME, SEARCH_TIME, metric_of
 
@@ -92,43 +92,44 @@ _AVERAGES = ("average", "mean", "std")
 
 @dataclass(frozen=True)
 class Runs:
-    """Missions read from a file.
+    """Missions read from one or several files.
 
     Attributes:
-        frame: a row for each mission, indexed by its line, with COLUMNS and the further columns of the file.
-        sha256: of the file's bytes, in hex.
-        averages: lines of rows that are averages rather than missions, and were left out.
+        files: SHA-256 of each file's bytes, in hex, by its path.
+        frame: a row for each mission with COLUMNS and the further columns of the files; of one file, indexed by its
+            line; of several real ones, with `condition` if the conditions are known.
+        notes: what a reader of a comparison should know about the files.
     """
 
-    path: Path
+    files: Mapping[Path, str]
     frame: pandas.DataFrame
-    sha256: str
-    averages: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def managers(self) -> tuple[str, ...]:
         """In the order of their first missions."""
         return tuple(self.frame["manager"].unique())
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a reader of a comparison should know about the file."""
-        if not self.averages:
-            return ()
-        lines = ", ".join(map(str, self.averages))
-        return (f"{self.path}: line{'s' * (len(self.averages) > 1)} {lines} left out: averages, not missions",)
+    def choose(self, wanted: Sequence[str]) -> tuple[str, ...]:
+        """Choose the managers to compare: those named, or all.
 
-    def check_simulated(self, managers: Sequence[str] = ()) -> None:
-        """Raise an InputError unless these missions are of one scenario, and some of them of each manager."""
+        Raises:
+            InputError: one has no mission.
+        """
+        for manager in wanted:
+            if manager not in self.managers:
+                remedy = f"{did_you_mean(manager, self.managers, 'its managers')}; choose with --managers"
+                problem, files = f"has no mission of manager {manager!r}", ", ".join(map(str, self.files))
+                raise InputError(problem, file=files, remedy=remedy)
+        return tuple(dict.fromkeys(wanted)) or self.managers
+
+    def check_simulated(self) -> None:
+        """Raise an InputError unless the missions of this file are of one scenario."""
         names = [name for name in self.frame["scenario"].unique() if name]
         if len(names) > 1:
             problem = f"has missions of several scenarios: {names[0]} and {names[1]}"
             line = self.frame.index[self.frame["scenario"] == names[1]][0]
-            raise line_error(self.path, line, problem, "give the missions of one scenario")
-        for manager in managers:
-            if manager not in self.managers:
-                remedy = f"it has {', '.join(self.managers)}; choose among them with --managers"
-                raise InputError(f"has no mission of manager {manager!r}", file=self.path, remedy=remedy)
+            raise line_error(next(iter(self.files)), line, problem, "give the missions of one scenario")
 
 
 @plain_arguments
@@ -165,7 +166,7 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     rows, lines, averages = [], [], []
     for line, row in numbered:
         if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
-            averages.append(line)
+            averages.append(str(line))
         elif layout[DISTANCE] not in row:  # else it is the header again, as in files that were put together
             if len(row) != len(header):
                 problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
@@ -175,7 +176,8 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     if not rows:
         raise line_error(path, 1, "has no missions under its header", REMEDY)
     text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str).apply(lambda column: column.str.strip())
-    return Runs(path, _Cells(path, text, layout).missions(), digest, tuple(averages))
+    left_out = f"{path}: line{'s' * (len(averages) > 1)} {', '.join(averages)} left out: averages, not missions"
+    return Runs({path: digest}, _Cells(path, text, layout).missions(), (left_out,) if averages else ())
 
 
 def is_foreign(content: Content) -> bool:

@@ -9,7 +9,6 @@ the share of missions that there may be in them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Unpack
 
@@ -21,7 +20,7 @@ from pydantic import Field, model_validator
 from suave_des.arguments import plain_arguments
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
-from suave_des.errors import InputError, did_you_mean, line_error, number_of
+from suave_des.errors import InputError, line_error, located, number_of
 from suave_des.records.runs import Runs, read_runs
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import Replacements, load_scenario
@@ -187,41 +186,8 @@ def _same(column: pandas.Series[Any], value: Any) -> NDArray[np.bool_]:
 # Missions
 
 
-@dataclass(frozen=True)
-class RealRuns:
-    """Real missions of one or several files.
-
-    Attributes:
-        frame: a row for each mission with the columns of records.runs.COLUMNS, file by file; with `condition` if the
-            conditions are known.
-        notes: what a reader of the comparison should know about the data.
-    """
-
-    files: tuple[Runs, ...]
-    frame: pandas.DataFrame
-    notes: tuple[str, ...]
-
-    @property
-    def managers(self) -> tuple[str, ...]:
-        """In the order of their first missions."""
-        return tuple(self.frame["manager"].unique())
-
-    def choose(self, wanted: Sequence[str]) -> tuple[str, ...]:
-        """Choose the managers to compare: those named, or all.
-
-        Raises:
-            InputError: one has no mission.
-        """
-        for manager in wanted:
-            if manager not in self.managers:
-                source = ", ".join(str(file.path) for file in self.files)
-                remedy = did_you_mean(manager, self.managers, "its managers")
-                raise InputError(f"has no mission of manager {manager!r}", file=source, remedy=remedy)
-        return tuple(dict.fromkeys(wanted)) or self.managers
-
-
 @plain_arguments
-def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None = None) -> RealRuns:
+def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None = None) -> Runs:
     """Read real missions.
 
     Example:
@@ -238,28 +204,27 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
     Raises:
         InputError: with file and line: a file cannot be read, two are the same, or a condition cannot be determined.
     """
-    files = [read_runs(path) for path in paths]
-    for place, file in enumerate(files):
-        for other in files[:place]:
-            if file.sha256 == other.sha256:
-                raise InputError(f"has the same content as {other.path}", file=file.path, remedy="give each file once")
-    notes = [f"{note}." for file in files for note in file.notes]
-    frame = pandas.concat([file.frame for file in files], ignore_index=True)
+    read, files = [read_runs(path) for path in paths], dict[Path, str]()
+    for path, digest in (item for runs in read for item in runs.files.items()):
+        if same := next((other for other in files if files[other] == digest), None):
+            raise InputError(f"has the same content as {same}", file=path, remedy="give each file once")
+        files[path] = digest
+    notes = [note for runs in read for note in runs.notes]
+    frame = pandas.concat([runs.frame for runs in read], ignore_index=True)
     if conditions is not None and len(conditions):
         named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
         try:
             numbers = condition_numbers(conditions, frame)
         except InputError as error:
             if error.place is not None:
-                lines = [(file.path, int(line)) for file in files for line in file.frame.index]
+                lines = [(path, int(line)) for runs in read for path in runs.files for line in runs.frame.index]
                 raise line_error(*lines[int(error.place)], error.problem, error.remedy) from None
-            names = ", ".join(str(file.path) for file in files)
-            raise InputError(error.problem, file=names, remedy=error.remedy) from None
+            raise InputError(error.problem, file=", ".join(map(str, files)), remedy=error.remedy) from None
         if not named:
             each = f"one after the other, as many missions of each of the {len(conditions)}"
-            notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}.")
+            notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}")
         frame = frame.drop(columns=named).assign(**{CONDITION: numbers})
-    return RealRuns(tuple(files), frame, tuple(notes))
+    return Runs(files, frame, tuple(notes))
 
 
 def matched(
@@ -275,10 +240,8 @@ def matched(
     if not names:
         remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
-    try:
+    with located(place="real missions"):
         numbers = condition_numbers(simulated[list(names)].drop_duplicates().astype(object), real)
-    except InputError as error:
-        raise InputError(error.problem, place="real missions", remedy=error.remedy) from None
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
     real, simulated = real.assign(**{CONDITION: numbers}), simulated.assign(**{CONDITION: own})
     for name in real.columns.intersection(simulated.columns).intersection(["initial_x_m", "initial_y_m"]):
@@ -316,14 +279,14 @@ def published_for(scenario: str | Path) -> Path | None:
 
 
 def targets_of(
-    real: RealRuns, given: Path | None = None
+    real: Runs, given: Path | None = None
 ) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
     """Read the shares and limits of the file given, or of NAME.targets.yaml beside each NAME.csv, and name the files.
 
     Raises:
         InputError: with file and line: one cannot be read, or is not valid.
     """
-    beside = [file.path.with_suffix(".targets.yaml") for file in real.files]
+    beside = [path.with_suffix(".targets.yaml") for path in real.files]
     paths = (given,) if given else tuple(path for path in beside if path.is_file())
     lists = [validated(read_yaml(path), Targets) for path in paths]
     shares: list[Share] = []
