@@ -165,18 +165,17 @@ class PolicyDifference:
 def compare_decisions(states: States, one: Decide, other: Decide, no_proof: tuple[str, ...]) -> PolicyDifference:
     """Compare what two knowledge bases decide in all of some states; see PolicyDifference."""
     decided, reported = [], 0
-    numbers = dict(states.reports)
     for situation, before, after in compare(one, other, map(Situation, states)):
         if any(before.choice(each.function) != after.choice(each.function) for each in situation.state.objectives):
             decided.append((situation.state, before, after))
         elif before.statuses != after.statuses:
-            reported += numbers[situation.state.components]
+            reported += states.reports[situation.state.components]
     differing = [state for state, _, _ in decided]
     cells = states.frame(differing)
     add_decisions(cells, states, [before for _, before, _ in decided], "_a")
     add_decisions(cells, states, [after for _, _, after in decided], "_b")
     cells["state"] = differing
-    compared = len(states.measured) * len(states.tasks) * sum(numbers.values())
+    compared = len(states.measured) * len(states.tasks) * sum(states.reports.values())
     return PolicyDifference(compared, cells, reported, states.space, states.functions, no_proof)
 
 

@@ -26,7 +26,7 @@ from suave_des.kb.states import FactReader
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology, Terms
 from suave_des.knowledge.pellet import TimeLimit
-from suave_des.knowledge.pellet.in_process import InProcessPellet, Trace, entailed, one_at_a_time, trace_contradiction
+from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed, one_at_a_time, trace_contradiction
 from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import COMPARISONS, Atom, AtomKind, Rule, Variable, write_atom, write_term
@@ -136,8 +136,8 @@ class Tracer:
         with one_at_a_time:
             found = self._derive(canonical_triple(triple), frozenset())
             if found is None:  # the axioms that Pellet says that it follows from, without the steps between
-                trace = self._trace(triple, self.asserted, self.base.content.enabled_rules)
-                found = Derivation(self._fact(triple), "axioms", axioms=self._axioms(trace))
+                axioms = self._axioms(triple, self.asserted, self.base.content.enabled_rules)
+                found = Derivation(self._fact(triple), "axioms", axioms=axioms)
             return found
 
     def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
@@ -185,7 +185,7 @@ class Tracer:
             if about_same and other not in above and triple in self._concluded(other, asked):
                 premise = self._derive(other, above)
                 if premise is not None:
-                    axioms = self._axioms(self._trace(triple, [other]))
+                    axioms = self._axioms(triple, [other])
                     yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
 
     def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
@@ -199,12 +199,10 @@ class Tracer:
         content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
         return content.n_triples(rules)
 
-    def _trace(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> Trace:
-        return trace_contradiction(self._text(facts, rules) + _denial(triple))
-
-    def _axioms(self, trace: Trace) -> tuple[str, ...]:
-        """The axioms of the schema in a trace: domains, subclasses and the like."""
-        schema = (each for each in trace.axioms if not each.startswith(("rule(", "prop(", "type(")))
+    def _axioms(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> tuple[str, ...]:
+        """The axioms of the schema by which a triple follows from facts: domains, subclasses and the like."""
+        _, used = trace_contradiction(self._text(facts, rules) + _denial(triple))
+        schema = (each for each in used if not each.startswith(("rule(", "prop(", "type(")))
         return tuple(_IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema)
 
     def _fact(self, triple: Triple) -> Fact:
@@ -474,19 +472,12 @@ _FORMS: Final = (
 CHOSEN, LEFT_OUT, NOT_BEST = "chosen", "left out", "not the best"
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """The planner's verdict on a function design.
-
-    Attributes:
-        verdict: "chosen", "left out" or "not the best".
-        because: derivations of the facts for which it is left out.
-    """
+class Candidate(NamedTuple):
+    """The planner's verdict on a function design: "chosen", "left out" or "not the best"; and why."""
 
     design: str
     verdict: str
     reason: str
-    because: tuple[Derivation, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.design}: {self.verdict}: {self.reason}"
@@ -509,38 +500,16 @@ def verdicts(base: Ontology, reasoning: Reasoning, decision: Decision) -> Iterat
 
 
 @dataclass(frozen=True)
-class DecisionExplanation:
-    """Why a function gets a design.
+class Explanation:
+    """The answer to a question about a state.
 
     Attributes:
-        answer: in one sentence.
-        because: derivations of the facts that require adaptation.
-        candidates: all designs of the function, by name; none when there is nothing to decide.
+        facts: how they follow.
+        decisions: of each function the lines that say why it gets its design, the answer first.
     """
 
-    function: str
-    answer: str
-    because: tuple[Derivation, ...] = ()
-    candidates: tuple[Candidate, ...] = ()
-
-    def lines(self) -> Iterator[str]:
-        """The answer, and below it the reasons and the verdict on each design."""
-        yield f"{self.function}: {self.answer}"
-        for derivation in self.because:
-            yield "  adapted because"
-            yield from derivation.lines("    ")
-        for candidate in self.candidates:
-            yield f"  {candidate}"
-            for derivation in candidate.because:
-                yield from derivation.lines("    ")
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """The answer to a question about a state: how facts follow, and why functions get their designs."""
-
     facts: tuple[Derivation, ...] = ()
-    decisions: tuple[DecisionExplanation, ...] = ()
+    decisions: tuple[tuple[str, ...], ...] = ()
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
@@ -549,8 +518,8 @@ class Explanation:
         """All of it, one fact or decision after the other."""
         for derivation in self.facts:
             yield from derivation.lines()
-        for decision in self.decisions:
-            yield from decision.lines()
+        for lines in self.decisions:
+            yield from lines
         if not self.facts and not self.decisions:
             yield "nothing is inferred, and nothing is decided"
 
@@ -603,7 +572,8 @@ class _Explainer:
         remedies += (f"rule {each}" for each in near[:_MOST])
         raise InputError(f"{fact} does not follow in this state", remedy="; ".join(remedies))
 
-    def design(self, design: str) -> DecisionExplanation:
+    def design(self, design: str) -> tuple[str, ...]:
+        """Why a design is chosen or not."""
         function = next((name for name in self.base.functions if design in self.base.designs(name)), None)
         if function is None:
             known = [each for name in self.base.functions for each in self.base.designs(name)]
@@ -611,29 +581,28 @@ class _Explainer:
         for decision in self.reasoning.plan.decisions:
             if decision.function == function:
                 return self.decision(decision, design)
-        if function not in {each.function for each in self.reasoning.inference.state.objectives}:
-            return DecisionExplanation(function, f"nothing is decided: {function} has no objective in this state")
-        present = self.reasoning.inference.state.grounded(function) or "it"
-        answer = f"nothing is decided: the objective of {function} requires no adaptation, so {present} stays"
-        return DecisionExplanation(function, answer)
+        state = self.reasoning.inference.state
+        answer = f"the objective of {function} requires no adaptation, so {state.grounded(function) or 'it'} stays"
+        if function not in {each.function for each in state.objectives}:
+            answer = f"{function} has no objective in this state"
+        return (f"{function}: nothing is decided: {answer}",)
 
-    def decision(self, decision: Decision, asked: str | None = None) -> DecisionExplanation:
-        """Why a decision is made; the answer begins with the design that was asked about."""
-        objective = objective_name(decision.function)
-        candidates = []
+    def decision(self, decision: Decision, asked: str | None = None) -> tuple[str, ...]:
+        """Why a decision is made: the answer, which begins with the design that was asked about, and the reasons."""
+        function, objective = decision.function, objective_name(decision.function)
         answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
+        lines: list[str] = []
+        for fact in sorted(self.reasoning.inference.facts, key=str):
+            if fact.subject == objective and fact.property in ("o_status", "o_updatable"):
+                lines += ["  adapted because", *self.derive(fact).lines("    ")]
         for each in verdicts(self.base, self.reasoning, decision):
-            why = (Fact(each.design, "fd_realisability", False), Fact(each.design, "fd_error_log", objective))
-            because = (self.derive(fact) for fact in why if each.verdict == LEFT_OUT and fact in self.triples)
-            candidates.append(replace(each, because=tuple(because)))
+            lines.append(f"  {each}")
+            for fact in (Fact(each.design, "fd_realisability", False), Fact(each.design, "fd_error_log", objective)):
+                if each.verdict == LEFT_OUT and fact in self.triples:
+                    lines += self.derive(fact).lines("    ")
             if each.design == asked:
                 answer = f"{asked} is {each.verdict}: {each.reason}"
                 if decision.design is None:
-                    present = self.reasoning.inference.state.grounded(decision.function) or decision.function
+                    present = self.reasoning.inference.state.grounded(function) or function
                     answer = f"no design is left, {present} stays; {answer}"
-        status = (
-            fact
-            for fact in sorted(self.reasoning.inference.facts, key=str)
-            if fact.subject == objective and fact.property in ("o_status", "o_updatable")
-        )
-        return DecisionExplanation(decision.function, answer, tuple(map(self.derive, status)), tuple(candidates))
+        return f"{function}: {answer}", *lines

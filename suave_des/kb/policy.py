@@ -117,7 +117,7 @@ def make_policy(
         decide(Situation(state)).contradiction if outcome.reasoning is None else ""
         for state, outcome in zip(every, outcomes, strict=True)
     ]
-    words = {reports.components: _in_words(reports, states.space) for reports in states.reports}
+    words = {reports: _in_words(reports, states.space) for reports in states.reports}
     cases["state"], cases["reports"] = every, [words[state.components] for state in every]
     cases["flipping"] = flipping
     ineffective = (name for name in measured_attributes(base, settings) if name not in states.space.attributes)
@@ -148,7 +148,7 @@ def _flipping(states: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> 
 def _in_words(reports: Reports, space: PolicySpace) -> str:
     """What components report: counted where they are interchangeable, else named."""
     counted: Counter[tuple[str, str]] = Counter()
-    for component, status in reports.components:
+    for component, status in reports:
         kind = next(each for each in space.alike if component in each)
         label = component if len(kind) == 1 else "" if len(space.alike) == 1 else f" of {kind[0]} and alike"
         counted[label, status] += 1

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 
 import yaml
 from lxml import etree
@@ -187,8 +187,8 @@ def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[t
     regions: dict[str, Region] = {}
     for kind, name, value, _ in given.parts():
         region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
-        builder.add(kind, name, 0 if region else value)
-        if region:
+        builder.add(kind, name, value if region is None else 0)
+        if region is not None:
             regions[name] = region
     for values, words in measurements_in(knowledge.base, regions):
         for name, value in values.items():
@@ -198,29 +198,17 @@ def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[t
         yield builder.state(), words
 
 
-class Failure(NamedTuple):
-    """An expectation that does not hold: what is wrong, in the first situation, if there is one, and why, as lines."""
-
-    what: str
-    situation: Situation | None = None
-    because: tuple[str, ...] = ()
-
-    def lines(self) -> Iterator[str]:
-        """What does not hold, in which situation, and why."""
-        yield self.what
-        if self.situation is not None:
-            where = f" ({self.situation.ranges})" if self.situation.ranges else ""
-            yield f"  in the state{where}: {self.situation.state}"
-        yield from (f"  {line}" for line in self.because)
-
-
 @dataclass(frozen=True)
 class TestResult:
-    """What came of a test: its failures, none if it passed, and how long it took, explanations included."""
+    """What came of a test, and how long it took, explanations included.
+
+    Attributes:
+        failures: the lines of each expectation that does not hold: what is wrong, then in which state, and why.
+    """
 
     __test__ = False  # pytest takes it for a test otherwise
     test: RuleTest
-    failures: tuple[Failure, ...]
+    failures: tuple[tuple[str, ...], ...]
     duration_s: float
 
     @property
@@ -236,13 +224,13 @@ def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
         ReasonerTimeoutError: the reasoner takes too long.
     """
     began = time.perf_counter()
-    found = [Failure(test.problem)] if test.problem else []
-    for situation in () if found else test.situations:
-        unmet = list(_unmet(test, situation, knowledge.outcome))
-        if unmet:
-            found = [
-                Failure(what, situation, tuple(_because(knowledge, test, situation, about))) for what, about in unmet
-            ]
+    found: list[tuple[str, ...]] = [(test.problem,)] if test.problem else []
+    for situation in test.situations:
+        for what, about in _unmet(test, situation, knowledge.outcome):
+            where = f" ({situation.ranges})" if situation.ranges else ""
+            because = (f"  {line}" for line in _because(knowledge, test, situation, about))
+            found.append((what, f"  in the state{where}: {situation.state}", *because))
+        if found:
             break
     return TestResult(test, tuple(found), time.perf_counter() - began)
 
@@ -314,8 +302,8 @@ def junit_xml(results: Sequence[TestResult]) -> bytes:
             parts = {"classname": str(file), "name": name, "file": str(file), "line": line}
             case = etree.SubElement(suite, "testcase", parts, time=f"{result.duration_s:.3f}")
             if not result.passed:
-                message = _clean("; ".join(failure.what for failure in result.failures))
-                text = _clean("\n".join(line for each in result.failures for line in each.lines()))
+                message = _clean("; ".join(what for what, *_ in result.failures))
+                text = _clean("\n".join(line for each in result.failures for line in each))
                 etree.SubElement(case, "failure", message=message).text = text
     return etree.tostring(root, xml_declaration=True, encoding="utf-8", pretty_print=True)
 

@@ -19,8 +19,8 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
-from math import comb
-from typing import Any, Final, NamedTuple
+from math import factorial, perm, prod
+from typing import Any, Final
 
 from suave_des.errors import InputError, KnowledgeError, shown
 from suave_des.kb.states import LASTING, ManagingSettings
@@ -193,21 +193,15 @@ def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
     return (each for each in ranks if set(each) == set(range(max(each) + 1)))
 
 
-def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
-    """Every number in the ontologies and enabled rules, ascending."""
-    return tuple(map(exact, regions_of(base).thresholds))
+#: Measured values that a test is about: all that compare as given with numbers; empty: no measurement.
+Region = tuple[tuple[str, Decimal], ...]
 
 
-class Region(NamedTuple):
-    """Measured values that a test is about: all that compare as given with numbers; None: no measurement."""
-
-    comparisons: tuple[tuple[str, Decimal], ...] | None
-
-    def holds(self, value: Decimal | None) -> bool:
-        """Whether a measured value, None for none, is in it."""
-        if value is None or self.comparisons is None:
-            return value is None and self.comparisons is None
-        return all(OPERATORS[sign](value, number) for sign, number in self.comparisons)
+def is_in(region: Region, value: Decimal | None) -> bool:
+    """Whether a measured value, None for none, is in a region."""
+    if value is None or not region:
+        return value is None and not region
+    return all(OPERATORS[sign](value, number) for sign, number in region)
 
 
 def parse_region(text: str) -> Region | None:
@@ -218,20 +212,20 @@ def parse_region(text: str) -> Region | None:
     """
     text = text.strip()
     if text == _MISSING:
-        return Region(None)
+        return ()
     if not {"<", ">"} & {*text}:
         return None
     parts = [part.strip() for part in _SIGN.split(f". {text}" if text[0] in "<>" else text)]
     sides = list(zip(parts[::2], parts[1::2], parts[2::2], strict=False))
     remedy = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
     try:
-        region = Region(
-            tuple((sign, exact(right)) if left == "." else (mirrored(sign), exact(left)) for left, sign, right in sides)
+        region = tuple(
+            (sign, exact(right)) if left == "." else (mirrored(sign), exact(left)) for left, sign, right in sides
         )
     except KnowledgeError:
         raise InputError(f"{shown(text)} is not a region", remedy=remedy) from None
-    scale = Scale(tuple(sorted({number for _, number in region.comparisons or ()})))
-    is_empty = not any(map(region.holds, map(scale.value, range(1, len(scale)))))
+    scale = Scale(tuple(sorted({number for _, number in region})))
+    is_empty = not any(is_in(region, scale.value(at)) for at in range(1, len(scale)))
     if is_empty or any((left == ".") == (right == ".") for left, _, right in sides):
         raise InputError(f"no number is in the region {shown(text)}", remedy=remedy)
     return region
@@ -239,9 +233,9 @@ def parse_region(text: str) -> Region | None:
 
 def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[tuple[dict[str, Decimal | None], str]]:
     """Measured values in the regions of attributes, one for each kind that comparing rules tell apart, with words."""
-    ends = {number for region in regions.values() for _, number in region.comparisons or ()}
-    scale = Scale(tuple(sorted({*numbers_in(base), *ends})))
-    inside = ([at for at in range(len(scale)) if region.holds(scale.value(at))] for region in regions.values())
+    ends = {number for region in regions.values() for _, number in region}
+    scale = Scale(tuple(sorted({*regions_of(base).thresholds, *ends})))
+    inside = ([at for at in range(len(scale)) if is_in(region, scale.value(at))] for region in regions.values())
     for places in itertools.product(*inside):
         words = ", ".join(f"{name} {scale.text(at)}" for name, at in zip(regions, places, strict=True))
         for values in scale.values(places):
@@ -332,15 +326,16 @@ def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     return own == {(swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own}
 
 
-class Reports(NamedTuple):
-    """(component, c_status) of the first ones of each group of interchangeable components; for how many they stand."""
-
-    components: tuple[tuple[str, str], ...]
-    combinations: int
+#: (component, c_status) of those that report.
+Reports = tuple[tuple[str, str], ...]
 
 
-def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int) -> Iterator[Reports]:
-    """All that at most so many components can report, up to an exchange in their group, fewest reports first."""
+def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int) -> dict[Reports, int]:
+    """All that at most so many components can report, up to an exchange in their group, fewest reports first.
+
+    Returns:
+        reports of the first ones of each group of interchangeable components, with the number for which they stand.
+    """
     ways = (
         [
             each
@@ -349,18 +344,14 @@ def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], 
         ]
         for group in groups
     )
+    found: dict[Reports, int] = {}
     for chosen in itertools.product(*ways):
-        if sum(map(len, chosen)) > most:
-            continue
-        combinations = 1
-        components: list[tuple[str, str]] = []
-        for group, named in zip(groups, chosen, strict=True):
-            components += zip(group, named, strict=False)
-            left = len(group)
-            for number in Counter(named).values():
-                combinations *= comb(left, number)
-                left -= number
-        yield Reports(tuple(sorted(components)), combinations)
+        if sum(map(len, chosen)) <= most:
+            both = list(zip(groups, chosen, strict=True))
+            components = sorted(pair for group, named in both for pair in zip(group, named, strict=False))
+            alike = prod(factorial(number) for named in chosen for number in Counter(named).values())
+            found[tuple(components)] = prod(perm(len(group), len(named)) for group, named in both) // alike
+    return found
 
 
 @dataclass(frozen=True)
@@ -389,7 +380,7 @@ class PolicySpace:
         # What the thruster monitor reports, and what enabled rules ask for.
         asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), rdf.C_STATUS)
         statuses = tuple(sorted({*asked, FAILED, RECOVERED}))
-        return cls(attributes, numbers_in(base), interchangeable_components(base), statuses, functions)
+        return cls(attributes, regions_of(base).thresholds, interchangeable_components(base), statuses, functions)
 
     @property
     def scale(self) -> Scale:
@@ -506,12 +497,13 @@ class States:
 
     Attributes:
         measured: (attribute, value) of those attributes that are measured.
+        reports: what components report, with the number of states for which each stands.
         tasks: states with objectives and groundings only.
     """
 
     space: PolicySpace
     measured: tuple[tuple[tuple[str, Decimal], ...], ...]
-    reports: tuple[Reports, ...]
+    reports: Mapping[Reports, int]
     tasks: tuple[KnowledgeState, ...]
 
     @classmethod
@@ -523,7 +515,7 @@ class States:
         """
         if max_failed < 0:
             raise InputError(f"{max_failed} components cannot fail", remedy="give 0 or more")
-        reports = tuple(component_reports(space.alike, space.statuses, max_failed))
+        reports = component_reports(space.alike, space.statuses, max_failed)
         tasks = tuple(_tasks(base, settings, space))
         scale, attributes = space.scale, space.attributes
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
@@ -547,7 +539,7 @@ class States:
     def __iter__(self) -> Iterator[KnowledgeState]:
         """One state of each kind; those that differ only in their task follow one another."""
         for values, reports, task in itertools.product(self.measured, self.reports, self.tasks):
-            yield KnowledgeState(task.objectives, task.groundings, reports.components, values)
+            yield KnowledgeState(task.objectives, task.groundings, reports, values)
 
     @cached_property
     def functions(self) -> tuple[str, ...]:
@@ -564,12 +556,11 @@ class States:
         """
         import pandas  # an inference alone needs none, the larger part of its start
 
-        numbers = dict(self.reports)
         columns: dict[str, list[Any]] = {}
         for name in self.space.attributes:
             columns[name] = [self.space.scale.place(dict(state.measurements).get(name)) for state in states]
         columns["components"] = ["; ".join(f"{name}={status}" for name, status in each.components) for each in states]
-        columns["states"] = [numbers[state.components] for state in states]
+        columns["states"] = [self.reports[state.components] for state in states]
         for name in self.functions:
             asked = (any(each.function == name for each in state.objectives) for state in states)
             now = (state.grounded(name) or NO_GROUNDING for state in states)

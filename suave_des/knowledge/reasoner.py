@@ -45,6 +45,7 @@ from suave_des.knowledge.state import (
     Reasoning,
     Rejection,
     Value,
+    exact,
     objective_name,
 )
 
@@ -113,7 +114,7 @@ def regions_of(ontology: Ontology) -> Regions:
     """Find the regions of an ontology, and reasons why its rules may distinguish values within them."""
     literals = list(_literals(ontology))
     numbers = {Decimal(value.text.strip()) for _, value in literals if _NUMBER.fullmatch(value.text)}
-    thresholds = sorted(number for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT)
+    thresholds = sorted(exact(number) for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT)
     binary = [where for where, value in literals if value.datatype in _BINARY]
     reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
     return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology)])))

@@ -109,34 +109,35 @@ def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path
 class TestDecisions:
     def test_why_not_names_the_filter_and_how_its_fact_follows(self, knowledge, in_error):
         (decision,) = knowledge.explain(in_error, "why not fd_all_thrusters?").decisions
-        assert decision.answer == "fd_all_thrusters is left out: not realisable"
-        left_out = next(each for each in decision.candidates if each.design == "fd_all_thrusters")
-        assert [each.rule for each in left_out.because] == ["compError"]
+        assert decision[0] == "f_maintain_motion: fd_all_thrusters is left out: not realisable"
+        left_out = decision.index("  fd_all_thrusters: left out: not realisable")
+        assert "[by rule compError with " in decision[left_out + 1]
 
     def test_why_tells_the_call_and_every_other_design(self, knowledge, in_error):
         (decision,) = knowledge.explain(in_error, "why fd_spiral_low?").decisions
-        assert [each.rule for each in decision.because] == ["S1b"]
-        assert [(each.design, each.verdict) for each in decision.candidates] == [
-            ("fd_spiral_high", "left out"),
-            ("fd_spiral_low", "chosen"),
-            ("fd_spiral_medium", "left out"),
+        assert decision[1] == "  adapted because" and "[by rule S1b with " in decision[2]
+        assert [line.split(": ")[:2] for line in decision if line.startswith("  fd_")] == [
+            ["  fd_spiral_high", "left out"],
+            ["  fd_spiral_low", "chosen"],
+            ["  fd_spiral_medium", "left out"],
         ]
 
     def test_a_design_that_is_merely_worse_is_compared_with_the_best(self, knowledge):
         (decision,) = knowledge.explain(knowledge.state(), "why not fd_spiral_low?").decisions
-        assert decision.answer == "fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
+        answer = "fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
+        assert decision[0] == f"{SEARCH}: {answer}"
 
     def test_nothing_to_adapt_is_said(self, knowledge):
         state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
         (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
-        assert "requires no adaptation, so fd_spiral_low stays" in decision.answer
+        assert "requires no adaptation, so fd_spiral_low stays" in decision[0]
         (decision,) = knowledge.explain(state, "why fd_recover_thrusters?").decisions
-        assert "f_maintain_motion has no objective in this state" in decision.answer
+        assert "f_maintain_motion has no objective in this state" in decision[0]
 
     def test_with_no_design_left_the_present_one_stays(self, knowledge):
         state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1})
         (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
-        assert decision.answer.startswith("no design is left, fd_spiral_low stays; fd_spiral_high is left out: ")
+        assert ": no design is left, fd_spiral_low stays; fd_spiral_high is left out: " in decision[0]
 
 
 @pytest.mark.parametrize(

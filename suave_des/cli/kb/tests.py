@@ -210,14 +210,14 @@ def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
         console.print(Text(f" {result.test.name} ".center(width, "_"), "bold red"))
         console.print(_place(result.test.file, result.test.line))
         for failure in result.failures:
-            first, *more = failure.lines()
+            first, *more = failure
             console.print(Text(first, "red"))
             if more:
                 console.print("\n".join(more))
     console.print(" short summary ".center(width, "="))
     for result in failed:
         place = _place(result.test.file, result.test.line)
-        console.print(f"FAILED {place}: {result.test.name}: {result.failures[0].what}")
+        console.print(f"FAILED {place}: {result.test.name}: {result.failures[0][0]}")
 
 
 def _print_summary(console: Console, results: Sequence[TestResult], duration_s: float) -> None:

