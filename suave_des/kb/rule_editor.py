@@ -14,7 +14,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 from xml.parsers import expat
-from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
@@ -23,16 +22,17 @@ from suave_des.files import write_files
 from suave_des.kb.states import read_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
-from suave_des.knowledge.rdf import RDF, RDF_TYPE, RDFS, SWRL, SWRLA, XSD, Lit, Triple, local_name
+from suave_des.knowledge.rdf import RDF, RDF_TYPE, RDFS, SWRL, SWRLA, XSD, Lit, Triple, local_name, namespace
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
 _PREFIXES: Final = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
-_DECLARED: Final = " ".join(f'xmlns:{prefix}="{iri}"' for prefix, iri in _PREFIXES.items())
+_DESCRIPTION, _END = f"{{{RDF}}}Description", "</rdf:Description>"
 _TYPE, _VARIABLE, _BUILTIN = f"{{{RDF}}}type", SWRL + "Variable", SWRL + "Builtin"
 _NODE_ID: Final = f"{{{RDF}}}nodeID"
+_LANGUAGE: Final = "{http://www.w3.org/XML/1998/namespace}lang"
 _Span = tuple[int, int]
 
 
@@ -92,9 +92,9 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
     for start, end in sorted(spans, reverse=True):
         changed, marks = _MARK.subn(rb"\g<1>" + word, content[start:end])
         if not marks and (tag := _TAG.match(changed)):
-            declared = f'<swrla:isRuleEnabled xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF}"'
-            mark = _property_xml(ENABLED, _truth(enabled), {}).replace("<swrla:isRuleEnabled", declared, 1)
-            changed = changed[: tag.end()] + mark.encode() + changed[tag.end() :]
+            start_tag = f'<swrla:isRuleEnabled xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF}" rdf:datatype="{XSD}boolean">'
+            mark = start_tag.encode() + word + b"</swrla:isRuleEnabled>"
+            changed = changed[: tag.end()] + mark + changed[tag.end() :]
         content = content[:start] + changed + content[end:]
     _replace(file, content, lambda rules: [replace(r, enabled=enabled) if r.name == name else r for r in rules])
     return True
@@ -168,41 +168,30 @@ def _rule_xml(rule: Rule) -> str:
     """The element of a rule. Its variables and built-ins are declared where it uses them, so that they go with it."""
     triples = triples_of(rule)
     start = triples[0][0]
-    declared = {triple[0]: _VARIABLE for triple in triples if triple[2] == _VARIABLE}
-    builtins = {atom.predicate: _BUILTIN for atom in rule.body if atom.kind == "builtin"}
-    of: dict[str, list[Triple]] = {start: []}
-    if not rule.enabled:
-        of[start].append((start, ENABLED, _truth(False)))
-    for triple in triples:
+    builtins = [(atom.predicate, RDF_TYPE, _BUILTIN) for atom in rule.body if atom.kind == "builtin"]
+    mark = [] if rule.enabled else [(start, ENABLED, Lit("false", XSD + "boolean"))]
+    of: dict[str, list[Triple]] = {}
+    for triple in dict.fromkeys((*mark, *triples, *builtins)):
         of.setdefault(triple[0], []).append(triple)
-    for name, kind in (*declared.items(), *builtins.items()):
-        of[name] = [(name, RDF_TYPE, kind)]
-    order = [start]
-    for node in order:  # a list nests as deep as it is long, which is too deep for a recursion
-        order += [str(value) for _, predicate, value in of[node] if value in of and predicate != RDF_TYPE]
-    texts: dict[str, str] = {}
-    for node in reversed(order):
-        texts[node] = "".join(_property_xml(predicate, value, texts) for _, predicate, value in of[node])
-    inside = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", texts[start])
-    return f"    <rdf:Description {_DECLARED}>{inside}\n    </rdf:Description>\n"
-
-
-def _property_xml(predicate: str, value: str | Lit, texts: dict[str, str]) -> str:
-    """The element of a property; `texts` are the contents of the nodes that are written inside."""
-    name = next(f"{prefix}:{predicate[len(iri) :]}" for prefix, iri in _PREFIXES.items() if predicate.startswith(iri))
-    if isinstance(value, Lit):
-        in_language = value.datatype.startswith("@")
-        kind = f' xml:lang="{value.datatype[1:]}"' if in_language else f" rdf:datatype={quoteattr(value.datatype)}"
-        kind = "" if predicate == RDFS + "label" else kind
-        return f"<{name}{kind}>{escape(value.text)}</{name}>"
-    if value not in texts:
-        return f"<{name} rdf:resource={quoteattr(value)}/>"
-    about = "" if value.startswith("_:") else f" rdf:about={quoteattr(value)}"
-    return f"<{name}><rdf:Description{about}>{texts[value]}</rdf:Description></{name}>"
-
-
-def _truth(value: bool) -> Lit:
-    return Lit(str(value).lower(), XSD + "boolean")
+    root = etree.Element(_DESCRIPTION, nsmap=_PREFIXES)
+    waiting = [(root, start)]
+    for element, node in waiting:  # a list nests as deep as it is long, which is too deep for a recursion
+        for _, predicate, value in of[node]:
+            inside = etree.SubElement(element, f"{{{namespace(predicate)}}}{local_name(predicate)}")
+            if isinstance(value, Lit):
+                inside.text = value.text
+                if value.datatype.startswith("@"):
+                    inside.set(_LANGUAGE, value.datatype[1:])
+                elif predicate != RDFS + "label":
+                    inside.set(f"{{{RDF}}}datatype", value.datatype)
+            elif value in of:
+                about = {} if value.startswith("_:") else {f"{{{RDF}}}about": value}
+                waiting.append((etree.SubElement(inside, _DESCRIPTION, about), value))
+            else:
+                inside.set(f"{{{RDF}}}resource", value)
+    text = etree.tostring(root, encoding="unicode")
+    lines = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", text)
+    return f"    {lines.removesuffix(_END)}\n    {_END}\n"
 
 
 def _replace(file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]) -> None:
