@@ -179,32 +179,19 @@ def compare_decisions(states: States, one: Decide, other: Decide, no_proof: tupl
     return PolicyDifference(compared, cells, reported, states.space, states.functions, no_proof)
 
 
-class PairedDifference(NamedTuple):
-    """One metric of the same missions under two knowledge bases.
-
-    Attributes:
-        pairs: its values with one (`a`) and with the other (`b`), by run, where both are known.
-        difference: mean of b - a, run by run, with its 95% interval (Student's t).
-        changed: number of missions in which the metric differs.
-    """
-
-    metric: Metric
-    pairs: pandas.DataFrame
-    difference: Estimate
-    changed: int
-
-
 class MissionDifference(NamedTuple):
     """Missions under two knowledge bases, with common random numbers.
 
     Attributes:
         changed: run numbers of the missions in which any column of runs.csv differs.
-        metrics: search time, distance, and what else differs.
+        metrics: search time, distance, and what else differs: each with its values with one (`a`) and with the other
+            (`b`), by run, where both are known; the mean of b - a, run by run, with its 95% interval (Student's t); and
+            the number of missions in which it differs.
     """
 
     missions: int
     changed: tuple[int, ...]
-    metrics: tuple[PairedDifference, ...]
+    metrics: tuple[tuple[Metric, pandas.DataFrame, Estimate, int], ...]
 
     def table(self, decisions: PolicyDifference) -> Table:
         """Decisions and missions in one table."""
@@ -297,5 +284,5 @@ def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifferen
         pairs = pandas.DataFrame({"a": before[name], "b": after[name]}, dtype=float).dropna()
         metric = metric_of(name) or Metric(name, name.replace("_", " "))
         found = mean_interval((pairs["b"] - pairs["a"]).to_numpy())
-        metrics.append(PairedDifference(metric, pairs, found, int(differs[name].sum())))
+        metrics.append((metric, pairs, found, int(differs[name].sum())))
     return MissionDifference(len(before), tuple(int(run) for run in before.index[differs.any(axis=1)]), tuple(metrics))

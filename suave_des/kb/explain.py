@@ -24,7 +24,7 @@ from suave_des.kb.matching import FACT_KINDS, Binding, Bound, Facts, Probes, bou
 from suave_des.kb.space import Situation
 from suave_des.kb.states import FactReader
 from suave_des.knowledge import rdf
-from suave_des.knowledge.ontology import Content, Ontology, Terms
+from suave_des.knowledge.ontology import Content, Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed, one_at_a_time, trace_contradiction
 from suave_des.knowledge.rdf import Lit, Triple, local_name
@@ -88,12 +88,12 @@ class Tracer:
     """Derives the facts of one state.
 
     Attributes:
-        pellet: made by `pellet_for`, for who asks about many states; None: one of its own.
+        pellet: has the ontologies, and reads all terms.
     """
 
     base: Ontology
     state: KnowledgeState
-    pellet: InProcessPellet | None = field(default=None, repr=False)
+    pellet: InProcessPellet = field(repr=False)
     _steps: dict[object, frozenset[Triple]] = field(default_factory=dict, repr=False)
     _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
 
@@ -109,7 +109,7 @@ class Tracer:
         Raises:
             KnowledgeError: the state contradicts itself.
         """
-        return (self.pellet or pellet_for(self.base)).infer(self.base.assertions(self.state)) | self.asserted
+        return self.pellet.infer(self.base.assertions(self.state)) | self.asserted
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
@@ -207,17 +207,6 @@ class Tracer:
 
     def _fact(self, triple: Triple) -> Fact:
         return rdf.fact_of(triple, self.base.names)
-
-
-def pellet_for(base: Ontology) -> InProcessPellet:
-    """Load an ontology into Pellet, to read all its terms and those that its rules mention."""
-    terms = base.content.all_terms()
-    atoms = [atom for rule in base.content.enabled_rules for atom in rule.atoms]
-    properties = {atom.predicate for atom in atoms if atom.kind in ("object", "data")}
-    classes = {atom.predicate for atom in atoms if atom.kind == "class"}
-    return InProcessPellet(
-        base, Terms(tuple(sorted(properties.union(terms.properties))), tuple(sorted(classes.union(terms.classes))))
-    )
 
 
 def canonical_triple(triple: Triple) -> Triple:
@@ -363,8 +352,8 @@ class RuleQuestions:
         """All that follows in a state, or what contradicts what in it."""
         if state not in self._facts:
             try:
-                tracer = Tracer(self._usable, state)
-                self._facts[state] = Facts(tracer.known)
+                pellet = InProcessPellet(self._usable, self._usable.content.all_terms())
+                self._facts[state] = Facts(Tracer(self._usable, state, pellet).known)
             except ContradictionError as error:
                 self._facts[state] = error.problem.removeprefix("contradiction: ")
         return self._facts[state]
@@ -529,7 +518,7 @@ def explain(base: Ontology, question: str, reasoning: Reasoning, pellet: InProce
 
     Args:
         reasoning: what is inferred of all terms and planned in the state.
-        pellet: with the ontologies, made by `pellet_for`.
+        pellet: has the ontologies, and reads all terms.
     """
     question = question.strip()
     why = _WHY.fullmatch(question)

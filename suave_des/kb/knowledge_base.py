@@ -10,7 +10,7 @@ from typing import Any
 
 from suave_des.arguments import plain_arguments
 from suave_des.kb.difference import PolicyDifference, compare_decisions
-from suave_des.kb.explain import Explanation, explain, pellet_for
+from suave_des.kb.explain import Explanation, explain
 from suave_des.kb.policy import Policy, make_policy
 from suave_des.kb.query import QueryResult, answer, graph_of
 from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
@@ -118,7 +118,7 @@ class KnowledgeBase:
 
     @cached_property
     def _tracing_pellet(self) -> InProcessPellet:
-        return pellet_for(self.base)
+        return InProcessPellet(self.base, self.base.content.all_terms())
 
     def decide(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Reasoning:
         """Decide as a mission does: infer the terms on which decisions depend and those that rules assert, and plan.

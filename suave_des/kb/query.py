@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Final
 
 import rdflib
-from rdflib.compare import to_canonical_graph
 from rdflib.namespace import RDFS
 
 from suave_des.errors import InputError, nearest
@@ -41,9 +40,8 @@ def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) ->
     """Return the graph that queries are answered from, with labels and comments; see KnowledgeBase.query."""
     situation = () if state is None else base.assertions(state)
     more: Iterable[Triple] = InProcessPellet(base, base.content.all_terms()).infer(situation) if inferred else ()
-    content = replace(base.content, structure=_with_fixed_names(base.content.structure))
-    graph = rdflib.Graph("SimpleMemory")  # goes through triples in the order in which they came
-    lines = content.n_triples(content.rules) + "".join(map(n_triple, (*situation, *more)))
+    graph = rdflib.Graph("SimpleMemory")  # in the order in which they came: an answer with LIMIT is always the same
+    lines = base.content.n_triples(base.content.rules) + "".join(map(n_triple, (*situation, *more)))
     names = {name: rdflib.BNode(name) for name in _UNNAMED.findall(lines)}
     graph.parse(data=lines, format="nt", bnode_context=names)
     for source in base.sources:
@@ -54,15 +52,6 @@ def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) ->
     for prefix, namespace in _PREFIXES.items():
         graph.bind(prefix, namespace, override=True, replace=True)
     return graph
-
-
-def _with_fixed_names(structure: Sequence[str]) -> tuple[str, ...]:
-    """Class expressions with the same names for their parts each time: those of the parser are random.
-
-    So a query with LIMIT and without ORDER BY has the same answer each time, too.
-    """
-    graph = to_canonical_graph(rdflib.Graph().parse(data="".join(structure), format="nt"))
-    return tuple(sorted(f"{' '.join(term.n3() for term in triple)} .\n" for triple in graph))
 
 
 def answer(graph: rdflib.Graph, text: str) -> QueryResult:

@@ -86,7 +86,7 @@ class Content:
         return Terms(_named(rdf.reached(wanted, edges)), tuple(name for name, kind in heads if kind == "Class"))
 
     def all_terms(self) -> Terms:
-        """Every property and class: some axiom can conclude any of them."""
+        """Every property and class, for some axiom can conclude any of them, and those that rules ask for."""
         kinds: dict[str, set[str]] = {}
         for subject, predicate, value in self.triples:
             if predicate == rdf.RDF_TYPE and isinstance(value, str):
@@ -96,6 +96,9 @@ class Content:
         properties = properties.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
         classes = {*decisions.classes, *(name for _, name in rdf.memberships(self.triples))}
         classes = classes.union(*(kinds.get(kind, ()) for kind in _CLASSES))
+        asked = [atom for rule in self.enabled_rules for atom in rule.body if atom.predicate not in ("", EXPRESSION)]
+        properties |= {atom.predicate for atom in asked if atom.kind in ("object", "data")}
+        classes |= {atom.predicate for atom in asked if atom.kind == "class"}
         return Terms(_named(properties - kinds.get(rdf.OWL + "AnnotationProperty", set())), _named(classes))
 
     def n_triples(self, rules: Sequence[Rule] | None = None) -> str:

@@ -219,7 +219,7 @@ def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
     text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
-    graph = Graph()
+    graph = Graph("SimpleMemory")  # goes through triples in the order of the file, each time the same
     before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write the ill-formed 1e3 as 1000
     try:
         with without_log():

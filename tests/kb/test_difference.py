@@ -58,8 +58,9 @@ def test_rules_count_with_their_text(tmp_path):
 
 def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other():
     (search, _, *_) = compare_missions("seams2023", 1, {}, {"values": {"mission.time_limit_s": 20}}).metrics
-    one, other = search.pairs.loc[1]
-    assert other <= 21 < one and search.difference.value == other - one
+    _, pairs, difference, _ = search
+    one, other = pairs.loc[1]
+    assert other <= 21 < one and difference.value == other - one
 
 
 @pytest.mark.parametrize("number", [0, 9])
@@ -89,11 +90,11 @@ def test_the_difference_of_missions_is_the_second_less_the_first():
     after = pandas.DataFrame({name: [104.0, 126.0, 90.0] for name in METRICS}, index=[1, 2, 3])
     found = paired(before, after)
     assert found.missions == 3 and found.changed == (1, 2)
-    for metric in found.metrics:
-        interval = metric.difference.interval
-        assert (*metric.pairs.mean(), metric.difference.value) == pytest.approx((310 / 3, 320 / 3, 10 / 3))
+    for _, pairs, difference, changed in found.metrics:
+        interval = difference.interval
+        assert (*pairs.mean(), difference.value) == pytest.approx((310 / 3, 320 / 3, 10 / 3))
         assert interval is not None and interval[0] < 10 / 3 < interval[1]
-        assert metric.changed == 2
+        assert changed == 2
     assert list(found.lines()) == ["runs that differ: 1, 2"]
 
 
@@ -104,8 +105,9 @@ def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_mis
     )
     after = before.assign(mean_reaction_time_s=[2.5, 3.0])
     found = paired(before, after)
-    assert [each.metric.name for each in found.metrics] == [*METRICS, "mean_reaction_time_s"]
-    assert (found.metrics[2].difference.value, found.metrics[2].changed) == (0.5, 2)
+    assert [metric.name for metric, *_ in found.metrics] == [*METRICS, "mean_reaction_time_s"]
+    _, _, difference, changed = found.metrics[2]
+    assert (difference.value, changed) == (0.5, 2)
 
 
 @pytest.mark.parametrize("change", ["inconsistent", "none left", "other statuses"])
