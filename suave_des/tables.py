@@ -58,10 +58,6 @@ class Table:
     def _alignment(self) -> str:
         return self.align + "r" * (len(self.headings) - len(self.align))
 
-    def width(self) -> int:
-        """Return the width of the text if nothing is broken into lines."""
-        return sum(self._widths(None)) + 2 * (len(self.headings) - 1)
-
     def _widths(self, width: int | None) -> list[int]:
         """Return the width of each column; of a table that is too wide, columns of text are made narrower."""
         cells = [self.headings, *(row for row in self.rows if len(row) > 1)]
@@ -181,7 +177,7 @@ class Written(ABC):
         for title, tables, sentences, below in self.sections():
             for place, table in enumerate(tables):
                 heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
-                fits = table.headings[-1] != EFFECT or table.width() <= width
+                fits = table.headings[-1] != EFFECT or max(map(len, table.text().split("\n"))) <= width
                 shown = table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
                 parts.append(heading + shown.text(width) + (f"\n{below}" if below else ""))
             parts.append("\n".join(folded(f"- {each}", width) for each in sentences))

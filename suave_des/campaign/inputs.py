@@ -221,6 +221,8 @@ def trained_on(campaign: Campaign) -> Iterator[str]:
 
 # The code of users' managers and functions: it decides results, and is sent to other machines.
 
+_DECIDING = {"managers", "runs", "seed", "time_out_s", "sweep", "perturbations", "runs_per_draw", "record_knowledge"}
+"""Fields of the specification that determine results as they are."""
 MAIN = "__main__.py"
 """Place of a script that defines a class itself."""
 _INSTALLED = (
@@ -328,14 +330,7 @@ def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
     return {
         "versions": versions(),
         "machine": platform.machine(),
-        "seed": spec.seed,
-        "managers": list(spec.managers),
-        "runs": spec.runs,
-        "time_out_s": spec.time_out_s,
-        "record_knowledge": spec.record_knowledge,
-        "sweep": spec.sweep,
-        "perturbations": spec.perturbations,
-        "runs_per_draw": spec.runs_per_draw,
+        **spec.model_dump(mode="json", include=_DECIDING),
         "ensemble": campaign.variation.ensemble and campaign.variation.ensemble.name,
         "scenario": loaded.scenario.model_dump(mode="json"),
         "files_sha256": dict(sorted({**files, **inputs}.items())),

@@ -6,6 +6,7 @@ No control characters from files of others reach a terminal.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -20,19 +21,15 @@ from suave_des.tables import Table
 if TYPE_CHECKING:
     from suave_des.metrics.result import MissionMetrics, MissionResult
 
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202f\u205f-\u2069]")
+"""Control characters but for tabs and ends of lines, and those that turn the direction of text, or are not seen."""
 TEXT_WIDTH = 95
 """Columns of text at most, which is hard to read in longer lines."""
 
 
 def plain(text: str) -> str:
     r"""Return a text with \x1b and the like in place of control characters, which a terminal would obey."""
-    if text.isprintable():
-        return text
-    return "".join(char if char.isprintable() or char in "\n\t" else _escaped(char) for char in text)
-
-
-def _escaped(char: str) -> str:
-    return char.encode("unicode_escape").decode() if char < "\xa0" or 0x202A <= ord(char) <= 0x2069 else char
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 class PlainConsole(Console):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -281,18 +280,16 @@ def balanced(real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequ
     """
     kept = []
     for manager in managers:
-        theirs = Counter(real.loc[real["manager"] == manager, CONDITION].tolist())
+        theirs = real.loc[real["manager"] == manager, CONDITION].value_counts().sort_index()
         ours = simulated[simulated["manager"] == manager]
-        counts = Counter(ours[CONDITION].tolist())
-        for number in sorted(theirs):
-            if number not in counts:
-                problem = f"there is no simulated mission of manager {manager} under condition {number}"
-                raise InputError(problem, remedy="simulate every condition of the campaign")
-        factor = min(counts[number] / count for number, count in theirs.items())
+        counts = ours[CONDITION].value_counts().reindex(theirs.index)
+        for number in counts.index[counts.isna()][:1]:
+            problem = f"there is no simulated mission of manager {manager} under condition {number}"
+            raise InputError(problem, remedy="simulate every condition of the campaign")
+        factor = float((counts / theirs).min())
         factor = math.floor(factor) or factor  # fewer simulated than real ones: as nearly as can be
-        wanted = {number: max(1, math.floor(factor * count)) for number, count in theirs.items()}
-        place = ours.groupby(CONDITION).cumcount()
-        kept.append(ours[place < ours[CONDITION].map(wanted).fillna(0)])
+        wanted = (factor * theirs // 1.0).clip(lower=1.0)
+        kept.append(ours[ours.groupby(CONDITION).cumcount() < ours[CONDITION].map(wanted).fillna(0)])
     return pandas.concat(kept)
 
 

@@ -262,12 +262,9 @@ def draw(distribution: AnyDistribution, stream: random.Random) -> float:
 
 def mean(distribution: AnyDistribution) -> float:
     """Mean of a distribution; of a normal one before it is cut."""
-    if isinstance(distribution, Normal):
-        return distribution.mean
-    if isinstance(distribution, Exponential):
-        return distribution.minimum + distribution.mean
-    stated = [value for _, value in _stated(distribution)]
-    return sum(stated) / len(stated)
+    stated = _stated(distribution)
+    values = [value for key, value in stated if key == "mean"] or [value for _, value in stated]
+    return sum(values) / len(values)
 
 
 def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
