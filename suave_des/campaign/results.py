@@ -96,9 +96,7 @@ class CampaignResult:
         varied = self.campaign.variation
         if varied.ensemble is None:
             return []
-        found = differences(
-            self._kept(), self.campaign.spec.managers, _PLACES, varied.ensemble, varied.runs_sharing_draw
-        )
+        found = differences(varied, self._kept(), self.campaign.spec.managers, _PLACES)
         return [{**each, **_swept(varied, each.pop("point"))} for each in found]
 
     def report(self) -> dict[str, Any]:

@@ -298,13 +298,9 @@ def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemb
 
 
 def differences(
-    rows: Iterable[tuple[MissionKey, Row]],
-    managers: Sequence[str],
-    metrics: Mapping[str, int],
-    ensemble: Ensemble,
-    runs_sharing_draw: int = 1,
+    variation: Variation, rows: Iterable[tuple[MissionKey, Row]], managers: Sequence[str], metrics: Mapping[str, int]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the difference of each pair of managers in each metric, point by point, in the columns of ensemble.csv.
+    """Yield the difference of each pair of managers in each metric, point by point: columns of ensemble.csv.
 
     The difference is paired by run, over the runs that both have. Its 95% interval is by Student's t over independent
     draws, for chance alone. The range in which the differences of 95 in 100 parameter sets lie is the prediction
@@ -315,8 +311,8 @@ def differences(
     Args:
         rows: of runs.csv, ordered by their keys.
         metrics: place in a row, by column.
-        runs_sharing_draw: consecutive runs that share a draw, and so are not independent.
     """
+    assert variation.ensemble is not None
     for point, group in groupby(rows, key=lambda each: each[0].point):
         by_manager: dict[int, dict[int, Sequence[Any]]] = {}
         for key, row in group:
@@ -328,9 +324,9 @@ def differences(
                 continue
             by_member: dict[int, list[float]] = {}
             for run, value in by_run.items():
-                by_member.setdefault(ensemble.member(run), []).append(value)
+                by_member.setdefault(variation.ensemble.member(run), []).append(value)
             means, mean = list(map(fmean, by_member.values())), fmean(by_run.values())
-            interval = mean_of(list(by_run.values()), [(run - 1) // runs_sharing_draw for run in by_run])
+            interval = mean_of(list(by_run.values()), [(run - 1) // variation.runs_sharing_draw for run in by_run])
             members, half = len(means), math.nan
             if members > 1:
                 half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)

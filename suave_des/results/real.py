@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self, Unpack
 import numpy as np
 import pandas
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from suave_des.arguments import plain_arguments
 from suave_des.campaign.spec import read_campaign_file
@@ -24,7 +24,7 @@ from suave_des.errors import InputError, line_error, located, number_of
 from suave_des.records.runs import Runs, read_runs
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import Replacements, load_scenario
-from suave_des.scenario.models import Number, Strict, ordered, wrong
+from suave_des.scenario.models import Number, Strict, in_order, wrong
 from suave_des.scenario.yamlfile import read_yaml, validated
 
 PAPERS_RUNS = "seams2023_runs.csv"
@@ -43,7 +43,7 @@ _TOLERANCE = 1e-6
 # Targets
 
 Column = Literal["search_time_s", "distance_inspected_m", "detection_x_m", "pipeline_found", "mean_reaction_time_s"]
-Bounds = tuple[Number, Number]
+Bounds = Annotated[tuple[Number, Number], AfterValidator(in_order)]
 Region = dict[Column, Annotated[tuple[Bounds, ...], Field(min_length=1)]]
 """By column the intervals, ends included, one of which must contain the value; an unknown place is in none."""
 
@@ -60,19 +60,13 @@ class Share(Strict):
     """Only runs in this region are counted; left out: all."""
     where: Annotated[Region, Field(min_length=1)]
     """The region whose share is taken."""
-    target: tuple[Number, Number] | None = None
+    target: Bounds | None = None
     """Least and greatest share that a faithful simulation may have; left out: the share is only printed."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for region in (self.among, self.where):
-            for intervals in region.values():
-                for low, high in intervals:
-                    ordered(low, high)
-        if self.target is not None:
-            ordered(*self.target)
-            if self.target[0] < 0 or self.target[1] > 1:
-                raise wrong("a share is between 0 and 1", "such as target: [0.25, 0.65]", "target")
+        if self.target is not None and (self.target[0] < 0 or self.target[1] > 1):
+            raise wrong("a share is between 0 and 1", "such as target: [0.25, 0.65]", "target")
         return self
 
 

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from string import Formatter
 from types import MappingProxyType
@@ -416,17 +416,14 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
     title = f"Samples: {runs}, then simulated"
     yield _table(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
     title = f"Simulated compared with {runs} (difference = simulated - {real})"
-    columns: tuple[tuple[str, str], ...] = (
-        ("difference of means", "{difference_of_means:+.2f}"),
-        _interval("difference_of_means", "+.1f"),
-    )
+    apart = ("difference of means", "{difference_of_means:+.2f}"), _interval("difference_of_means", "+.1f")
     ratio = ("std ratio", "{std_ratio:.2f}"), _interval("std_ratio", ".2f")
     tests = ("KS p", "{ks_p:p}"), ("AD p", "{ad_p:p}")
-    yield _table(validation.cells, title, "ll", *head, *columns, *ratio, *tests)
+    yield _table(validation.cells, title, "ll", *head, *apart, *ratio, *tests)
     title = f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size"
-    columns = (head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}"))
+    pair = head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}")
     better = (f"{real}: better", "{published_better}"), ("simulated agrees", "{agreement:share}")
-    yield _table(validation.pairs, title, "ll", *columns, ("simulated", "{simulated_superiority:.2f}"), *better)
+    yield _table(validation.pairs, title, "ll", *pair, ("simulated", "{simulated_superiority:.2f}"), *better)
     title = f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)"
     shares = validation.shares
     if len(shares):
@@ -438,9 +435,8 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
     interval = _interval("published_share", ".0%")
     yield _table(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
     stds = (f"std: {real}", "{real_std:.2f}"), ("simulated", "{simulated_std:.2f}"), ("ratio", "{std_ratio:.2f}")
-    columns = (*head, ("|difference|", "{difference:.2f}"), *stds)
-    within = over_conditions(validation.conditions)
-    yield _table(within, "Within conditions: medians over the conditions", "ll", *columns)
+    off, within = ("|difference|", "{difference:.2f}"), over_conditions(validation.conditions)
+    yield _table(within, "Within conditions: medians over the conditions", "ll", *head, off, *stds)
     rows = [_target(each) for each in rows_of(validation.targets)]
     yield Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl")
 
@@ -546,15 +542,14 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
     """
     theirs = in_papers_order(read_runs(published or find(PAPERS_RUNS, "scenarios/published")).frame)
     rows = []
-    for manager in theirs["manager"].unique():
-        for metric in PAPER_METRICS:
-            for statistic, estimate in (("mean", mean_of), ("std", std_of)):
-                paper, here = (estimate(sample(side, manager, metric).tolist()) for side in (theirs, runs))
-                if not paper.has_interval:
-                    problem = f"fewer than two published runs of {manager}"
-                    raise InputError(problem, place=metric, remedy="an interval needs two or more")
-                row = {"manager": manager, "metric": metric, "statistic": statistic}
-                rows.append(row | paper.columns("paper") | here.columns("here"))
+    for manager, metric in product(theirs["manager"].unique(), PAPER_METRICS):
+        for statistic, estimate in (("mean", mean_of), ("std", std_of)):
+            paper, here = (estimate(sample(side, manager, metric).tolist()) for side in (theirs, runs))
+            if not paper.has_interval:
+                problem = f"fewer than two published runs of {manager}"
+                raise InputError(problem, place=metric, remedy="an interval needs two or more")
+            row = {"manager": manager, "metric": metric, "statistic": statistic}
+            rows.append(row | paper.columns("paper") | here.columns("here"))
     figures = pandas.DataFrame(rows)
     ours = figures["here"].astype(float)
     is_outside = (ours < figures["paper_ci95_low"]) | (ours > figures["paper_ci95_high"])

@@ -24,7 +24,7 @@ from pydantic import AfterValidator, BaseModel, Field, Json
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown, unknown
 from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at, with_values
-from suave_des.scenario.models import LONGEST_S, Real, Scenario, mean, ordered
+from suave_des.scenario.models import LONGEST_S, Real, Scenario, in_order, mean
 from suave_des.scenario.modes import modes_of
 from suave_des.scenario.yamlfile import Layer, Location, parse_yaml, read_yaml, validated
 
@@ -404,13 +404,8 @@ def _layer(values: Mapping[str, Value], base: Path) -> Layer:
 # The campaign.
 
 
-def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
-    ordered(*interval, "the beginning", "the end")
-    return interval
-
-
 _Limit = Annotated[Real, Field(ge=-LONGEST_S, le=LONGEST_S)]
-_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(_ordered)]
+_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(in_order)]
 _Count = Annotated[int, Field(strict=True, ge=1)]
 
 

@@ -68,6 +68,12 @@ def ordered(low: float, high: float, low_key: str = "minimum", high_key: str = "
         raise wrong(problem, f"give the smaller one as {low_key}", low_key, high_key)
 
 
+def in_order(interval: tuple[float, float]) -> tuple[float, float]:
+    """Return an interval; raise an error if its ends are not in order."""
+    ordered(*interval, "the beginning", "the end")
+    return interval
+
+
 @dataclass(frozen=True)
 class Within:
     """Bounds of a number or of what a distribution in its place states; its spread is at most their distance.

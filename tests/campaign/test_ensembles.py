@@ -1,6 +1,7 @@
 """Each run of a campaign has one member of an ensemble, the same under all managers; differences are told by member."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from scipy import stats
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.variation import ENSEMBLE_COLUMN, Ensemble, differences, read_ensemble
+from suave_des.campaign.variation import ENSEMBLE_COLUMN, Ensemble, Variation, differences, read_ensemble
 from suave_des.errors import InputError
 from suave_des.records.store import MissionKey
 from suave_des.resources import shipped_folder
@@ -104,41 +105,42 @@ def rows_of(by_manager: dict[int, list[float]]):
 
 
 def test_a_difference_is_paired_by_run_and_told_by_member():
-    ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
+    varied = Variation(ensemble=Ensemble("two", ("x",), ((1.0,), (2.0,))))
     rows = rows_of({0: [10.0, 20.0, 12.0, 22.0], 1: [9.0, 25.0, 10.0, 27.0]})
-    (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    (found,) = differences(varied, rows, ["none", "bt"], {"search_time_s": 0})
     assert (found["first"], found["second"], found["n"], found["members"]) == ("bt", "none", 4, 2)
     assert (found["difference"], found["members_below_0"], found["members_above_0"]) == (1.75, 1, 1)
 
 
 def test_the_interval_of_a_difference_is_over_draws_not_over_the_runs_that_share_one():
-    ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
+    varied = Variation(ensemble=Ensemble("two", ("x",), ((1.0,), (2.0,))))
     draws = np.random.default_rng(3).normal(5.0, 4.0, 6)
     values = np.repeat(draws, 10) + np.random.default_rng(4).normal(0.0, 0.1, 60)
     rows = rows_of({0: [0.0] * 60, 1: values.tolist()})
-    (of_draws,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble, 10)
+    shared = replace(varied, drawn={"start.x_m": "start.x_m"}, runs_per_draw=10)
+    (of_draws,) = differences(shared, rows, ["none", "bt"], {"search_time_s": 0})
     means = values.reshape(6, 10).mean(axis=1)
     assert (of_draws["ci95_low"], of_draws["ci95_high"]) == pytest.approx(
         stats.t.interval(0.95, 5, means.mean(), stats.sem(means))
     )
-    (of_runs,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    (of_runs,) = differences(varied, rows, ["none", "bt"], {"search_time_s": 0})
     assert (of_runs["ci95_low"], of_runs["ci95_high"]) == pytest.approx(
         stats.t.interval(0.95, 59, values.mean(), stats.sem(values))
     )
 
 
 def test_a_run_that_one_manager_lacks_is_left_out():
-    ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
+    varied = Variation(ensemble=Ensemble("two", ("x",), ((1.0,), (2.0,))))
     rows = [row for row in rows_of({0: [1.0, 2.0], 1: [1.0, 5.0]}) if row[0] != MissionKey(0, 0, 1)]
-    (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    (found,) = differences(varied, rows, ["none", "bt"], {"search_time_s": 0})
     assert (found["n"], found["difference"]) == (1, 3.0)
     assert [found[name] for name in ("ci95_low", "ci95_high", "range95_low", "range95_high")] == [None] * 4
 
 
 def test_the_range_over_members_is_that_of_their_means():
-    ensemble = Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,)))
+    varied = Variation(ensemble=Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,))))
     rows = rows_of({0: [0.0] * 6, 1: [0.0, 10.0, 20.0, 2.0, 12.0, 22.0]})
-    (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    (found,) = differences(varied, rows, ["none", "bt"], {"search_time_s": 0})
     assert (found["range95_low"], found["range95_high"]) == pytest.approx(
         (11.0 - 4.302653 * 10.0 * (4 / 3) ** 0.5, 11.0 + 4.302653 * 10.0 * (4 / 3) ** 0.5), rel=1e-6
     )

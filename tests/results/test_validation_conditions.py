@@ -220,7 +220,7 @@ ENTRY = "shares:\n  - manager: none\n    name: early\n    where: {where}\n"
         ("shares:\n  - manager: none\n    name: early\n", "line 2, shares[0].where", "is missing"),
         (ENTRY.format(where="{}"), "line 4, shares[0].where", ""),
         (ENTRY.format(where="{search_time_s: []}"), "line 4, shares[0].where.search_time_s", ""),
-        (ENTRY.format(where="{search_time_s: [[9, 3]]}"), "line 2, shares[0]", ""),
+        (ENTRY.format(where="{search_time_s: [[9, 3]]}"), "line 4, shares[0].where.search_time_s[0]", "above the end"),
         (ENTRY.format(where="{search_time_s: [[3]]}"), "line 4, shares[0].where.search_time_s[0]", ""),
         (ENTRY.format(where="{search_time_s: [[3, soon]]}"), "line 4, shares[0].where.search_time_s[0]", ""),
         (ENTRY.format(where="{speed: [[3, 4]]}"), "line 4, shares[0].where", ""),
