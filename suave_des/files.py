@@ -249,11 +249,18 @@ def make_output_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
 
 
-def remove_results(folder: Path, names: Collection[str]) -> None:
-    """Remove files made from a campaign that is replaced, and those named; an InputError if one cannot be removed."""
+def remove_results(folder: Path, names: Collection[str], *, parts_only: bool = False) -> None:
+    """Remove the unfinished files of these names that a process left when it was killed; and all files of a campaign.
+
+    These are the ones named, and those made from them; they stay if `parts_only`.
+
+    Raises:
+        InputError: one cannot be removed.
+    """
     with _user_errors(folder):
-        for name in (*names, *DERIVED):
-            (folder / name).unlink(missing_ok=True)
+        parts = (part for name in names for part in folder.glob(f".{name}.*{_PART}"))
+        for path in (*parts, *(() if parts_only else (folder / name for name in (*names, *DERIVED)))):
+            path.unlink(missing_ok=True)
 
 
 def _utf8(text: str) -> bytes:
@@ -289,13 +296,6 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
         for temporary in written.values():
             with suppress(OSError):  # what could not be written has been told of
                 temporary.unlink(missing_ok=True)
-
-
-def remove_parts(folder: Path, names: Iterable[str]) -> None:
-    """Remove unfinished files of these names, left by a process that was killed."""
-    for name in names:
-        for part in folder.glob(f".{name}.*{_PART}"):
-            part.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -19,16 +19,7 @@ from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.learned import Learned
 from suave_des.metrics.result import MissionMetrics
 from suave_des.records.mission_folder import provenance
-from suave_des.records.store import (
-    FILES,
-    STORE_FILE,
-    MissionFailure,
-    Store,
-    StoreError,
-    check_no_link,
-    has_campaign,
-    is_left_over,
-)
+from suave_des.records.store import STORE_FILE, MissionFailure, Store, StoreError, has_campaign, is_left_over, tidy
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 
@@ -182,8 +173,7 @@ def _run(
     elif folder is not None:
         with store.reading():
             inputs.check_same(store.about("deciding"), decides, folder)
-        check_no_link(folder)
-        files.remove_parts(folder, FILES)
+        tidy(folder, is_new=False)
         store.forget_passing_failures()
         for name, value in about.items():
             store.note(name, value)
@@ -226,11 +216,9 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
     was_there = folder.exists()
     try:
         files.make_output_folder(folder)
-        check_no_link(folder)
         store = Store(folder / STORE_FILE, replace=True)
         try:
-            files.remove_parts(folder, FILES)
-            files.remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
+            tidy(folder, is_new=True)  # first, or a kill would leave earlier results beside the new campaign
             store.begin(about)
             yield store
         finally:

@@ -163,16 +163,7 @@ def validate(
     With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
     from suave_des import __version__
-    from suave_des.results.real import (
-        CONDITION,
-        PAPERS_RUNS,
-        condition_numbers,
-        condition_text,
-        published_for,
-        read_conditions,
-        read_real,
-        targets_of,
-    )
+    from suave_des.results.real import PAPERS_RUNS, numbered, published_for, read_conditions, read_real, targets_of
     from suave_des.results.validation import FILES
     from suave_des.results.validation import validate as compare
 
@@ -215,13 +206,9 @@ def validate(
         sources |= {"scenario": result.campaign.loaded.scenario.name, "runs": settings["runs"]}
         if not set(result.campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
             exit_telling_failures(result)
-    if len(conditions):
-        simulated = simulated.assign(**{CONDITION: condition_numbers(conditions, simulated)})
-    validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
+    validation = compare(real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed)
     console = output()
-    texts = (f"Condition {number}: {condition_text(conditions, number)}" for number in range(1, len(conditions) + 1))
-    notes = [*(f"{note}." for note in real.notes), *texts]
-    for line in [*notes, ""] if notes else ():
+    for line in [*real.notes, ""] if real.notes else ():
         console.print(line)
     for table in validation.tables(word):
         print_table(console, table)

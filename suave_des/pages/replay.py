@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from suave_des import __version__
+from suave_des.api import run_mission
 from suave_des.campaign.campaign import opened_campaign
-from suave_des.campaign.inputs import check_inputs
-from suave_des.campaign.spec import RUNS_LIMIT, check_range
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.explain import LEFT_OUT, Derivation, verdicts
@@ -34,7 +33,6 @@ from suave_des.resources import find, hashes
 from suave_des.results.mission import Rules, adaptations, details, mode_spans
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base, read_base
-from suave_des.simulation.simulator import Simulator
 from suave_des.world.pipeline import sample_points
 
 MOST_MISSIONS = 2
@@ -90,10 +88,7 @@ def missions_run(
         MissionError: a manager raised.
     """
     _check_number(len(managers))
-    check_range("run", run, 1, RUNS_LIMIT)
-    check_inputs([loaded], managers, {})
-    simulator = Simulator(loaded)
-    return [record_of(simulator.run(each, run, seed, record=True), loaded) for each in managers]
+    return [record_of(run_mission(loaded, each, run, seed), loaded) for each in managers]
 
 
 def _check_number(number: int) -> None:

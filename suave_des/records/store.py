@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
-from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, write_files
+from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, remove_results, write_files
 from suave_des.interrupts import Stopped, was_interrupted
 from suave_des.records.metrics import COLUMNS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
@@ -376,10 +376,15 @@ def write_campaign(folder: Path, files: Mapping[str, Content], suave: Mapping[st
             inner.rmdir()
 
 
-def check_no_link(folder: Path) -> None:
-    """Raise an InputError if the folder of the exemplar's files is a link, whose files would be replaced."""
+def tidy(folder: Path, *, is_new: bool) -> None:
+    """Remove unfinished files from the folder of a campaign, and the results of an earlier one, if this is a new one.
+
+    Raises:
+        InputError: the folder of the exemplar's files is a link, whose files would be replaced.
+    """
     if (folder / SUAVE_FOLDER).is_symlink():
         raise InputError("is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it")
+    remove_results(folder, FILES, parts_only=not is_new)
 
 
 def is_left_over(name: str) -> bool:

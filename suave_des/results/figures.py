@@ -30,15 +30,7 @@ from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
-from suave_des.results.groups import (
-    Group,
-    Groups,
-    check_swept,
-    first_alike,
-    grouped,
-    least_and_greatest,
-    runs_sharing_draw,
-)
+from suave_des.results.groups import Group, Groups, check_swept, first_alike, grouped, least_and_greatest
 from suave_des.results.mission import Rules, draw_map, draw_timeline
 from suave_des.results.style import folded, key_words, value_words
 
@@ -109,7 +101,7 @@ def draw_differences(drawn: Groups) -> style.Picture:
         raise InputError(problem, place="kind", remedy="give campaigns of two managers or more with the same seed")
     height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
-    shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
+    shares = drawn.counted in ("draw", "value")
     for place, (axes, _, title) in enumerate(_metric_panels(figure)):
         axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
         for row, (one, _, apart) in enumerate(rows):
@@ -348,8 +340,7 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
     found, middles, counts = [], [], []
     for _, part in frame.groupby(key):
         has_runs = part["run"].notna().all()
-        runs = first_alike(part, runs_sharing_draw(part))
-        by_run = part.groupby(["seed", runs])[metric].mean() if has_runs else part[metric]
+        by_run = part.groupby(["seed", first_alike(part)])[metric].mean() if has_runs else part[metric]
         found.append(mean_of(by_run.dropna().tolist()))
         counts.append(int(by_run.count()))
         middles.append(float(part["place"].mean()) + beside)

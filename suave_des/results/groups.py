@@ -246,8 +246,9 @@ def runs_sharing_draw(frame: pandas.DataFrame) -> int:
     return math.lcm(*frame[SHARING].dropna().astype(int).unique()) if SHARING in frame else 1
 
 
-def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
-    """Return of each mission the first run that shares its draws."""
+def first_alike(frame: pandas.DataFrame, alike: int = 0) -> pandas.Series[float]:
+    """Return of each mission the first run that shares its draws; `alike` of them do, by default runs_sharing_draw."""
+    alike = alike or runs_sharing_draw(frame)
     return (frame["run"] - 1) // alike * alike + 1
 
 
@@ -257,7 +258,7 @@ def _with_draws(population: Missions) -> pandas.DataFrame:
         problem = f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
         raise InputError(problem, place="population", remedy="draw the conditions, as perturbations")
     frame = population.frame
-    drawn = frame.assign(draw=first_alike(frame, runs_sharing_draw(frame)))
+    drawn = frame.assign(draw=first_alike(frame))
     return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 

@@ -121,13 +121,13 @@ def conditions_of(sweep: Sweep) -> pandas.DataFrame:
     return pandas.DataFrame(points, columns=list(sweep.parameters), dtype=object)
 
 
-def condition_text(conditions: pandas.DataFrame, number: int) -> str:
+def _condition_text(conditions: pandas.DataFrame, number: int) -> str:
     """Return a condition's values, such as "start.y_m=2.455"."""
     return ", ".join(f"{name}={value}" for name, value in conditions.iloc[number - 1].items())
 
 
-def condition_numbers(conditions: pandas.DataFrame, runs: pandas.DataFrame) -> NDArray[np.int64]:
-    """Return the number of each mission's condition, from 1, shape (n,).
+def numbered(runs: pandas.DataFrame, conditions: pandas.DataFrame) -> pandas.DataFrame:
+    """Return missions with a column `condition`, the number of each one's condition, from 1; as they are without any.
 
     Of columns named like the parameters, those that are there must agree; without any, one of NUMBER_COLUMNS has the
     numbers; without that, missions are in order, as the exemplar's runner makes them: equally many of each condition.
@@ -136,16 +136,18 @@ def condition_numbers(conditions: pandas.DataFrame, runs: pandas.DataFrame) -> N
         InputError: about a row, counted from 0 as its place: it is of no condition, or of several; or, without a place,
             a manager's missions do not divide evenly.
     """
+    if not len(conditions):
+        return runs
     if named := [str(name) for name in conditions if name in runs]:
-        return _by_values(conditions, runs, named)
+        return runs.assign(**{CONDITION: _by_values(conditions, runs, named)})
     column = next((name for name in NUMBER_COLUMNS if name in runs), None)
     if column is None:
-        return _in_order(runs["manager"], len(conditions))
+        return runs.assign(**{CONDITION: _in_order(runs["manager"], len(conditions))})
     numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
     for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(conditions) + 1)))[:1]:
         problem = f"{column}: there is no condition {runs[column].iloc[row]}"
         raise InputError(problem, place=str(row), remedy=f"the campaign has {len(conditions)}, counted from 1")
-    return numbers.astype(np.int64)
+    return runs.assign(**{CONDITION: numbers.astype(np.int64)})
 
 
 def _by_values(conditions: pandas.DataFrame, runs: pandas.DataFrame, named: Sequence[str]) -> NDArray[np.int64]:
@@ -154,7 +156,7 @@ def _by_values(conditions: pandas.DataFrame, runs: pandas.DataFrame, named: Sequ
     for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
         given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
         fitting = ", ".join(str(number) for number in 1 + np.flatnonzero(fits[:, row])) or "none"
-        shown = "; ".join(condition_text(conditions, number) for number in range(1, min(len(conditions), 8) + 1))
+        shown = "; ".join(_condition_text(conditions, number) for number in range(1, min(len(conditions), 8) + 1))
         problem = f"conditions of the campaign that have {given}: {fitting}"
         raise InputError(problem, place=str(row), remedy=f"name one; the campaign has {shown}")
     return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
@@ -203,12 +205,12 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
         if same := next((other for other in files if files[other] == digest), None):
             raise InputError(f"has the same content as {same}", file=path, remedy="give each file once")
         files[path] = digest
-    notes = [note for runs in read for note in runs.notes]
+    notes = [f"{note}." for runs in read for note in runs.notes]
     frame = pandas.concat([runs.frame for runs in read], ignore_index=True)
     if conditions is not None and len(conditions):
         named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
         try:
-            numbers = condition_numbers(conditions, frame)
+            frame = numbered(frame, conditions).drop(columns=[name for name in named if name != CONDITION])
         except InputError as error:
             if error.place is not None:
                 lines = [(path, int(line)) for runs in read for path in runs.files for line in runs.frame.index]
@@ -216,8 +218,9 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
             raise InputError(error.problem, file=", ".join(map(str, files)), remedy=error.remedy) from None
         if not named:
             each = f"one after the other, as many missions of each of the {len(conditions)}"
-            notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}")
-        frame = frame.drop(columns=named).assign(**{CONDITION: numbers})
+            notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}.")
+        texts = (_condition_text(conditions, number) for number in range(1, len(conditions) + 1))
+        notes += (f"Condition {number}: {text}" for number, text in enumerate(texts, 1))
     return Runs(files, frame, tuple(notes))
 
 
@@ -226,7 +229,7 @@ def matched(
 ) -> tuple[pandas.DataFrame, pandas.DataFrame]:
     """Return real and simulated missions with the numbers of their conditions, the points of a sweep of these names.
 
-    Conditions of real missions are found as by condition_numbers; simulated ones are in the order of the points.
+    Conditions of real missions are found as by `numbered`; simulated ones are in the order of the points.
 
     Raises:
         InputError: nothing is swept, or the real missions are not of these conditions.
@@ -235,9 +238,9 @@ def matched(
         remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
     with located(place="real missions"):
-        numbers = condition_numbers(simulated[list(names)].drop_duplicates().astype(object), real)
+        real = numbered(real, simulated[list(names)].drop_duplicates().astype(object))
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
-    real, simulated = real.assign(**{CONDITION: numbers}), simulated.assign(**{CONDITION: own})
+    simulated = simulated.assign(**{CONDITION: own})
     for name in real.columns.intersection(simulated.columns).intersection(["initial_x_m", "initial_y_m"]):
         off = real.groupby(CONDITION)[name].mean() - simulated.groupby(CONDITION)[name].mean()
         if ((off - off.median()).abs() > _START_M).any():

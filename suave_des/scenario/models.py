@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from itertools import pairwise
 from pathlib import Path
+from statistics import NormalDist
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
@@ -156,12 +157,8 @@ class Normal(Drawn):
     def _interval_is_likely(self) -> Self:
         low, high = self.interval
         ordered(low, high)
-        if self.std == 0:
-            share = 1.0 if low <= self.mean <= high else 0.0
-        else:
-            scale = self.std * math.sqrt(2)
-            share = (math.erf((high - self.mean) / scale) - math.erf((low - self.mean) / scale)) / 2
-        if share < 0.001:
+        likely = NormalDist(self.mean, self.std or 1e-300)
+        if likely.cdf(high) - likely.cdf(low) < 0.001 and not (self.std == 0 and low <= self.mean <= high):
             problem = f"[{low:g}, {high:g}] leaves next to nothing of the distribution"
             raise wrong(problem, "move or widen it, or use distribution: uniform", "minimum", "maximum")
         return self

@@ -9,7 +9,7 @@ from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
-from suave_des.results.real import Share, Targets, condition_numbers, conditions_of, count, read_real
+from suave_des.results.real import Share, Targets, conditions_of, count, numbered, read_real
 from suave_des.results.validation import balanced, compare_conditions, compare_shares, over_conditions, validate
 from suave_des.scenario.yamlfile import read_yaml, validated
 
@@ -30,12 +30,12 @@ def missions(manager: str, by_condition: dict[int, list[float]]) -> pandas.DataF
 
 def test_a_mission_is_of_the_condition_whose_rounded_values_its_columns_have():
     runs = frame(**{"start.y_m": [2.8, 2.46, 2.8], FAILURE: [30.0, 146.39, 91.19]})
-    assert condition_numbers(CONDITIONS, runs).tolist() == [3, 1, 2]
+    assert numbered(runs, CONDITIONS)["condition"].tolist() == [3, 1, 2]
 
 
 @pytest.mark.parametrize("column", ["condition", "block"])
 def test_a_column_may_give_the_number(column):
-    assert condition_numbers(CONDITIONS, frame(**{column: [3, 1]})).tolist() == [3, 1]
+    assert numbered(frame(**{column: [3, 1]}), CONDITIONS)["condition"].tolist() == [3, 1]
 
 
 @pytest.mark.parametrize(
@@ -51,15 +51,15 @@ def test_a_column_may_give_the_number(column):
 )
 def test_a_mission_of_no_condition_or_of_several_is_named(columns, problem, row):
     with pytest.raises(InputError, match=problem) as error:
-        condition_numbers(CONDITIONS, frame(**columns))
+        numbered(frame(**columns), CONDITIONS)
     assert error.value.place == row
 
 
 def test_in_order_each_manager_has_as_many_missions_of_each_condition():
     managers = pandas.Series(["none"] * 3 + ["bt"] * 6)
-    assert condition_numbers(CONDITIONS, managers.to_frame("manager")).tolist() == [1, 2, 3, 1, 1, 2, 2, 3, 3]
+    assert numbered(managers.to_frame("manager"), CONDITIONS)["condition"].tolist() == [1, 2, 3, 1, 1, 2, 2, 3, 3]
     with pytest.raises(InputError, match="5 missions of manager bt, which 3 conditions do not share evenly"):
-        condition_numbers(CONDITIONS, managers[:-1].to_frame("manager"))
+        numbered(managers[:-1].to_frame("manager"), CONDITIONS)
 
 
 def test_files_of_several_managers_are_one_data_set(write):
@@ -68,7 +68,7 @@ def test_files_of_several_managers_are_one_data_set(write):
     assert list(real.managers) == ["bt", "none"]
     assert real.frame["condition"].tolist() == [1, 3, 1, 3]
     assert "block" not in real.frame
-    assert real.notes == ()
+    assert [note.split()[0] for note in real.notes] == ["Condition"] * 3
 
 
 def test_missions_without_a_condition_are_taken_in_order_and_that_is_said(write):
