@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, TypeGuard
 
 from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge import rdf
@@ -209,7 +209,8 @@ class Model:
         measurements: the measured value that a quality attribute type may get, by the type's name.
         own: what the ontologies assert of objectives (for example hasNFR), groundings, measurements and the status of
             components, by IRI: it holds in states that have them.
-        estimated: the quality attribute types of which a design has an expected value, by the design's name.
+        estimated: by the design's name, the quality attribute types of which it has an expected value, sorted, each
+            with the smallest one; None where that is no number.
     """
 
     functions: Mapping[str, str]
@@ -220,7 +221,7 @@ class Model:
     groundings: Mapping[str, str]
     measurements: Mapping[str, str]
     own: Mapping[str, tuple[rdf.Triple, ...]]
-    estimated: Mapping[str, frozenset[str]]
+    estimated: Mapping[str, Mapping[str, Decimal | None]]
 
     @cached_property
     def in_states(self) -> frozenset[str]:
@@ -316,14 +317,18 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
             kept.append(triple)
         elif predicate not in _STATE_PROPERTIES and rdf.is_fact(triple):
             own[holder].append(triple)
-    estimated: dict[str, set[str]] = {name: set() for name in designs}
-    for design, attribute, _ in estimations(triples, designs, attributes):
-        estimated[design].add(attribute)
+    numbers = {s: Decimal(o.text.strip()) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o)}
+    type_of = {s: local_name(o) for s, p, o in triples if p == rdf.IS_QA_TYPE and isinstance(o, str)}
+    estimated: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
+    for design, individual in ((s, str(o)) for s, p, o in triples if p == _HAS_QA_ESTIMATION and o in type_of):
+        if designs.get(name := local_name(design)) == design:
+            values = (estimated[name].get(type_of[individual]), numbers.get(individual))
+            estimated[name][type_of[individual]] = min((each for each in values if each is not None), default=None)
     model = Model(
         *(functions, designs, components, attributes),
         *(objectives, groundings, measurements),
         own={iri: tuple(found) for iri, found in own.items()},
-        estimated={name: frozenset(found) for name, found in estimated.items()},
+        estimated={name: dict(sorted(found.items())) for name, found in estimated.items()},
     )
     return model, replace(content, triples=tuple(kept))
 
@@ -333,18 +338,6 @@ def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
     below = ((str(o), s) for s, p, o in triples if p == rdf.RDFS + "subClassOf")
     classes = rdf.reached([rdf.TOMASYS + name], below)
     return {s for s, p, o in triples if p == rdf.RDF_TYPE and o in classes}
-
-
-def estimations(
-    triples: Iterable[rdf.Triple], designs: Mapping[str, str], attributes: Mapping[str, str]
-) -> Iterator[tuple[str, str, str]]:
-    """(design, quality attribute type, IRI of the QAvalue individual) of each hasQAestimation."""
-    design_names = {iri: name for name, iri in designs.items()}
-    attribute_names = {iri: name for name, iri in attributes.items()}
-    types = {s: attribute_names[o] for s, p, o in triples if p == rdf.IS_QA_TYPE and isinstance(o, str)}
-    for subject, predicate, value in triples:
-        if predicate == _HAS_QA_ESTIMATION and subject in design_names and value in types:
-            yield design_names[subject], types[str(value)], str(value)
 
 
 def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]]:
@@ -362,7 +355,7 @@ def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
         shown, datatype = value if isinstance(value, Lit) else (value, "")
-        if predicate == rdf.HAS_VALUE and not (datatype in rdf.EXACT and rdf.is_well_formed(Lit(shown, datatype))):
+        if predicate == rdf.HAS_VALUE and not _is_decimal(value):
             but = f" but an xsd:{local_name(datatype)}" if datatype not in (*rdf.EXACT, "") else ""
             yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
         if predicate == rdf.QA_OPERATOR and shown not in OPERATORS:
@@ -370,10 +363,14 @@ def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]
         if predicate in functional and isinstance(value, Lit):
             one = rdf.value_of(value, names)
             other = seen.setdefault((subject, predicate), one)
-            if one != other:
+            if one is not other and one != other:
                 values = f"the values {other} and {one}"
                 problem = f"contradiction: the functional property {local_name(predicate)} has {values}"
                 yield subject, problem, "keep one of them"
+
+
+def _is_decimal(value: str | Lit) -> TypeGuard[Lit]:
+    return isinstance(value, Lit) and value.datatype in rdf.EXACT and rdf.is_well_formed(value)
 
 
 def _wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
@@ -563,19 +560,8 @@ class Ontology:
     def expected(self, design: str) -> Mapping[str, Decimal]:
         """Expected value of each quality attribute of a function design, its performance among them; of several, the
         smallest."""
-        return self._expected.get(design, {})
-
-    @cached_property
-    def _expected(self) -> Mapping[str, Mapping[str, Decimal]]:
-        triples, found = self.content.triples, {name: dict[str, Decimal]() for name in self.model.designs}
-        numbers = {
-            s: Decimal(value.text.strip()) for s, p, value in triples if p == rdf.HAS_VALUE and isinstance(value, Lit)
-        }
-        for design, attribute, individual in estimations(triples, self.model.designs, self.model.attributes):
-            if individual in numbers:
-                value = numbers[individual]
-                found[design][attribute] = min(value, found[design].get(attribute, value))
-        return {name: dict(sorted(expected.items())) for name, expected in found.items()}
+        known = self.model.estimated.get(design, {})
+        return {name: value for name, value in known.items() if value is not None}
 
     def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
         """Return the triples that assert a state, for every reasoner in the same order.

@@ -8,8 +8,10 @@ from collections.abc import Callable
 import pytest
 
 from suave_des.errors import InputError
+from suave_des.knowledge.checks import Subject
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import Reasoner
+from tests.helpers.checks import findings_of, only
 from tests.helpers.knowledge_states import searching
 from tests.helpers.owl_text import individual, rule
 
@@ -121,6 +123,8 @@ def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy, value, datatyp
         'NamedIndividual rdf:about="http://www.metacontrol.org/suave#qa_water_visibility_high"'
     )[0].count("\n")
     assert f"{path}: line {line}: qa_water_visibility_high: hasValue '{value}' is not an xsd:decimal" in problem
+    subject = Subject([path], reaction_thresholds_m=(3.25, 2.25, 1.25))
+    assert only(findings_of(subject), "is not an xsd:decimal").line == line
 
 
 def test_an_unknown_operator_is_reported(suave_copy):
