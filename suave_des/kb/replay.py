@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -15,28 +15,14 @@ from suave_des.kb.space import Situation, differing_decisions
 from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.state import NONE_LEFT, STAYS
-from suave_des.metrics.result import KnowledgeRecord
+from suave_des.knowledge.state import NONE_LEFT, STAYS, KnowledgeState
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 
 _UNCHANGED: Final = dict.fromkeys((STAYS, NONE_LEFT), "no change")
 
 
-class ReplayedCycle(NamedTuple):
-    """One recorded reasoning cycle in which a rule fires or something changes.
-
-    Attributes:
-        t_s: mission time.
-        firings: each way in which a rule fires: conclusions and individuals, without numbers, which differ each time.
-        decisions: those that would have been different.
-        contradiction: for a state that would contradict itself, what contradicts what.
-    """
-
-    t_s: float
-    firings: tuple[str, ...]
-    decisions: tuple[str, ...]
-    contradiction: str = ""
+FIRES, DECIDES, CONTRADICTS = "fires", "decides", "contradicts"
 
 
 class MissionReplay(NamedTuple):
@@ -46,55 +32,59 @@ class MissionReplay(NamedTuple):
         folder: the mission's output folder, or its campaign's.
         mission: which of the campaign's; empty for a mission with a folder of its own.
         states: number of recorded states.
-        cycles: the cycles in which a rule fires or something changes, in order of time.
+        found: in order of mission time, in s: the time; "fires", with the conclusions and the individuals, without
+            numbers, which differ each time; or "decides", with a decision that would have been different; or
+            "contradicts", with what contradicts what in a state.
     """
 
     folder: Path
     mission: str
     states: int
-    cycles: tuple[ReplayedCycle, ...]
+    found: tuple[tuple[float, str, str], ...]
+
+    def times(self, kind: str) -> list[float]:
+        """The times of what was found of a kind."""
+        return [t_s for t_s, each, _ in self.found if each == kind]
 
     def lines(self) -> Iterator[str]:
         """The replay as `kb try` prints it."""
         which = f": {self.mission}" if self.mission else ""
-        firing_cycles = sum(bool(cycle.firings) for cycle in self.cycles)
-        yield f"{self.folder}{which}: fires in {firing_cycles} of {self.states} recorded states"
-        yield from self._grouped("  ", lambda cycle: cycle.firings)
-        yield f"  decisions that would have been different: {sum(len(cycle.decisions) for cycle in self.cycles)}"
-        yield from self._grouped("    ", lambda cycle: cycle.decisions)
-        contradicting = [cycle for cycle in self.cycles if cycle.contradiction]
-        if contradicting:
-            yield f"  states that would contradict themselves: {len(contradicting)} ({_times(contradicting)})"
-            yield f"    {contradicting[0].contradiction}"
+        yield f"{self.folder}{which}: fires in {len({*self.times(FIRES)})} of {self.states} recorded states"
+        yield from self._grouped("  ", FIRES)
+        yield f"  decisions that would have been different: {len(self.times(DECIDES))}"
+        yield from self._grouped("    ", DECIDES)
+        if times := self.times(CONTRADICTS):
+            yield f"  states that would contradict themselves: {len(times)} ({_span(times)})"
+            yield next(f"    {text}" for _, kind, text in self.found if kind == CONTRADICTS)
 
-    def _grouped(self, indent: str, texts_of: Callable[[ReplayedCycle], Iterable[str]]) -> Iterator[str]:
-        """Each text with the times of its cycles."""
-        found: dict[str, list[ReplayedCycle]] = {}
-        for cycle in self.cycles:
-            for text in texts_of(cycle):
-                found.setdefault(text, []).append(cycle)
-        return (f"{indent}{_times(cycles)}: {text}" for text, cycles in found.items())
+    def _grouped(self, indent: str, kind: str) -> Iterator[str]:
+        """Each text of a kind with its times."""
+        times: dict[str, list[float]] = {}
+        for t_s, each, text in self.found:
+            if each == kind:
+                times.setdefault(text, []).append(t_s)
+        return (f"{indent}{_span(of_text)}: {text}" for text, of_text in times.items())
 
 
 def summary(missions: Sequence[MissionReplay]) -> Iterator[str]:
     """Several replays as `kb try` prints them: those in which something happens, and how many they are."""
     for mission in missions:
-        if mission.cycles or len(missions) == 1:
+        if mission.found or len(missions) == 1:
             yield from mission.lines()
     if len(missions) > 1:
-        cycles = [mission.cycles for mission in missions]
-        firing = sum(any(each.firings for each in one) for one in cycles)
-        changed = [sum(len(each.decisions) for each in one) for one in cycles]
-        contradictions = sum(any(each.contradiction for each in one) for one in cycles)
+        firing, changed, contradictions = (
+            [len(mission.times(kind)) for mission in missions] for kind in (FIRES, DECIDES, CONTRADICTS)
+        )
         yield (
-            f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
-            f"({number_of(sum(changed), 'decision')}), contradictions in {contradictions}"
+            f"{len(missions)} missions: fires in {sum(map(bool, firing))}, different decisions in "
+            f"{sum(map(bool, changed))} ({number_of(sum(changed), 'decision')}), "
+            f"contradictions in {sum(map(bool, contradictions))}"
         )
 
 
-def _times(cycles: Sequence[ReplayedCycle]) -> str:
-    first, last = cycles[0].t_s, cycles[-1].t_s
-    return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(cycles)} states"
+def _span(times: Sequence[float]) -> str:
+    first, last = times[0], times[-1]
+    return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(times)} states"
 
 
 def try_rules(
@@ -121,10 +111,10 @@ def try_rules(
     for where, mission in recorded_missions(folder):
         if trial is None or trial.scenario != mission.scenario:
             trial = _Trial(mission.scenario, rule, disabled, limit)
-        cycles = tuple(each for each in map(trial.replay, mission.records) if each is not None)
+        found = tuple((record.t_s, *each) for record in mission.records for each in trial.replay(record.state))
         point = f", point {mission.point}" if mission.point else ""
         which = f"{mission.manager}, run {mission.run}{point}" if mission.run else ""
-        yield MissionReplay(where, which, len(mission.records), cycles)
+        yield MissionReplay(where, which, len(mission.records), found)
 
 
 class _Trial:
@@ -146,20 +136,17 @@ class _Trial:
         self.rules = [each for each in self.with_rule.content.enabled_rules if each.name in names]
         self.pellet = InProcessPellet(self.with_rule, self.with_rule.content.all_terms())
 
-    def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
-        """Return the effect of the change in a recorded reasoning cycle; None if it has none."""
-        situation = Situation(record.state)
-        before, after = self.before.outcome(situation), self.after.outcome(situation)
+    def replay(self, state: KnowledgeState) -> Iterator[tuple[str, str]]:
+        """The effects of the change in a recorded state, if it has any; see MissionReplay."""
+        before, after = self.before.outcome(Situation(state)), self.after.outcome(Situation(state))
         if after.reasoning is None:
-            return ReplayedCycle(record.t_s, (), (), f"contradiction: {after.contradiction}")
-        decisions = []
+            yield CONTRADICTS, f"contradiction: {after.contradiction}"
+            return
         for name, *choices in differing_decisions(before, after):
             one, other = (_UNCHANGED.get(each, each) for each in choices)
             if one != other:
-                decisions.append(f"{name}: {other} instead of {one}")
-        firings = []
-        tracer = Tracer(self.with_rule, record.state, self.pellet)
+                yield DECIDES, f"{name}: {other} instead of {one}"
+        tracer = Tracer(self.with_rule, state, self.pellet)
         for bindings, facts in (firing for rule in self.rules for firing in tracer.firings(rule)):
             bound = with_bindings(tuple(each for each in bindings if not isinstance(each[1], Decimal)))
-            firings.append(f"{', '.join(map(str, facts))}{bound or ' with nothing bound'}")
-        return ReplayedCycle(record.t_s, tuple(firings), tuple(decisions)) if firings or decisions else None
+            yield FIRES, f"{', '.join(map(str, facts))}{bound or ' with nothing bound'}"

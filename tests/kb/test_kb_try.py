@@ -7,7 +7,7 @@ import pytest
 
 from suave_des import run_mission
 from suave_des.errors import InputError
-from suave_des.kb.replay import try_rules
+from suave_des.kb.replay import CONTRADICTS, DECIDES, FIRES, try_rules
 from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
@@ -53,16 +53,15 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
         if record.state.grounded(SEARCH) is not None and dict(record.state.measurements)["water_visibility"] < 2.5
     ]
     assert expected
-    assert [cycle.t_s for cycle in trial.cycles if cycle.firings] == pytest.approx(expected, abs=1e-6)
-    (firing,) = trial.cycles[0].firings
-    assert "?q = obs_water_visibility" in firing
+    assert trial.times(FIRES) == pytest.approx(expected, abs=1e-6)
+    assert "?q = obs_water_visibility" in next(text for _, kind, text in trial.found if kind == FIRES)
     assert trial.states == len(result.knowledge)
 
 
 def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     folder, result = mission
     (trial,) = try_rules(folder, disabled="QAWaterVisibility")
-    lost = [each for cycle in trial.cycles for each in cycle.decisions]
+    lost = [text for _, kind, text in trial.found if kind == DECIDES]
     adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
     assert len(lost) == len(adapted) > 0
     assert all(each.startswith(f"{SEARCH}: no change instead of fd_") for each in lost)
@@ -72,10 +71,9 @@ def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     folder, _ = mission
     clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
     (trial,) = try_rules(folder, clash)
-    problems = [cycle for cycle in trial.cycles if cycle.contradiction]
+    problems = [text for _, kind, text in trial.found if kind == CONTRADICTS]
     assert problems
-    assert all("by the rules QAWaterVisibility (" in moment.contradiction for moment in problems)
-    assert all(", clash (" in moment.contradiction for moment in problems)
+    assert all("by the rules QAWaterVisibility (" in text and ", clash (" in text for text in problems)
     status, text, _ = command("try", clash, "--on", folder)
     assert status == 0
     assert f"states that would contradict themselves: {len(problems)}" in text
@@ -117,8 +115,8 @@ def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission
     alone = next(try_rules(mission[0], disabled="QAWaterVisibility"))
     first, second = try_rules(campaign, disabled="QAWaterVisibility")
     assert (first.mission, second.mission) == ("metacontrol, run 1", "metacontrol, run 1, point 1")
-    assert first.cycles == alone.cycles
-    assert second.cycles != first.cycles
+    assert first.found == alone.found
+    assert second.found != first.found
     status, text, _ = command("try", "--disable", "QAWaterVisibility", "--on", campaign)
     assert status == 0
     assert "metacontrol, run 1: fires in" in text

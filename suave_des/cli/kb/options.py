@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -56,12 +56,9 @@ class ReasonerOptions(KnowledgeOptions):
         from suave_des.kb.knowledge_base import KnowledgeBase
 
         return KnowledgeBase.load(
-            self.ontology or (),
+            **dict[str, Any](self.replacements),
             scenario=self.scenario,
             reasoner=self.reasoner,
-            rules=self.rules or (),
-            disabled_rules=self.disable_rule or (),
-            values=self.values,
             time_limit_s=self.time_limit,
         )
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import subprocess
 from collections.abc import Iterator, Sequence
-from decimal import Decimal
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -23,7 +22,7 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology, Terms
 from suave_des.knowledge.pellet.in_process import java_executable, launcher_environment, unescape
 from suave_des.knowledge.rdf import RDF as RDF_IRI
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, reached, term_of
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, for_pellet, n_triple, reached, term_of
 
 _PLAIN: Final = RDF_IRI + "PlainLiteral"
 _STATE_IRI: Final = "urn:suave-des:state"
@@ -51,14 +50,14 @@ class StockPellet:
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
-            lossy = [triple for triple in assertions if _is_lossy(triple[2])]
-            text = self._text + "".join(n_triple(triple) for triple in assertions if triple not in lossy)
+            numbers = [each for each in assertions if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"]
+            text = self._text + "".join(n_triple(triple) for triple in assertions if triple not in numbers)
             ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
-            for triple in lossy:
+            for triple in numbers:
                 _add_exactly(world, ontology, triple)
             if not _reason(world):
                 return None
-            return frozenset(self._read(world)) - {_as_float(triple) for triple in lossy}
+            return frozenset(self._read(world)).difference(map(_as_float, numbers)).union(numbers)
         finally:
             world.close()
 
@@ -114,24 +113,15 @@ def _remove_temporary_file(trace: TracebackType | None) -> None:
 
 
 def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: Triple) -> None:
-    """Assert a decimal as written: the loader would convert it to a float, and write 1e-05, not a decimal."""
+    """Assert a decimal exactly: the loader would convert it to a float, and write 1e-05, not a decimal."""
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
-    ontology._add_data_triple_raw_spod(subject_id, predicate_id, value.text, datatype_id)
+    ontology._add_data_triple_raw_spod(subject_id, predicate_id, for_pellet(value).text, datatype_id)
 
 
 def _as_float(triple: Triple) -> Triple:
-    """Return the triple to which owlready2 rounds such a decimal when Pellet returns it: it is not a second value."""
+    """Return the triple to which owlready2 may round a decimal when Pellet returns it: it is not a second value."""
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     return subject, predicate, Lit(str(float(value.text)), value.datatype)
-
-
-def _is_lossy(value: str | Lit) -> bool:
-    """Whether owlready2, which stores numbers as floats, would write a decimal differently."""
-    return (
-        isinstance(value, Lit)
-        and value.datatype == XSD + "decimal"
-        and ("e" in str(float(value.text)) or Decimal(str(float(value.text))) != Decimal(value.text))
-    )
