@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from suave_des import run_mission
-from suave_des.kb.coverage import FIRES, FIRES_NOT, Goal, measure_coverage
+from suave_des.kb import adequacy
+from suave_des.kb.adequacy import Goal, Mutant, is_horn, measure_coverage, mutants_of, mutate, sample
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.mutation import EQUIVALENT, KILLED, OPERATORS, SURVIVED, Mutant, is_horn, mutants_of, mutate, sample
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
 from suave_des.kb.space import PolicySpace, Situation, States, difference, interchangeable_components
 from suave_des.knowledge.ontology import Ontology
@@ -66,7 +66,7 @@ def test_a_mutant_may_depend_on_an_attribute_on_which_the_rule_does_not(tmp_path
     assert "water_current" not in PolicySpace.of(knowledge.base, knowledge.settings).attributes
     dropped = mutant(knowledge, "own", "isQAtype(?q, water_visibility) is left out")
     (found,), _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), [dropped], max_failed=0)
-    assert found.result == SURVIVED and found.state is not None
+    assert found.result == adequacy.SURVIVED and found.state is not None
     measured = dict(found.state.measurements)
     assert measured["water_current"] < Decimal("0.1") <= measured.get("water_visibility", Decimal(1))
 
@@ -89,9 +89,9 @@ tests:
 """
     tests = read_tests(tmp_path, knowledge, follows)
     assert run_test(knowledge, tests[0]).passed
-    assert mutate(knowledge, tests, [removed], max_failed=0)[0][0].result == KILLED
+    assert mutate(knowledge, tests, [removed], max_failed=0)[0][0].result == adequacy.KILLED
     (found,), _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), [removed], max_failed=1)
-    assert found.result == SURVIVED and found.state is not None
+    assert found.result == adequacy.SURVIVED and found.state is not None
     assert dict(found.state.components) == {"c_thruster_1": "FALSE"}
 
 
@@ -134,7 +134,7 @@ def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_ra
     knowledge = small
     of_rule = [each for each in mutants_of(knowledge.base) if each.name == "QAWaterVisibility"]
     results, _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), of_rule, max_failed=1)
-    equivalent = [each.mutant for each in results if each.result == EQUIVALENT]
+    equivalent = [each.mutant for each in results if each.result == adequacy.EQUIVALENT]
     assert set(map(str, equivalent)) == EQUIVALENT_ONES
     draw = random.Random(7)
     space = PolicySpace.of(knowledge.base, knowledge.settings)
@@ -179,7 +179,7 @@ def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path):
     rules = file(tmp_path, 'clash: fg_status(?g, "IN_ERROR_NFR") -> fg_status(?g, "IN_ERROR_FR")')
     knowledge = KnowledgeBase.load(rules=rules, values=FEWER_NUMBERS)
     (found,), _ = mutate(knowledge, [], [mutant(knowledge, "clash", "the rule is removed")], max_failed=0)
-    assert (found.result, found.reason) == (SURVIVED, "it no longer contradicts itself")
+    assert (found.result, found.reason) == (adequacy.SURVIVED, "it no longer contradicts itself")
 
 
 def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_path, suave_copy):
@@ -207,12 +207,13 @@ def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_p
 
 def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge):
     found = mutants_of(knowledge.base)
-    assert {mutant.operator for mutant in found} == set(OPERATORS) - {"threshold moved"}  # they have no numbers
+    # They have no numbers.
+    assert {mutant.operator for mutant in found} == set(adequacy.OPERATORS) - {"threshold moved"}
     assert len(sample(found, 10)) == 10
     assert [str(each) for each in mutants_of(Ontology.load())] == [str(each) for each in found]
 
 
-@pytest.mark.parametrize("operator", [each for each in OPERATORS if each != "threshold moved"])
+@pytest.mark.parametrize("operator", [each for each in adequacy.OPERATORS if each != "threshold moved"])
 def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge, operator):
     mutant = next(each for each in mutants_of(knowledge.base) if each.operator == operator)
     state = knowledge.state(
@@ -223,10 +224,10 @@ def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge, operator):
 
 def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells_them_apart(tmp_path, small):
     chosen = {
-        "lessThan(?measured, ?expected) becomes greaterThan(?measured, ?expected)": KILLED,
-        "lessThan(?measured, ?expected) becomes lessThanOrEqual(?measured, ?expected)": SURVIVED,
-        "FunctionGrounding(?fg) is left out": EQUIVALENT,
-        "the rule is removed": KILLED,
+        "lessThan(?measured, ?expected) becomes greaterThan(?measured, ?expected)": adequacy.KILLED,
+        "lessThan(?measured, ?expected) becomes lessThanOrEqual(?measured, ?expected)": adequacy.SURVIVED,
+        "FunctionGrounding(?fg) is left out": adequacy.EQUIVALENT,
+        "the rule is removed": adequacy.KILLED,
     }
     mutants = [each for each in mutants_of(small.base) if each.name == "QAWaterVisibility" and each.text in chosen]
     results, _ = mutate(small, read_tests(tmp_path, small, LOW_AND_HIGH), mutants, max_failed=0)
@@ -245,10 +246,10 @@ def test_coverage_names_what_is_missing_and_states_for_it(tmp_path, knowledge, a
         knowledge = KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
     situations = [situation for test in tests for situation in test.situations]
     coverage = measure_coverage(knowledge, situations, max_failed=0)
-    fired, not_fired = (Goal("QAWaterVisibility", -1, outcome) for outcome in (FIRES, FIRES_NOT))
+    fired, not_fired = (Goal("QAWaterVisibility", -1, outcome) for outcome in (adequacy.FIRES, adequacy.FIRES_NOT))
     assert (coverage.covered[fired], coverage.covered[not_fired]) == (1, 1)
     assert "equal" in {goal.outcome for goal in coverage.missing if goal.rule == "QAWaterVisibility"}
-    assert Goal("S10", -1, FIRES) in coverage.unreachable
+    assert Goal("S10", -1, adequacy.FIRES) in coverage.unreachable
     proposed = [Situation(state) for state, _ in coverage.proposed]
     assert not measure_coverage(knowledge, [*situations, *proposed], max_failed=0).missing
 
@@ -271,5 +272,5 @@ def test_the_shipped_tests_kill_the_mutants_of_the_shipped_rules(knowledge):
     tests = [test for file in shipped_tests() for test in TestFile.read(file).tests(knowledge)]
     assert all(run_test(knowledge, test).passed for test in tests)
     results, _ = mutate(knowledge, tests, sample(mutants_of(knowledge.base), 100), max_failed=1)
-    survivors = [str(each.mutant) for each in results if each.result == SURVIVED]
-    assert len(survivors) <= 0.05 * sum(each.result != EQUIVALENT for each in results), survivors
+    survivors = [str(each.mutant) for each in results if each.result == adequacy.SURVIVED]
+    assert len(survivors) <= 0.05 * sum(each.result != adequacy.EQUIVALENT for each in results), survivors

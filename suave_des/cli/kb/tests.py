@@ -231,7 +231,7 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
 
 def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
-    from suave_des.kb.coverage import measure_coverage
+    from suave_des.kb.adequacy import measure_coverage
     from suave_des.kb.rule_tests import tests_text
 
     if file is not None and len(suites) > 1:
@@ -251,7 +251,7 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
 
 
 def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
-    from suave_des.kb.mutation import mutants_of, mutate, mutation_lines, mutation_table, sample
+    from suave_des.kb.adequacy import mutants_of, mutate, mutation_lines, mutation_table, sample
 
     for suite in suites:
         found = mutants_of(suite.knowledge.base)
