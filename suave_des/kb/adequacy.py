@@ -163,18 +163,14 @@ def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], 
         covering = _covering(knowledge, left)
         for state in States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space):
             found.setdefault(covering(Situation(state)), state)
-    candidates = {state: reached for reached, state in found.items() if reached}
-    proposed = tuple((state, tuple(sorted(candidates[state]))) for state in small_cover(candidates))
-    return Coverage(tuple(sorted({*goals})), covered, frozenset[Goal]().union(*candidates.values()), proposed)
-
-
-def small_cover(candidates: Mapping[KnowledgeState, frozenset[Goal]]) -> list[KnowledgeState]:
-    """Find few states that together cover all that any of them covers: each next one covers most of what is left."""
-    left, chosen = set[Goal]().union(*candidates.values()), list[KnowledgeState]()
-    while left:
-        chosen.append(max(candidates, key=lambda state: len(candidates[state] & left)))
-        left -= candidates[chosen[-1]]
-    return chosen
+    missing = frozenset[Goal]().union(*found)
+    proposed: dict[KnowledgeState, tuple[Goal, ...]] = {}
+    waiting = set(missing)
+    while waiting:  # each next one covers most of what is left
+        reached = max(found, key=lambda each: len(each & waiting))
+        proposed[found[reached]] = tuple(sorted(reached))
+        waiting -= reached
+    return Coverage(tuple(sorted({*goals})), covered, missing, tuple(proposed.items()))
 
 
 # Mutants.

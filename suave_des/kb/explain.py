@@ -513,37 +513,36 @@ class Explanation:
             yield "nothing is inferred, and nothing is decided"
 
 
-def explain(base: Ontology, question: str, reasoning: Reasoning, pellet: InProcessPellet) -> Explanation:
-    """Answer a question about a state; see KnowledgeBase.explain.
+class Explainer:
+    """Answers questions about a state.
 
     Args:
         reasoning: what is inferred of all terms and planned in the state.
         pellet: has the ontologies, and reads all terms.
     """
-    question = question.strip()
-    why = _WHY.fullmatch(question)
-    if question and not why and "(" not in question:
-        raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
-    explainer = _Explainer(base, reasoning, Tracer(base, reasoning.inference.state, pellet))
-    if why:
-        return Explanation(decisions=(explainer.design(why.group(1)),))
-    if question:
-        return Explanation((explainer.fact(question),))
-    inferred = sorted(reasoning.inference.facts, key=str)
-    return Explanation(tuple(map(explainer.derive, inferred)), tuple(map(explainer.decision, reasoning.plan.decisions)))
 
-
-class _Explainer:
-    """Finds the facts behind a decision, and how they follow."""
-
-    def __init__(self, base: Ontology, reasoning: Reasoning, tracer: Tracer) -> None:
-        self.base, self.reasoning, self.tracer = base, reasoning, tracer
+    def __init__(self, base: Ontology, reasoning: Reasoning, pellet: InProcessPellet) -> None:
+        self.base, self.reasoning = base, reasoning
+        self.tracer = tracer = Tracer(base, reasoning.inference.state, pellet)
         self.triples: dict[Fact, Triple] = {}
         for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
             for fact in rdf.facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
 
+    def answer(self, question: str) -> Explanation:
+        """Answer a question; see KnowledgeBase.explain."""
+        question = question.strip()
+        if why := _WHY.fullmatch(question):
+            return Explanation(decisions=(self.design(why.group(1)),))
+        if question and "(" not in question:
+            raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
+        if question:
+            return Explanation((self.fact(question),))
+        inferred = sorted(self.reasoning.inference.facts, key=str)
+        return Explanation(tuple(map(self.derive, inferred)), tuple(map(self.decision, self.reasoning.plan.decisions)))
+
     def derive(self, fact: Fact) -> Derivation:
+        """How a fact follows."""
         return self.tracer.derive(self.triples[fact])
 
     def fact(self, text: str) -> Derivation:

@@ -10,7 +10,7 @@ from typing import Any
 
 from suave_des.arguments import plain_arguments
 from suave_des.kb.difference import PolicyDifference, compare_decisions
-from suave_des.kb.explain import Explanation, explain
+from suave_des.kb.explain import Explainer, Explanation
 from suave_des.kb.policy import Policy, make_policy
 from suave_des.kb.query import QueryResult, answer, graph_of
 from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
@@ -198,7 +198,8 @@ class KnowledgeBase:
         """
         reasoning = self.infer(state)
         return self.limit.run(
-            lambda: explain(self.base, question, reasoning, self._tracing_pellet), f"explaining the state {state}"
+            lambda: Explainer(self.base, reasoning, self._tracing_pellet).answer(question),
+            f"explaining the state {state}",
         )
 
     def policy(

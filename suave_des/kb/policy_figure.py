@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import chain, cycle
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,7 +33,8 @@ def draw_policy(policy: Policy, path: Path) -> None:
     """
     check_picture(path)
     found = {name: function_table(policy, name) for name in policy.functions}
-    drawn = {name: each for name, each in found.items() if len(set(_outcomes(each)) - {STAYS}) > 1}
+    outcomes = {name: {*chain(*(row[each.down :] for row in each.table.rows))} for name, each in found.items()}
+    drawn = {name: each for name, each in found.items() if len(outcomes[name] - {STAYS}) > 1}
     if not drawn:
         raise InputError("no function has a choice to draw")
     rows = [len(each.table.rows) for each in drawn.values()]
@@ -62,10 +63,6 @@ def draw_policy(policy: Policy, path: Path) -> None:
             write_picture(figure, path, bbox_inches="tight")
         finally:
             plt.close(figure)
-
-
-def _outcomes(table: FunctionTable) -> Iterator[str]:
-    return (cell for row in table.table.rows for cell in row[table.down :])
 
 
 def _then(now: str, outcome: str) -> str:
@@ -127,5 +124,5 @@ def _colours(names: set[str]) -> dict[str, str]:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    others = itertools.cycle(dict.fromkeys((*OTHER_MODES, *map(to_hex, map(colormaps["Set2"], range(8))))))
+    others = cycle(dict.fromkeys((*OTHER_MODES, *map(to_hex, map(colormaps["Set2"], range(8))))))
     return {name: _FIXED[name] if name in _FIXED else next(others) for name in sorted(names, key=_low_to_high)}

@@ -80,8 +80,38 @@ class Material:
 
     @cached_property
     def dead(self) -> list[tuple[Rule, Atom]]:
-        """The rules that fire in no state, each with an atom of its body that can never hold."""
-        return dead_rules(self)
+        """The enabled rules that fire in no state, each with an atom of its body that can never hold.
+
+        An atom cannot hold if no ontology asserts its class or property, no state adds it and no rule that can fire
+        concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not
+        every dead rule is returned.
+        """
+        content, model = self.content, self.base.model
+        leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
+        both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
+        related = [(one, name, str(other)) for one, name, other in content.triples]
+        steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
+        steps += [(other, one) for one, name, other in related if name in (*both_ways, rdf.RDFS + "subPropertyOf")]
+        held = {rdf.OWL + "Thing", swrl.EXPRESSION}
+        held |= rdf.terms(
+            rdf.TOMASYS, "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status"
+        )
+        held |= {*(name for _, name in rdf.memberships(content.triples)), *(name for _, name, _ in content.triples)}
+        held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
+        held |= {rdf.HAS_QA_VALUE} if any(model.estimated.values()) else set()
+        structure = "".join(content.structure)
+        waiting, possible = list(content.enabled_rules), rdf.reached(held, steps)
+
+        def allows(atom: Atom) -> bool:
+            is_named = atom.kind in ("class", "object", "data") and atom.arguments
+            # Class expressions and property chains are not followed.
+            return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
+
+        while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
+            held.update(atom.predicate for rule in firing for atom in rule.head)
+            possible = rdf.reached(held, steps)
+            waiting = [rule for rule in waiting if rule not in firing]
+        return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
 
     @cached_property
     def for_other_models(self) -> list[Rule]:
@@ -358,41 +388,6 @@ def for_other_models(material: Material) -> Iterator[Finding]:
     for file, names in by_file.items():
         message = f"rules for other models, which never fire in this one: {', '.join(names)}"
         yield Finding(Level.INFO, message, str(file))
-
-
-def dead_rules(material: Material) -> list[tuple[Rule, Atom]]:
-    """Find the enabled rules that fire in no state, each with an atom of its body that can never hold.
-
-    An atom cannot hold if no ontology asserts its class or property, no state adds it and no rule that can fire
-    concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not every
-    dead rule is returned.
-    """
-    content, model = material.content, material.base.model
-    leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
-    both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
-    related = [(one, name, str(other)) for one, name, other in content.triples]
-    steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
-    steps += [(other, one) for one, name, other in related if name in (*both_ways, rdf.RDFS + "subPropertyOf")]
-    held = {rdf.OWL + "Thing", swrl.EXPRESSION}
-    held |= rdf.terms(
-        rdf.TOMASYS, "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status"
-    )
-    held |= {*(name for _, name in rdf.memberships(content.triples)), *(name for _, name, _ in content.triples)}
-    held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
-    held |= {rdf.HAS_QA_VALUE} if any(model.estimated.values()) else set()
-    structure = "".join(content.structure)
-    waiting, possible = list(content.enabled_rules), rdf.reached(held, steps)
-
-    def allows(atom: Atom) -> bool:
-        is_named = atom.kind in ("class", "object", "data") and atom.arguments
-        # Class expressions and property chains are not followed.
-        return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
-
-    while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
-        held.update(atom.predicate for rule in firing for atom in rule.head)
-        possible = rdf.reached(held, steps)
-        waiting = [rule for rule in waiting if rule not in firing]
-    return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
 
 
 def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str | None]]:
