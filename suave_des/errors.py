@@ -179,17 +179,11 @@ class Finding:
     @classmethod
     def of(cls, error: InputError) -> Finding:
         """Make a finding of an error, with the parts of its place."""
-        place = error.place or ""
-        line, column, rule = (re.search(pattern, place) for pattern in (r"line (\d+)", r"column (\d+)", r"^rule (.*)"))
-        return cls(
-            Level.ERROR,
-            error.problem,
-            error.file,
-            int(line.group(1)) if line else None,
-            rule.group(1) if rule else None,
-            int(column.group(1)) if column else None,
-            error.remedy,
-        )
+        patterns = r"line (\d+)", r"column (\d+)", r"^rule (.*)"
+        found = (re.search(pattern, error.place or "") for pattern in patterns)
+        line, column, rule = (match[1] if match else None for match in found)
+        line_number, column_number = (int(number) if number else None for number in (line, column))
+        return cls(Level.ERROR, error.problem, error.file, line_number, rule, column_number, error.remedy)
 
     @property
     def where(self) -> str:

@@ -133,12 +133,8 @@ class CampaignResult:
         """
         spec, sweep = self.campaign.spec, self.campaign.variation.sweep
         assert self.folder is not None
-        about = {
-            "scenario": self.campaign.loaded.scenario.name,
-            "managers": spec.managers,
-            "runs": spec.runs,
-            "seed": spec.seed,
-        }
+        about = {"scenario": self.campaign.loaded.scenario.name}
+        about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
         columns = (*SUMMARY_COLUMNS, *sweep.parameters)
         files: dict[str, Content] = {
             store.RUNS_FILE: store.runs_pieces(self.columns, self.stream()),
@@ -203,10 +199,7 @@ def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remark
         found[place] = _figures(kept(group), variation.runs_sharing_draw)
     none = _figures((), 1)
     summary = tuple(
-        {
-            **dict(zip(SUMMARY_COLUMNS, (name, *found.get((point, number), none)), strict=True)),
-            **_swept(variation, point),
-        }
+        dict(zip(SUMMARY_COLUMNS, (name, *found.get((point, number), none)), strict=True)) | _swept(variation, point)
         for point in range(max((point for point, _ in found), default=0) + 1)
         for number, name in enumerate(spec.managers)
     )

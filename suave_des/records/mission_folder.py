@@ -293,13 +293,9 @@ def read_missions(path: Path) -> Iterator[RecordedMission]:
             for key_path, value in content["swept"].items():
                 holder, key = holder_of(at_point, key_path)
                 holder[key] = value
-            yield RecordedMission(
-                str(content["manager"]),
-                int(content["point"]),
-                int(content["run"]),
-                Scenario.model_validate(at_point),
-                tuple(_cycle(content["states"], *cycle) for cycle in content["cycles"]),
-            )
+            point, run = int(content["point"]), int(content["run"])
+            records = tuple(_cycle(content["states"], *cycle) for cycle in content["cycles"])
+            yield RecordedMission(str(content["manager"]), point, run, Scenario.model_validate(at_point), records)
 
 
 @contextmanager
@@ -328,10 +324,6 @@ def _cycle(states: Sequence[Mapping[str, Any]], t_s: Any, index: int, *values: A
 
 
 def _record(t_s: Any, content: Mapping[str, Any], measurements: Mapping[str, Any]) -> KnowledgeRecord:
-    state = KnowledgeState.of(
-        [ObjectiveState(str(name), status, bool(always)) for name, status, always in content["objectives"]],
-        groundings=content["groundings"],
-        components=content["components"],
-        measurements=measurements,
-    )
-    return KnowledgeRecord(float(t_s), state)
+    objectives = [ObjectiveState(str(name), status, bool(always)) for name, status, always in content["objectives"]]
+    others = {name: content[name] for name in ("groundings", "components")}
+    return KnowledgeRecord(float(t_s), KnowledgeState.of(objectives, measurements=measurements, **others))

@@ -302,16 +302,10 @@ def concluded(
     for row in differences:
         row["conclusion"] = conclusion(row, by_name[row["metric"]])
     counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
-    return Comparison(
-        " ".join(_conclusions(groups, summaries, differences)),
-        _frame(summaries, _SUMMARY).astype({"horizon_s": "Int64"}),
-        _frame(differences, _DIFFERENCE).astype(counts),
-        (*groups.missions.notes, *groups.notes, *_worse_paired(differences)),
-        groups.metrics,
-        groups.counted,
-        largest,
-        replay,
-    )
+    frames = _frame(summaries, _SUMMARY).astype({"horizon_s": "Int64"}), _frame(differences, _DIFFERENCE).astype(counts)
+    sentences = " ".join(_conclusions(groups, summaries, differences))
+    notes = (*groups.missions.notes, *groups.notes, *_worse_paired(differences))
+    return Comparison(sentences, *frames, notes, groups.metrics, groups.counted, largest, replay)
 
 
 def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:

@@ -15,6 +15,8 @@ from suave_des.scenario.models import Real, Scenario, Strict, wrong
 from suave_des.scenario.yamlfile import Layer, validated
 
 ParameterValue = float | str | bool
+_NodeModes = Mapping[str, dict[str, ParameterValue]]
+"""Parameters of each mode of a node."""
 _STATES = "inactive, active or active.NODE_MODE"
 
 
@@ -134,7 +136,7 @@ class _Node(Strict):
     type: Literal["node"]
     modes: Annotated[dict[str, _NodeMode], Field(min_length=1)] | None = None
 
-    def parameters(self) -> dict[str, dict[str, ParameterValue]]:
+    def parameters(self) -> _NodeModes:
         """Parameters of each mode; each has those of __DEFAULT__ that it does not set itself."""
         own = {
             name: {} if mode.ros__parameters is None else mode.ros__parameters.model_dump(exclude_unset=True)
@@ -197,12 +199,7 @@ def modes_of(document: Layer) -> ModeTable:
     return ModeTable(str(document.path), functions)
 
 
-def _mode(
-    document: Layer,
-    path: KeyPath,
-    states: Mapping[str, Any],
-    nodes: Mapping[str, Mapping[str, dict[str, ParameterValue]]],
-) -> Mode:
+def _mode(document: Layer, path: KeyPath, states: Mapping[str, Any], nodes: Mapping[str, _NodeModes]) -> Mode:
     """A mode of a function: the parameters that it sets on each of the function's nodes that are active in it."""
     keys = {key.removeprefix("/"): key for key in states}
     for part, key in keys.items():
