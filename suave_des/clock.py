@@ -37,7 +37,7 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Event:
     return exactly_at(env, now_s + delay_s if delay_s > 0.0 else now_s)
 
 
-def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], None]) -> None:
+def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], Any]) -> None:
     """Call a function at mission time t, or as the next thing now if t has passed."""
     until(env, t_s).callbacks.append(lambda _: callback())
 

@@ -7,11 +7,11 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from suave_des.domain import BATTERY_LEVEL
+from suave_des.domain import BATTERY_LEVEL, THRUSTER_NAMES
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import Reasoner
-from suave_des.monitor.diagnostics import REPORTED_STATUSES
+from suave_des.monitor.diagnostics import FAILED, HULL, LEAK, RECOVERED
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
@@ -19,6 +19,8 @@ from suave_des.scenario.models import Scenario
 if TYPE_CHECKING:
     from suave_des.knowledge.checks import Subject
 
+REPORTED_STATUSES: Final = {**dict.fromkeys(THRUSTER_NAMES, (FAILED, RECOVERED)), HULL: (LEAK,)}
+"""The statuses that monitors report of each component."""
 OPENED: Final = 4
 _opened: dict[Hashable, Reasoner] = {}
 """Knowledge bases that are kept open, the oldest first."""

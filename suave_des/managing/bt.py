@@ -5,9 +5,8 @@ Source: the two trees of kas-lab/suave 1.5.0; suave_extended.xml is the one that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 from suave_des.domain import (
     BATTERY_LEVEL,
@@ -20,8 +19,8 @@ from suave_des.domain import (
     UNGROUND_MODE,
     WATER_VISIBILITY,
 )
-from suave_des.managing.base import Dependencies, ManagingSubsystem, System
-from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.managing.base import Dependencies, System
+from suave_des.managing.simple import RemembersFailures
 from suave_des.scenario.models import draw
 
 
@@ -85,30 +84,20 @@ class Behaviour:
                 held = (*held, child.name)
 
 
-class BehaviourTree(ManagingSubsystem):
+class BehaviourTree(RemembersFailures):
     """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected."""
-
-    subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
     def __init__(self, system: System) -> None:
         super().__init__(system)
         self._settings = system.scenario.managers.bt
         self.period_s = self._settings.tick_period_s
         self.starts_s = draw(self._settings.first_tick_s, system.stream("bt/phase"))
-        self._failed: set[str] = set()
         self._logged = ""
         self.root = self.make_tree()
 
     def make_tree(self) -> Behaviour:
         """Make the tree; called once, before the mission."""
         return Behaviour("=>", "mission", self._branches())
-
-    def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Remember failed thrusters."""
-        if diagnostic.value == FAILED:
-            self._failed.add(diagnostic.key)
-        else:
-            self._failed.discard(diagnostic.key)
 
     def adapt(self) -> None:
         """Tick the tree."""
@@ -139,7 +128,7 @@ class BehaviourTree(ManagingSubsystem):
         return self._motion(), self._search(), *((surface,) if self.system.scenario.leak is not None else ()), follow
 
     def _motion(self) -> Behaviour:
-        failed = Behaviour("", "a thruster has failed", act=lambda: bool(self._failed))
+        failed = Behaviour("", "a thruster has failed", act=lambda: bool(self.failed))
         recover = self._set(MAINTAIN_MOTION, "fd_recover_thrusters")
         choices = (Behaviour("->", "recovery", (failed, recover)), self._set(MAINTAIN_MOTION, "fd_all_thrusters"))
         return self._while_needed(MAINTAIN_MOTION, Behaviour("?", "thrusters", choices))

@@ -72,7 +72,9 @@ class Metacontrol(ManagingSubsystem):
         self._cancelled: set[str] = set()  # functions whose objectives were removed since the last cycle began
         self._recorded_statuses: frozenset[str] = frozenset()
         self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
-        self._awaited = self._attributes_to_await()
+        # Measured before the first cycle: signals of which function designs expect a value.
+        expected = self._reasoner.expected_attributes if revision.waits_for_first_measurement else frozenset[str]()
+        self._awaited = expected.intersection(system.measurements, scenario.signals)
         self._longest_s = support(scenario.latencies.inference_s)[1]
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_tick_s("metacontrol", self.period_s)
@@ -231,10 +233,7 @@ class Metacontrol(ManagingSubsystem):
             return
         for decision in self._analyze_and_plan().plan.decisions:
             if decision.function in functions and decision.design is not None:
-                call_at(env, ends_s, partial(self._request, decision.function, decision.design))
-
-    def _request(self, function: str, design: str) -> None:
-        self.system.change_mode(function, design)
+                call_at(env, ends_s, partial(self.system.change_mode, decision.function, decision.design))
 
     # Queries of the loop.
 
@@ -290,9 +289,3 @@ class Metacontrol(ManagingSubsystem):
 
     def _is_listening(self) -> bool:
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
-
-    def _attributes_to_await(self) -> frozenset[str]:
-        """Find the signals to be measured before the first cycle: those of which function designs expect a value."""
-        if not self._revision.waits_for_first_measurement:
-            return frozenset()
-        return self._reasoner.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)

@@ -110,7 +110,24 @@ class RandomManager(ManagingSubsystem):
             self.system.change_mode(function, self._stream.choice(self.system.modes.available_modes(function)))
 
 
-class Threshold(ManagingSubsystem):
+class RemembersFailures(ManagingSubsystem):
+    """Base of managers that remember which thrusters have failed: `failed`, those that were last reported as such."""
+
+    subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
+
+    def __init__(self, system: System) -> None:
+        super().__init__(system)
+        self.failed: set[str] = set()
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Remember a thruster that has failed, until it is reported as recovered."""
+        if diagnostic.value == FAILED:
+            self.failed.add(diagnostic.key)
+        else:
+            self.failed.discard(diagnostic.key)
+
+
+class Threshold(RemembersFailures):
     """threshold: metacontrol's decisions as plain conditions; the difference is the cost of the ontology.
 
     It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, from the same first cycle on in each
@@ -119,7 +136,6 @@ class Threshold(ManagingSubsystem):
     Attributes:
         thresholds_m: least visibility for each of the search modes; the first one that is reached decides.
         search_modes: a mode for each threshold; the last one is also for a visibility below all.
-        failed: thrusters that were reported as failed.
 
     Example:
         >>> class Bold(Threshold):
@@ -128,8 +144,6 @@ class Threshold(ManagingSubsystem):
         ...         self.thresholds_m = (3.0, 2.0, 1.0)
     """
 
-    subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
-
     def __init__(self, system: System) -> None:
         super().__init__(system)
         period_s = system.scenario.managers.metacontrol.reasoning_period_s
@@ -137,19 +151,11 @@ class Threshold(ManagingSubsystem):
         self.starts_s = system.first_tick_s("metacontrol", period_s)
         self.thresholds_m = system.scenario.managers.bt.visibility_thresholds_m
         self.search_modes = system.scenario.managers.bt.search_modes
-        self.failed: set[str] = set()
 
     @property
     def depends_on(self) -> Dependencies:
         """The thresholds between the search modes."""
         return {WATER_VISIBILITY: tuple(sorted(self.thresholds_m))}
-
-    def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Remember failed thrusters."""
-        if diagnostic.value == FAILED:
-            self.failed.add(diagnostic.key)
-        else:
-            self.failed.discard(diagnostic.key)
 
     def adapt(self) -> None:
         """Request the modes that fit."""

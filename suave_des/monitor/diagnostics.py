@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from suave_des.domain import THRUSTER_NAMES
-
 if TYPE_CHECKING:  # or looking a manager up would load the compiler
     from suave_des.vehicle.model import Pose
 
@@ -29,14 +27,10 @@ class Kind(StrEnum):
 
 EXEMPLAR_KINDS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
 """The kinds that the exemplar's monitors publish."""
-
-
 FAILED, RECOVERED = "FALSE", "RECOVERED"
 """Statuses of a thruster, as the ontology's property c_status has them: FALSE, it cannot be used."""
 HULL, LEAK = "hull", "LEAK"
 """The component that leaks, and its status then."""
-REPORTED_STATUSES = {**dict.fromkeys(THRUSTER_NAMES, (FAILED, RECOVERED)), HULL: (LEAK,)}
-"""The statuses that monitors report of each component."""
 
 
 @dataclass(frozen=True, slots=True)

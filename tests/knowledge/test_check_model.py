@@ -7,10 +7,9 @@ import pytest
 from suave_des.errors import Finding, KnowledgeError, Level
 from suave_des.kb.check import check
 from suave_des.knowledge.checks import Subject
-from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario_knowledge import open_base, subject_of
+from suave_des.scenario_knowledge import REPORTED_STATUSES, open_base, subject_of
 from tests.helpers.checks import (
     OWL,
     SUAVE,

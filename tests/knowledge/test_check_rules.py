@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import Level, has_level
-from suave_des.monitor.diagnostics import REPORTED_STATUSES
+from suave_des.scenario_knowledge import REPORTED_STATUSES
 from tests.helpers.checks import OWL, SUAVE, SWRL, TOMASYS, errors, found, only
 
 DECLARE = "declare it as {} property in the ontology"
