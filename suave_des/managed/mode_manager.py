@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -10,7 +10,7 @@ import simpy
 
 from suave_des.clock import call_at
 from suave_des.domain import UNGROUND_MODE
-from suave_des.errors import did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managed.node import FunctionNode, Log
 from suave_des.scenario.modes import Mode, ModeTable
 
@@ -85,16 +85,15 @@ class ModeManager:
         call_at(self.env, due_s, partial(self._take_effect, function, chosen))
         return True
 
-    def refusals(self) -> Iterator[str]:
-        """Yield what was wrong with requests that were refused, and what would be right."""
-        for function, mode in self.refused:
-            if function not in self.table and mode in self.table:
-                yield f"change_mode({shown(function)}, {shown(mode)}) has its arguments swapped (function, then mode)"
-            elif known := self.available_modes(function):
-                yield f"{function} has no mode {shown(mode)} ({did_you_mean(mode, known)})"
-            else:
-                remedy = f"{did_you_mean(function, self.nodes, 'functions')}; name its class under functions:"
-                yield f"there is no function {shown(function)} ({remedy} in the scenario)"
+    def refusal(self, function: str, mode: str) -> InputError:
+        """Say what is wrong with a request that is refused, and what would be right."""
+        if function not in self.table and mode in self.table:
+            called = f"change_mode({shown(function)}, {shown(mode)})"
+            return InputError(f"{called} has its arguments swapped", remedy="function, then mode")
+        if known := self.available_modes(function):
+            return InputError(f"{function} has no mode {shown(mode)}", remedy=did_you_mean(mode, known))
+        remedy = f"{did_you_mean(function, self.nodes)}; name its class under functions: in the scenario"
+        return InputError(f"there is no function {shown(function)}", remedy=remedy)
 
     def _take_effect(self, function: str, mode: Mode) -> None:
         self.nodes[function].apply(mode)

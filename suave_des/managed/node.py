@@ -15,7 +15,7 @@ from suave_des.clock import Process
 from suave_des.compiling import Array
 from suave_des.monitor.diagnostics import DiagnosticsBus
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import ArrivalCheck, Point, Vehicle
+from suave_des.vehicle.vehicle import ArrivalCheck, Point, Sends, Ticks, Vehicle
 
 Log = Callable[[str, str, str], None]
 """Called with source, event and detail of something to record."""
@@ -111,17 +111,13 @@ class SetPointSender:
             self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
 
     def queue(
-        self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
-    ) -> tuple[list[int], int]:
+        self, waypoints: Array, z_m: float, check: ArrivalCheck, ticks: Ticks, *, most: int, send: bool
+    ) -> tuple[Sends, bool]:
         """Send and queue set-points (see `Vehicle.queue_waypoints`), up to the first whose message will be lost."""
         send = send and not self._is_lost()
-        if self._before_loss < len(waypoints):
-            waypoints = waypoints[: 1 + int(self._before_loss)]
         x_error_m, y_error_m, z_error_m = self.frame_error_m
-        sent_as_m = x_error_m, y_error_m, z_m + z_error_m
-        return self.vehicle.queue_waypoints(
-            self.env.now, waypoints, sent_as_m, check, first=first, last=last, send=send
-        )
+        sent_as_m, most = (x_error_m, y_error_m, z_m + z_error_m), int(min(most, self._before_loss))
+        return self.vehicle.queue_waypoints(self.env.now, waypoints, sent_as_m, check, ticks, most=most, send=send)
 
     def queued_were_sent(self, count: int) -> None:
         """Count set-points that were sent from the queue."""

@@ -77,7 +77,7 @@ class GenerateSearchPath(WaypointFunction):
 
     def _restart(self) -> None:
         self._step = 0
-        self._last_altitude_m: float | None = None  # at the tick before
+        self._last_altitude_m: float | None = None  # of the way-points before
         self._ahead: Array | None = None  # the current way-point and some that follow it; None before the first
 
     def configure(self, mode: Mode) -> None:
@@ -106,14 +106,11 @@ class GenerateSearchPath(WaypointFunction):
         """Stop ticking."""
         self.stop()
 
-    def tick(self) -> None:
-        """Count a step of the spiral if the altitude differs from that at the previous tick."""
+    def waypoints(self, count: int) -> Array:
+        """Return the current way-point and those that follow it; at another altitude than before they are a step on."""
         if self.altitude_m != self._last_altitude_m:
             self._step += 1
             self._last_altitude_m = self.altitude_m
-
-    def waypoints(self, count: int) -> Array:
-        """Return the current way-point and those that follow it at the current altitude."""
         waypoints = np.empty((count + 1, 4))  # the last one is current when all others are reached
         form = self.revision.angle_step_rad, self.view_tangent
         if self._ahead is None:
@@ -151,4 +148,4 @@ class GenerateSearchPath(WaypointFunction):
         # the same tick, hence one tick less.
         node = self.revision
         first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
-        return ArrivalCheck(start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)
+        return ArrivalCheck(start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again, False)

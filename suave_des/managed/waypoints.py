@@ -8,15 +8,14 @@ earlier, it counts what has been reached by then, and looks ahead again at the n
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass, field
-from enum import Enum, auto
+from enum import Enum
 from typing import Final
 
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import FunctionNode, SetPointSender
-from suave_des.vehicle.vehicle import ArrivalCheck
+from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Sends
 
 QUEUED_WAYPOINTS: Final = 20
 """Number of way-points queued in addition to the current one; with 10, missions take 7% more CPU time."""
@@ -25,12 +24,13 @@ QUEUED_WAYPOINTS: Final = 20
 class Due(Enum):
     """What is done with the current way-point at the next tick at which the function acts."""
 
-    SEND = auto()
-    """It is sent, as it is a new one."""
-    RESEND = auto()
-    """It is sent again, as it was not reached in time."""
-    LOOK = auto()
-    """Nothing is sent, but looked ahead again: control or the way-points have changed, or the last one is resumed."""
+    SEND = "it is sent, as it is a new one"
+    RESEND = "it is sent again, as it was not reached in time"
+    LOOK = "nothing is sent, but looked ahead: the way-points have changed, or the last one is resumed"
+    LOOK_ON = "nothing is sent, but looked ahead from the next tick on"
+
+
+_SENDS: Final = (Due.SEND, Due.RESEND)
 
 
 @dataclass(eq=False)
@@ -38,15 +38,15 @@ class WaypointFunction(FunctionNode):
     """Base of functions that generate way-points, each sent when the one before is reached.
 
     It ticks from `start_at` until `stop`, or until no way-point is left. Between two ticks at which it acts, the
-    vehicle flies through the way-points that were queued; then the last of them is reached (SEND), or one is not
-    reached in time (RESEND).
+    vehicle flies through the way-points that were queued.
     """
 
     sender: SetPointSender
+    other: WaypointFunction | None = field(default=None, init=False)  # that may fly the vehicle at the same time
     _check: ArrivalCheck | None = field(default=None, init=False)  # None before the first tick and after the last
     _due: Due = field(default=Due.SEND, init=False)
     _act_at: int = field(default=0, init=False)  # the next tick at which it acts
-    _arrivals: list[int] = field(default_factory=list, init=False)  # ticks that will find the queued ones reached
+    _sends: Sends = field(default_factory=list, init=False)  # what is queued, and what is due
     _resend_at: int = field(default=0, init=False)  # tick that sends the current way-point again if it is not reached
 
     def __post_init__(self) -> None:
@@ -76,9 +76,6 @@ class WaypointFunction(FunctionNode):
     def not_reached(self) -> None:
         """React to a way-point that was not reached in time, and will be sent again."""
 
-    def tick(self) -> None:
-        """React to a tick at which the function acts, before it does."""
-
     def completed(self) -> None:
         """React to the end of the way-points."""
 
@@ -86,7 +83,7 @@ class WaypointFunction(FunctionNode):
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
         """Start ticking at mission time t, and send the current way-point, unless the last one sent is resumed."""
-        self._due, self._arrivals, self._act_at = Due.LOOK if resumes else Due.SEND, [], 0
+        self._due, self._sends, self._act_at = Due.LOOK if resumes else Due.SEND, [], 0
         if t_s > self.env.now:
             self._alarm.set(t_s)
         else:
@@ -111,54 +108,76 @@ class WaypointFunction(FunctionNode):
         check = self._check
         if check is not None and self._act_at > (tick := check.last_tick_until(self.env.now)):
             self.sender.vehicle.cancel_waypoints(self.env.now, check)
-            self._arrivals, self._due = [], Due.LOOK
+            self._sends, self._due = [], Due.LOOK
             self._set_alarm(check, tick + 1)
 
-    def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
-        """Look ahead again at the next tick after somebody else changes control, which cancels queued way-points."""
-        if self._check is not None and self._check is not check and self._due is not Due.LOOK:
-            self.catch_up()
+    def _control_changed(self, row: int, sent_with: ArrivalCheck | None) -> None:
+        """Look ahead again after somebody else changes control, which has cancelled queued way-points."""
+        check = self._check
+        if check is None or check is sent_with or self._due is Due.LOOK:
+            return
+        self.catch_up()
+        tick = check.last_tick_until(self.env.now)
+        if sent_with is None:
             self.waypoints_changed()
+        elif self._act_at > tick:
+            self._due = Due.LOOK_ON
+            self._look_ahead(check, tick, most=0)  # the other one is not done yet
 
     def _act(self) -> None:
         """Do what is due at this tick, and look ahead to the next tick at which something is."""
         check = self._check = self._check or self.arrival_check(self.env.now)
         tick = self._act_at
         self._count_arrivals(tick)
-        self.tick()
         while self._check is not None and self._act_at == tick:
-            first = tick if self._due is Due.LOOK else tick + check.first_check_ticks
             if self._due is Due.SEND:
                 self._resend_at = tick + check.resend_ticks
             elif self._due is Due.RESEND:
                 self.not_reached()
                 self._resend_at = tick + check.resend_again_ticks
-            self._look_ahead(check, tick, first)
+            self._look_ahead(check, tick)
 
-    def _look_ahead(self, check: ArrivalCheck, tick: int, first: int) -> None:
+    def _look_ahead(self, check: ArrivalCheck, tick: int, most: int = QUEUED_WAYPOINTS) -> None:
         """Queue the way-points, the current one included if it is due, and see when they will be reached."""
-        waypoints = self.waypoints(1 + QUEUED_WAYPOINTS)
+        waypoints = self.waypoints(1 + most)
         if len(waypoints) == 0:
             self._check = None
             self.completed()
             return
-        z_m, send = self.set_point_z_m(), self._due is not Due.LOOK
-        self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=self._resend_at, send=send)
-        self._due = Due.SEND if self._arrivals[-1:] == [act_at] else Due.RESEND
+        send, until = self._due in _SENDS, self._undisturbed_until(check)
+        first = tick + (check.first_check_ticks if send else self._due is Due.LOOK_ON)
+        ticks, z_m = (first, self._resend_at, until), self.set_point_z_m()
+        self._sends, is_due = self.sender.queue(waypoints, z_m, check, ticks, most=most, send=send)
+        self._due, act_at = Due.LOOK_ON, until
+        if is_due:
+            act_at, is_reached, _ = self._sends[-1]
+            self._due = Due.SEND if is_reached else Due.RESEND
         if act_at > tick:
             self._set_alarm(check, act_at)
         else:
             self._act_at = tick
             self._count_arrivals(tick)
 
+    def _undisturbed_until(self, check: ArrivalCheck) -> int:
+        """Find the tick up to which it is worth looking ahead: then the other function sends a set-point of its own."""
+        other = self.other
+        if other is None or other._check is None:
+            return 10**9  # a tick after every mission's end
+        other.catch_up()
+        until_s = max(self.env.now, other._check.time_s(other._resend_at))
+        if self._due not in _SENDS:  # else the track changes from now on
+            until_s = max(until_s, self.sender.vehicle.computed_row * STEP_S)
+        return check.last_tick_until(until_s) + 1
+
     def _count_arrivals(self, tick: int) -> None:
-        reached = bisect_right(self._arrivals, tick)
-        if reached and self._check is not None:
-            self._resend_at = self._arrivals[reached - 1] + self._check.resend_ticks
-            del self._arrivals[:reached]
-            is_sent_separately = self._due is Due.SEND and not self._arrivals  # the set-point after the last one queued
-            self.sender.queued_were_sent(reached - is_sent_separately)
-            self.reached(reached)
+        past = [each for each in self._sends if each[0] <= tick]
+        if past:
+            del self._sends[: len(past)]
+            self._resend_at = past[-1][2]
+            is_sent_separately = self._due in _SENDS and not self._sends  # the last one is left to the function
+            self.sender.queued_were_sent(len(past) - is_sent_separately)
+            if count := sum([is_reached for _, is_reached, _ in past]):
+                self.reached(count)
 
     def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
         self._act_at = tick

@@ -17,7 +17,7 @@ from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
 from suave_des.domain import WATER_VISIBILITY, Task
 from suave_des.draws import Draws
-from suave_des.errors import InputError, MissionError, MissionTimeOut, SuaveDesError, did_you_mean, shown
+from suave_des.errors import InputError, MissionError, MissionTimeOut, SuaveDesError, shown
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.destinations import GenerateRechargePath, Surface
 from suave_des.managed.detection import PipelineDetector
@@ -45,7 +45,6 @@ from suave_des.vehicle.kernel import POSITION
 from suave_des.vehicle.model import Pose
 from suave_des.vehicle.vehicle import row_at
 
-_ARGUMENTS = ("scenario", "manager", "run", "seed", "record")
 CALLER = "caller"
 """Name, in the metrics, of a managing subsystem that is the program which advances the mission."""
 
@@ -108,7 +107,8 @@ class Mission:
             if isinstance(number, bool) or not isinstance(number, int) or number < 0:
                 raise InputError(f"{name}: {shown(number)} is not a number of a {name}", remedy="give a whole number")
         if replacements:
-            check_names("Mission", replacements, (*_ARGUMENTS, *Replacements.__annotations__))
+            own = "scenario", "manager", "run", "seed", "record"
+            check_names("Mission", replacements, (*own, *Replacements.__annotations__))
         if not isinstance(scenario, PreparedScenario):
             scenario = PreparedScenario(load_scenario(scenario, **replacements))
         self._prepared = prepared = scenario
@@ -208,12 +208,8 @@ class Mission:
         Raises:
             InputError: there is no such function or mode.
         """
-        known = self.modes
-        if function not in known:
-            raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, known))
-        if mode not in known[function]:
-            remedy = did_you_mean(mode, known[function], "its modes")
-            raise InputError(f"function {function} has no mode {shown(mode)}", remedy=remedy)
+        if mode not in self.mode_manager.available_modes(function):
+            raise self.mode_manager.refusal(function, mode)
 
     def result(self) -> MissionResult:
         """Run to the end, and return the metrics with the record, if one was kept."""
@@ -342,22 +338,24 @@ class Mission:
             return draws.stream(f"functions/{function}/{name}")
 
         recovery_s = draws.each_time("revision.recovery.delay_s", revision.recovery.delay_s)
-        nodes: dict[str, FunctionNode] = {
-            domain.MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._thrusters, recovery_s),
-            domain.GENERATE_SEARCH_PATH: GenerateSearchPath(
-                env,
-                sender(domain.GENERATE_SEARCH_PATH),
-                revision.spiral,
-                self._origin_m,
-                self._prepared.view_tangent,
-                draws.phase(domain.GENERATE_SEARCH_PATH, revision.spiral.tick_period_s),
-                draws.value("latencies.search_start_s"),
-            ),
-        }
-        self._follow = FollowPipeline(
+        search = GenerateSearchPath(
+            env,
+            sender(domain.GENERATE_SEARCH_PATH),
+            revision.spiral,
+            self._origin_m,
+            self._prepared.view_tangent,
+            draws.phase(domain.GENERATE_SEARCH_PATH, revision.spiral.tick_period_s),
+            draws.value("latencies.search_start_s"),
+        )
+        follow = FollowPipeline(
             env, sender(domain.FOLLOW_PIPELINE), revision.follow, self._prepared.path, self._detector
         )
-        nodes[domain.FOLLOW_PIPELINE] = self._follow
+        self._follow, search.other, follow.other = follow, follow, search
+        nodes: dict[str, FunctionNode] = {
+            domain.MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._thrusters, recovery_s),
+            domain.GENERATE_SEARCH_PATH: search,
+            domain.FOLLOW_PIPELINE: follow,
+        }
         if self._battery is not None and (station := described.battery) is not None:
             recharge = domain.GENERATE_RECHARGE_PATH
             phase_s = draws.phase(recharge, station.docking_check_period_s)
@@ -444,6 +442,7 @@ class Mission:
             if self._surface is not None and self._surface.surfaced_s is not None:
                 self._further.surfacing_time_s = self._surface.surfaced_s - self._draws.drawn["leak.time_s"]
             further = self._further.columns(metrics)
+        refusals = [str(self.mode_manager.refusal(*request)) for request in self.mode_manager.refused]
         return MissionResult(
             metrics,
             tuple(recorder.events),
@@ -451,7 +450,7 @@ class Mission:
             tuple(recorder.knowledge),
             self._draws.drawn,
             further,
-            (*self.mode_manager.refusals(), *(() if is_built_in(self._manager_name) else self._host.remarks())),
+            (*refusals, *(() if is_built_in(self._manager_name) else self._host.remarks())),
         )
 
     def _guarded(self, run: Callable[..., object], *arguments: object) -> None:

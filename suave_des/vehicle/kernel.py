@@ -310,49 +310,55 @@ def fly_waypoints(
     sent_as: tuple[float, float, float],
     half_box: tuple[float, float],
     timer: tuple[float, float, float],
-    window: tuple[int, int, int, int],
-    arrivals: IntArray,
-) -> tuple[int, int]:
-    """Fly through way-points: at each tick of a timer that finds one reached, the next becomes the set-point.
+    window: tuple[int, int, int, int, int, int],
+    sends: IntArray,
+) -> tuple[int, bool, int]:
+    """Fly through way-points: the tick of a timer that finds one reached, or not reached in time, sends a set-point.
 
     Args:
         track: as for `advance`.
         computed: last row that is filled.
         dynamics: as for `advance`; its set-point ends as the one that was given last.
-        waypoints: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
-            already.
+        waypoints: x, y and z in the first columns, m, shape (n, at least 3); the set-point of the first is given.
         sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.
         half_box: half the width and half the height of the box around a way-point in which it counts as reached, m.
         timer: time of tick 0, time between ticks, and time between rows, s.
-        window: first tick to check, last one for the first way-point, and fewest and most ticks from one to the next.
-        arrivals: shape (n,); receives the ticks that find way-points reached.
+        window: first tick to check, the one that sends the first way-point again, and last one to check; and how many
+            there are from sending one to its first check, to sending it again, and again (0: the caller does it).
+        sends: shape (m, 3); receives for each set-point its tick, whether that finds the way-point before reached, and
+            the tick that sends it again. The last that has room, the one after the last way-point, and one that the
+            caller sends again are not given.
 
     Returns:
-        The number of way-points reached, and the last row that is now filled. Ticks beyond the track do not count.
+        How many set-points there are; whether the last of them is left to the caller; and the last row of the track
+        that is now filled. Ticks beyond the track do not count.
     """
-    tick, last, fewest, most = window
-    set_point, reached, last_row = dynamics[1], 0, track.shape[0] - 1
-    while tick <= last and row_of(tick, timer) <= last_row:
-        row, box = row_of(tick, timer), (waypoints[reached, 0], waypoints[reached, 1], waypoints[reached, 2], *half_box)
+    tick, again, until, fewest, most, most_again = window
+    set_point, place, sent, last_row = dynamics[1], 0, 0, track.shape[0] - 1
+    while tick <= until and row_of(tick, timer) <= last_row:
+        row, box = row_of(tick, timer), (waypoints[place, 0], waypoints[place, 1], waypoints[place, 2], *half_box)
         if row > computed:
-            end = min(row_of(last, timer), last_row)
-            tick = advance(track, computed, end, dynamics, box, timer, tick)
-            if not 0 <= tick <= last:
-                computed = end
+            end = min(row_of(min(again, until), timer), last_row)
+            found = advance(track, computed, end, dynamics, box, timer, tick)
+            is_reached = 0 <= found <= min(again, until)
+            tick = found if is_reached else again
+            computed = row_of(tick, timer) if is_reached else end
+            if tick > until or row_of(tick, timer) > last_row:
                 break
-            row = computed = row_of(tick, timer)
-        elif not is_in_box(track, row, box):
-            tick += 1
-            continue
-        arrivals[reached] = tick
-        reached += 1
-        if reached == waypoints.shape[0]:
-            break
-        set_point[0] = waypoints[reached, 0] + sent_as[0]
-        set_point[1] = waypoints[reached, 1] + sent_as[1]
+        else:
+            is_reached = is_in_box(track, row, box)
+            if not is_reached and tick < again:
+                tick += 1
+                continue
+        place += is_reached
+        again = tick + (most if is_reached else most_again)
+        sends[sent] = tick, int(is_reached), again
+        sent += 1
+        if place == waypoints.shape[0] or sent == sends.shape[0] or again == tick:
+            return sent, True, computed
+        set_point[0], set_point[1] = waypoints[place, 0] + sent_as[0], waypoints[place, 1] + sent_as[1]
         set_point[2] = sent_as[2]
         set_point[NUMBER] += 1.0
-        computed = row  # rows beyond it were flown to another set-point
-        last = tick + most
+        computed = row_of(tick, timer)  # rows beyond it were flown to another set-point
         tick += fewest
-    return reached, computed
+    return sent, False, computed

@@ -34,6 +34,7 @@ class ArrivalCheck:
         first_check_ticks: from the tick that finds a way-point reached to the first check of the next one.
         resend_ticks: from the tick that sends a way-point's set-point to the one that sends it again.
         resend_again_ticks: the same, once it has been sent again.
+        resends_unchanged: whether a way-point is sent again just as it was.
     """
 
     start_s: float
@@ -43,6 +44,7 @@ class ArrivalCheck:
     first_check_ticks: int
     resend_ticks: int
     resend_again_ticks: int
+    resends_unchanged: bool
 
     def time_s(self, tick: int) -> float:
         """Return the time of a tick."""
@@ -54,18 +56,24 @@ class ArrivalCheck:
         return tick if self.time_s(tick) <= t_s else tick - 1
 
 
+Ticks = tuple[int, int, int]
+"""The first tick that checks a way-point, the one that sends it again if it is not reached, and the last to look at."""
+Sends = list[list[int]]
+"""Set-points to be sent: tick, whether that finds a way-point reached (1) or not in time, tick that sends it again."""
+
+
 class _Queue(NamedTuple):
-    """Queued set-points: `before` is in force until way-points 1, 2, ... are sent, each at a tick of the check."""
+    """Queued set-points: `before` is in force until the first of them is sent."""
 
     check: ArrivalCheck
-    ticks: list[int]
+    sends: Sends
     before: Array
     waypoints: Array
     sent_as_m: Point
 
     def sent_until(self, t_s: float) -> int:
         """Count the set-points that have been sent by time t."""
-        return bisect_right(self.ticks, self.check.last_tick_until(t_s))
+        return bisect_right(self.sends, [self.check.last_tick_until(t_s) + 1])
 
 
 @dataclass(eq=False)
@@ -143,53 +151,63 @@ class Vehicle:
             return
         self._cancel_after(t_s)
         limit_n = self.model.thrust_limit_n if state == "works" else 0.0
-        thrust_n = self._thrust(thruster) if state == "frozen" else 0.0
+        thrust_n = 0.0
+        if state == "frozen":  # the next step tells what it gives
+            rows = np.repeat(self.track[[self.computed_row]], 2, axis=0)
+            kernel.advance(rows, 0, 1, self._dynamics, *kernel.UNCHECKED)
+            thrust_n = float(self._thrust_n[thruster - 1, kernel.LAST])
         self.thrusters[thruster - 1] = state
         self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
         self._notify(t_s)
 
     def queue_waypoints(
-        self, t_s: float, waypoints: Array, sent_as_m: Point, check: ArrivalCheck, *, first: int, last: int, send: bool
-    ) -> tuple[list[int], int]:
-        """Look ahead, and queue set-points: at the tick that finds a way-point reached, the next one is commanded.
+        self,
+        t_s: float,
+        waypoints: Array,
+        sent_as_m: Point,
+        check: ArrivalCheck,
+        ticks: Ticks,
+        *,
+        most: int,
+        send: bool,
+    ) -> tuple[Sends, bool]:
+        """Look ahead, and queue set-points: the tick that finds a way-point reached commands the next one.
 
-        A change of control cancels the set-points that are still queued then. While there are any, none is added, and
-        only the first way-point is looked at.
+        One that is not reached in time is commanded again, if the check says that it is the same then. A change of
+        control cancels the set-points that are still queued then. While there are any, none is added.
 
         Args:
             t_s: mission time.
             waypoints: positions to reach: x, y, z in the first three columns, m, shape (n, at least 3).
             sent_as_m: offset added to a way-point's x and y in its set-point, and the set-points' z.
             check: the ticks, and the box in which a way-point counts as reached.
-            first: first tick to check.
-            last: last tick to check for the first way-point; ticks after the mission's end do not count.
+            ticks: for the first way-point; those after the mission's end do not count.
+            most: how many set-points are queued at most.
             send: whether to command the first way-point's set-point now; otherwise it is already commanded.
 
         Returns:
-            The ticks at which way-points will be found reached if control does not change; and the tick at which the
-            caller has to act: the last way-point is reached then, or one is not reached in time.
+            The set-points as they will be sent if control does not change; and whether the last of them is left to the
+            caller: it is one too many, leads to none of the way-points, or is not the same as before.
         """
         sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.altitude_error_m
         if send:
             self._cancel_after(t_s)
             self._replace_set_point(waypoints, 0, sent_as_m, new=1)
-        elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.ticks):
-            waypoints = waypoints[:1]
-        count, before = len(waypoints), self._set_point.copy()
+        elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.sends):
+            most = 0
+        before, sends = self._set_point.copy(), np.empty((most + 1, 3), dtype=np.int64)
         box, timer = (check.half_width_m, check.half_height_m), (check.start_s, check.period_s, STEP_S)
-        window, ticks = (first, last, check.first_check_ticks, check.resend_ticks), np.empty(count, dtype=np.int64)
-        reached, self.computed_row = kernel.fly_waypoints(
-            self.track, self.computed_row, self._dynamics, waypoints, sent_as_m, box, timer, window, ticks
+        window = *ticks, check.first_check_ticks, check.resend_ticks, check.resend_again_ticks * check.resends_unchanged
+        count, is_due, self.computed_row = kernel.fly_waypoints(
+            self.track, self.computed_row, self._dynamics, waypoints, sent_as_m, box, timer, window, sends
         )
-        arrivals: list[int] = ticks[:reached].tolist()
-        is_queued = reached > 0 and count > 1
-        if is_queued:
-            self._queue = _Queue(check, arrivals[: count - 1], before, waypoints, sent_as_m)
-        if is_queued or send:
+        found: Sends = sends[:count].tolist()
+        queued = found[: count - is_due]
+        if queued:
+            self._queue = _Queue(check, queued, before, waypoints, sent_as_m)
+        if queued or send:
             self._notify(t_s, check)
-        if reached == count:
-            return arrivals, arrivals[-1]
-        return arrivals, arrivals[-1] + check.resend_ticks if arrivals else last
+        return found, is_due
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
         """Cancel the set-points after time t that were queued with a check, if any remain."""
@@ -224,11 +242,6 @@ class Vehicle:
         self.look_ahead(row)
         return row
 
-    def _thrust(self, thruster: int) -> float:
-        """Find the thrust that a thruster gives after the last row that is filled, N."""
-        kernel.advance(np.repeat(self.track[[self.computed_row]], 2, axis=0), 0, 1, self._dynamics, *kernel.UNCHECKED)
-        return float(self._thrust_n[thruster - 1, kernel.LAST])
-
     def _replace_set_point(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
         set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m
         set_point[0], set_point[1] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m
@@ -242,7 +255,8 @@ class Vehicle:
         if queue is not None:
             self._set_point[:] = queue.before
             if sent := queue.sent_until(t_s):
-                self._replace_set_point(queue.waypoints, sent, queue.sent_as_m, new=sent)
+                place = sum([is_reached for _, is_reached, _ in queue.sends[:sent]])
+                self._replace_set_point(queue.waypoints, place, queue.sent_as_m, new=sent)
 
     def _notify(self, t_s: float, check: ArrivalCheck | None = None) -> None:
         row = row_at(t_s)

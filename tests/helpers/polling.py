@@ -29,7 +29,6 @@ def tick(self: WaypointFunction) -> None:
     """Act at each tick: send what is due, and see whether the current way-point is reached now."""
     check = self._check = self._check or self.arrival_check(self.env.now)
     now = self._act_at
-    self.tick()
     while True:
         if not len(self.waypoints(1)):
             self._check = None

@@ -14,7 +14,7 @@ from suave_des.scenario.modes import Mode
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle import kernel
 from suave_des.vehicle.model import GRAVITY_M_PER_S2
-from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener, Vehicle, row_at
+from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener, Sends, Ticks, Vehicle, row_at
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -54,11 +54,11 @@ class PlacedVehicle:
         waypoints: Array,
         sent_as_m: tuple[float, float, float],
         check: ArrivalCheck,
+        ticks: Ticks,
         *,
-        first: int,
-        last: int,
+        most: int,
         send: bool,
-    ) -> tuple[list[int], int]:
+    ) -> tuple[Sends, bool]:
         """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
         if send:
             x_m, y_m, z_m = sent_as_m
@@ -66,11 +66,12 @@ class PlacedVehicle:
             self.command(t_s, waypoints.item(0, 0) + x_m, waypoints.item(0, 1) + y_m, z_m)
             self.sends = None
         half_widths_m = (check.half_width_m, check.half_width_m, check.half_height_m)
-        for tick in range(first, last + 1):
+        first, again, _ = ticks
+        for tick in range(first, again + 1):
             errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
             if all(error_m <= half_m for error_m, half_m in zip(errors_m, half_widths_m, strict=True)):
-                return [tick], tick
-        return [], last
+                return [[tick, 1, tick + check.resend_ticks]], True
+        return [[again, 0, again]], True
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
         """Do nothing: no set-point is ever queued."""

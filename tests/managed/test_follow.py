@@ -222,10 +222,10 @@ def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[flo
     follow = follow_of(env, name, vehicle)
     queue_waypoints, acting_s = vehicle.queue_waypoints, []
 
-    def queue(t_s, waypoints, sent_as_m, check, **others):
-        reached, act_at = queue_waypoints(t_s, waypoints, sent_as_m, check, **others)
-        acting_s.append(check.time_s(act_at))
-        return reached, act_at
+    def queue(t_s, waypoints, sent_as_m, check, ticks, **others):
+        sends, is_due = queue_waypoints(t_s, waypoints, sent_as_m, check, ticks, **others)
+        acting_s.append(check.time_s(sends[-1][0]))
+        return sends, is_due
 
     vehicle.queue_waypoints = queue
     if changed_s is not None:

@@ -6,11 +6,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from suave_des.managing.simple import Threshold
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.polling import each_pair, effects, polled
 
 MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
+
+
+class SearchesOn(Threshold):
+    """Leaves the search on, at changing altitudes, while the pipeline is followed: two functions send set-points."""
+
+    def __init__(self, system):
+        super().__init__(system)
+        self._heights = system.stream("heights")
+
+    def task_cancelled(self, task):
+        """End nothing."""
+
+    def adapt(self):
+        super().adapt()
+        if self.system.task is not None and self.system.task.name == "inspect_pipeline":
+            self.system.change_mode("f_generate_search_path", self._heights.choice(self.search_modes))
+
+
 LOADED = {name: load_scenario(name) for name in ("seams2023", "planta_exp1", "release15")}
 
 
@@ -62,7 +81,7 @@ def simulator(name: str, condition: str) -> Simulator:
     return Simulator(with_values(LOADED[name], CONDITIONS[condition]))
 
 
-def assert_same(simulator: Simulator, manager: str, run: int) -> None:
+def assert_same(simulator: Simulator, manager: str | type[Threshold], run: int) -> None:
     """Recorded and not, a mission is the one in which everything is polled."""
     with polled():
         plain = simulator.run(manager, run, 1, record=True)
@@ -85,7 +104,7 @@ def test_looking_ahead_changes_nothing(name, condition, manager):
 
 @given(
     name=st.sampled_from(["release15", "seams2023"]),  # their visibility has a period
-    manager=st.sampled_from(MANAGERS),
+    manager=st.sampled_from([*MANAGERS, SearchesOn]),
     run=st.integers(1, 10**6),
     loss=st.sampled_from([0.0, 0.0, 0.1, 0.6]),
     period_s=st.floats(10.0, 120.0),
@@ -95,7 +114,7 @@ def test_looking_ahead_changes_nothing(name, condition, manager):
     error_m=st.floats(-0.2, 1.0),
     slower=st.floats(0.0, 1.0),
 )
-@settings(max_examples=10)
+@settings(max_examples=12)
 def test_looking_ahead_changes_nothing_whatever_the_scenario(
     name, manager, run, loss, period_s, latency_s, failures_s, poll_s, error_m, slower
 ):
