@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.managing.simple import Threshold
+from suave_des.managing.simple import RandomManager
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.polling import each_pair, effects, polled
@@ -14,20 +14,14 @@ from tests.helpers.polling import each_pair, effects, polled
 MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
 
 
-class SearchesOn(Threshold):
-    """Leaves the search on, at changing altitudes, while the pipeline is followed: two functions send set-points."""
+class Restless(RandomManager):
+    """Picks modes of both functions at all times: often both send set-points."""
 
     def __init__(self, system):
         super().__init__(system)
-        self._heights = system.stream("heights")
+        self._functions = ("f_generate_search_path", "f_follow_pipeline")
 
-    def task_cancelled(self, task):
-        """End nothing."""
-
-    def adapt(self):
-        super().adapt()
-        if self.system.task is not None and self.system.task.name == "inspect_pipeline":
-            self.system.change_mode("f_generate_search_path", self._heights.choice(self.search_modes))
+    task_requested = task_cancelled = diagnostic = lambda self, _: None
 
 
 LOADED = {name: load_scenario(name) for name in ("seams2023", "planta_exp1", "release15")}
@@ -81,7 +75,7 @@ def simulator(name: str, condition: str) -> Simulator:
     return Simulator(with_values(LOADED[name], CONDITIONS[condition]))
 
 
-def assert_same(simulator: Simulator, manager: str | type[Threshold], run: int) -> None:
+def assert_same(simulator: Simulator, manager: str | type[RandomManager], run: int) -> None:
     """Recorded and not, a mission is the one in which everything is polled."""
     with polled():
         plain = simulator.run(manager, run, 1, record=True)
@@ -104,7 +98,7 @@ def test_looking_ahead_changes_nothing(name, condition, manager):
 
 @given(
     name=st.sampled_from(["release15", "seams2023"]),  # their visibility has a period
-    manager=st.sampled_from([*MANAGERS, SearchesOn]),
+    manager=st.sampled_from([*MANAGERS, Restless]),
     run=st.integers(1, 10**6),
     loss=st.sampled_from([0.0, 0.0, 0.1, 0.6]),
     period_s=st.floats(10.0, 120.0),
