@@ -108,9 +108,8 @@ def each_pair(fewest: Iterable[Any], second: Iterable[Any], third: Iterable[Any]
         second: levels of another factor; all its pairs with the third are there.
         third: levels of the last.
     """
-    rotated = list(fewest)
-    cells = []
-    for (i, one), (j, two), (k, three) in product(enumerate(rotated), enumerate(second), enumerate(third)):
-        is_quick = i == (j + k) % len(rotated)
-        cells.append(pytest.param(one, two, three, marks=() if is_quick else pytest.mark.slow))
-    return cells
+    levels = [list(enumerate(each)) for each in (fewest, second, third)]
+    return [
+        pytest.param(one, two, three, marks=() if i == (j + k) % len(levels[0]) else pytest.mark.slow)
+        for (i, one), (j, two), (k, three) in product(*levels)
+    ]

@@ -6,7 +6,6 @@ from functools import cache
 
 import simpy
 
-from suave_des.compiling import Array
 from suave_des.managed.node import SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Revision
@@ -14,7 +13,7 @@ from suave_des.scenario.modes import Mode
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle import kernel
 from suave_des.vehicle.model import GRAVITY_M_PER_S2
-from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener, Sends, Ticks, Vehicle, row_at
+from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener, Vehicle, row_at
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -48,30 +47,16 @@ class PlacedVehicle:
     def position(self, t_s: float) -> Place:
         return self.place
 
-    def queue_waypoints(
-        self,
-        t_s: float,
-        waypoints: Array,
-        sent_as_m: tuple[float, float, float],
-        check: ArrivalCheck,
-        ticks: Ticks,
-        *,
-        most: int,
-        send: bool,
-    ) -> tuple[Sends, bool]:
+    def queue_waypoints(self, t_s, waypoints, sent_as_m, check, ticks, *, most, send):
         """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
         if send:
-            x_m, y_m, z_m = sent_as_m
             self.sends = check
-            self.command(t_s, waypoints.item(0, 0) + x_m, waypoints.item(0, 1) + y_m, z_m)
+            self.command(t_s, *(waypoints[0, :2] + sent_as_m[:2]).tolist(), sent_as_m[2])
             self.sends = None
-        half_widths_m = (check.half_width_m, check.half_width_m, check.half_height_m)
-        first, again, _ = ticks
-        for tick in range(first, again + 1):
-            errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
-            if all(error_m <= half_m for error_m, half_m in zip(errors_m, half_widths_m, strict=True)):
-                return [[tick, 1, tick + check.resend_ticks]], True
-        return [[again, 0, again]], True
+        (first, again, _), halves_m = ticks, (check.half_width_m, check.half_width_m, check.half_height_m)
+        errors_m = [abs(a - b) for a, b in zip(self.place, waypoints[0, :3], strict=True)]
+        is_reached = all(error_m <= half_m for error_m, half_m in zip(errors_m, halves_m, strict=True))
+        return [[first, 1, first + check.resend_ticks] if is_reached else [again, 0, again]], True
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
         """Do nothing: no set-point is ever queued."""

@@ -122,3 +122,9 @@ def test_looking_ahead_changes_nothing_whatever_the_scenario(
         **faults(*((1 + number, "failure", t_s) for number, t_s in enumerate(failures_s))),
     }
     assert_same(Simulator(with_values(LOADED[name], values)), manager, run)
+
+
+@pytest.mark.parametrize("name", sorted(LOADED))
+def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(name):
+    for run in range(1, 21):
+        assert_same(simulator(name, "all of it"), Restless, run)
