@@ -54,9 +54,11 @@ class PlacedVehicle:
             self.command(t_s, *(waypoints[0, :2] + sent_as_m[:2]).tolist(), sent_as_m[2])
             self.sends = None
         (first, again, _), halves_m = ticks, (check.half_width_m, check.half_width_m, check.half_height_m)
-        errors_m = [abs(a - b) for a, b in zip(self.place, waypoints[0, :3], strict=True)]
-        is_reached = all(error_m <= half_m for error_m, half_m in zip(errors_m, halves_m, strict=True))
-        return [[first, 1, first + check.resend_ticks] if is_reached else [again, 0, again]], True
+        for tick in range(first, again + 1):
+            errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
+            if all(error_m <= half_m for error_m, half_m in zip(errors_m, halves_m, strict=True)):
+                return [[tick, 1, tick + check.resend_ticks]], True
+        return [[again, 0, again]], True
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
         """Do nothing: no set-point is ever queued."""
