@@ -6,7 +6,7 @@ import itertools
 from collections import Counter
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.errors import number_of
 from suave_des.kb.space import (
@@ -159,22 +159,15 @@ def _in_words(reports: Reports, space: PolicySpace) -> str:
     return " + ".join(parts) or "no report"
 
 
-class FunctionTable(NamedTuple):
-    """What happens to one function's grounding, over everything that has an effect on it.
-
-    Attributes:
-        table: as `kb policy` prints it; the last measured attribute goes across, all else down.
-        down: number of its columns that say what the case is; the others have outcomes.
-        across: the measured attribute that goes across; empty without one.
-    """
-
-    table: Table
-    down: int
-    across: str
+#: A table; the number of its columns that say what the case is; the measured attribute that goes across, or "".
+FunctionTable = tuple[Table, int, str]
 
 
 def function_table(policy: Policy, function: str) -> FunctionTable:
-    """Tabulate one function, without the dimensions on which it does not depend."""
+    """Tabulate what happens to one function's grounding, without the dimensions on which it does not depend.
+
+    The last measured attribute goes across, all else down.
+    """
     own, groundings = f"{function}_now", [f"{name}_now" for name in policy.functions]
     cases: Any = policy.cases[policy.cases[own] != ""].copy()
     flips = [f" ({FLIP_FLOP})" if function in flipping else "" for flipping in cases["flipping"]]
@@ -213,7 +206,7 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
     what = f", by measured {', '.join(attributes)}" if attributes else ""
     outcomes = [words for _, words in across] or ["then"]
     table = Table([*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes)))
-    return FunctionTable(table, len(headings), attributes[-1] if attributes else "")
+    return table, len(headings), attributes[-1] if attributes else ""
 
 
 def _spans(number: int, places: int, rows: Iterable[dict[tuple[int, ...], str]]) -> list[tuple[int, int]]:

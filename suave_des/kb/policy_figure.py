@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from suave_des.errors import InputError
-from suave_des.kb.policy import FLIP_FLOP, FunctionTable, Policy, function_table
+from suave_des.kb.policy import FLIP_FLOP, Policy, function_table
 from suave_des.kb.space import INCONSISTENT
 from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, STAYS
 from suave_des.results.figures import check_picture, write_picture
 from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publication
+from suave_des.tables import Table
 
 #: Units of measured values; those of a user's own attributes are not known.
 _UNITS: Final = {"water_visibility": "m", "battery_level": "share of a full battery"}
@@ -33,25 +34,25 @@ def draw_policy(policy: Policy, path: Path) -> None:
     """
     check_picture(path)
     found = {name: function_table(policy, name) for name in policy.functions}
-    outcomes = {name: {*chain(*(row[each.down :] for row in each.table.rows))} for name, each in found.items()}
+    outcomes = {name: {*chain(*(row[down:] for row in table.rows))} for name, (table, down, _) in found.items()}
     drawn = {name: each for name, each in found.items() if len(outcomes[name] - {STAYS}) > 1}
     if not drawn:
         raise InputError("no function has a choice to draw")
-    rows = [len(each.table.rows) for each in drawn.values()]
+    rows = [len(table.rows) for table, _, _ in drawn.values()]
     if sum(rows) > _MOST_ROWS:
         raise InputError(f"there are more than {_MOST_ROWS} rows to draw", remedy="lower --max-failed, or use --csv")
     import matplotlib.pyplot as plt
     from matplotlib.patches import Patch
 
     with publication():
-        names = {_then(row[0], cell) for each in drawn.values() for row in each.table.rows for cell in row[each.down :]}
+        names = {_then(row[0], each) for table, down, _ in drawn.values() for row in table.rows for each in row[down:]}
         colours, heights = _colours(names), [number + 4.0 for number in rows]
         size = WIDTH_IN, _ROW_IN * sum(heights) + 0.6
         figure, grid = plt.subplots(
             len(drawn), figsize=size, height_ratios=heights, squeeze=False, layout="constrained"
         )
-        for axes, (name, table) in zip(grid.flat, drawn.items(), strict=True):
-            _draw(axes, table, colours)
+        for axes, (name, each) in zip(grid.flat, drawn.items(), strict=True):
+            _draw(axes, *each, colours)
             axes.set_title(name, loc="left")
         handles = [
             Patch(facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name))
@@ -70,34 +71,33 @@ def _then(now: str, outcome: str) -> str:
     return outcome.replace(STAYS, now, 1).partition(" (")[0]
 
 
-def _draw(axes: Any, table: FunctionTable, colours: dict[str, str]) -> None:
+def _draw(axes: Any, table: Table, down: int, across: str, colours: dict[str, str]) -> None:
     import numpy as np
     from matplotlib.colors import ListedColormap
 
-    names, rows = list(colours), sorted(table.table.rows, key=lambda row: _low_to_high(row[0]))
-    numbers = np.array([[names.index(_then(row[0], cell)) for cell in row[table.down :]] for row in rows])
+    names, rows = list(colours), sorted(table.rows, key=lambda row: _low_to_high(row[0]))
+    numbers = np.array([[names.index(_then(row[0], cell)) for cell in row[down:]] for row in rows])
     cells = {"cmap": ListedColormap(list(colours.values())), "vmin": -0.5, "vmax": len(names) - 0.5}
     axes.pcolormesh(numbers, edgecolors="white", linewidth=0.5, **cells)
-    flips = np.array([[FLIP_FLOP in cell for cell in row[table.down :]] for row in rows])
+    flips = np.array([[FLIP_FLOP in cell for cell in row[down:]] for row in rows])
     if flips.any():
         axes.pcolor(np.ma.masked_where(~flips, numbers), hatch="////", alpha=0.0)
-    axes.set_yticks(np.arange(len(rows)) + 0.5, _labels(table, rows))
+    axes.set_yticks(np.arange(len(rows)) + 0.5, _labels(table.headings[1:down], [row[:down] for row in rows]))
     axes.set_xticks([])
-    if table.across:
-        axes.set_xticks(np.arange(numbers.shape[1]) + 0.5, map(_range, table.table.headings[table.down :]))
-        unit = _UNITS.get(table.across)
-        axes.set_xlabel(f"measured {table.across.replace('_', ' ')}" + (f", {unit}" if unit else ""))
+    if across:
+        axes.set_xticks(np.arange(numbers.shape[1]) + 0.5, map(_range, table.headings[down:]))
+        unit = _UNITS.get(across)
+        axes.set_xlabel(f"measured {across.replace('_', ' ')}" + (f", {unit}" if unit else ""))
     axes.invert_yaxis()
     axes.grid(False)
     axes.tick_params(length=0)
 
 
-def _labels(table: FunctionTable, rows: list[Sequence[str]]) -> list[str]:
+def _labels(headings: Sequence[str], rows: list[Sequence[str]]) -> list[str]:
     """The design in use now, and below it what else the outcome depends on, shortened."""
-    headings = table.table.headings[1 : table.down]
-    reports = {report for row in rows for text in row[1 : table.down] for report in text.split(", ")}
+    reports = {report for row in rows for text in row[1:] for report in text.split(", ")}
     labels = []
-    for now, *others in (row[: table.down] for row in rows):
+    for now, *others in rows:
         words = [
             f"{heading} {_range(text)}"
             if heading != "components"

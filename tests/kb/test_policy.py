@@ -93,7 +93,7 @@ class TestPolicy:
             assert "; ".join(sorted(reasoning.inference.statuses)) == case["statuses"]
 
     def test_the_search_table_has_the_deployed_thresholds(self, policy):
-        table = function_table(policy, SEARCH).table
+        table, _, _ = function_table(policy, SEARCH)
         ranges = ["not measured", "< 1.25", "1.25 <= . < 2.25", "2.25 <= . < 3.25", ">= 3.25"]
         assert table.headings == ["now", "components", *ranges]
         (from_high,) = {tuple(row[2:]) for row in table.rows if row[0] == "fd_spiral_high" and "no report" in row[1]}
@@ -123,7 +123,7 @@ class TestPolicy:
         flipping = found.marked("flip-flop")
         assert set(flipping[f"{MOTION}_now"]) == {"fd_all_thrusters", "fd_recover_thrusters"}
         assert set(flipping["flipping"]) == {(MOTION,)}
-        motion, search = (function_table(found, name).table.text() for name in (MOTION, SEARCH))
+        motion, search = (function_table(found, name)[0].text() for name in (MOTION, SEARCH))
         assert "(flip-flop)" in motion and "flip-flop" not in search
 
     def test_a_rule_that_computes_takes_the_proof_away(self, tmp_path):

@@ -91,7 +91,7 @@ def policy(
     if csv is not None:
         write_files(csv.parent, {csv.name: found.csv()})
     for name in found.functions:
-        print(shown(function_table(found, name).table))
+        print(shown(function_table(found, name)[0]))
     print(*found.lines(), sep="\n")
 
 
