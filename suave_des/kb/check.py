@@ -27,8 +27,6 @@ from suave_des.knowledge.state import KnowledgeState, ObjectiveState, measuremen
 from suave_des.monitor.diagnostics import RECOVERED
 from suave_des.resources import shipped_folder
 
-__all__ = ["MAX_STATES", "Subject", "check", "states_to_ask"]
-
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")

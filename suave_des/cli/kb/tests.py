@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.kb.rule_tests import RuleTest, Tested, TestResult
     from suave_des.knowledge.state import KnowledgeState
+
+    Suite = tuple[Tested, KnowledgeBase, list[RuleTest]]
 
 FAILED = 1
 """Exit status when a test fails."""
@@ -72,14 +74,6 @@ class MutationOptions:
         list[str] | None, typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable.")
     ] = None
     max_failed: MaxFailed = 1
-
-
-class Suite(NamedTuple):
-    """A knowledge base with all tests about it."""
-
-    about: Tested
-    knowledge: KnowledgeBase
-    tests: list[RuleTest]
 
 
 def test(
@@ -156,15 +150,16 @@ def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> Non
 
 
 def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
-    """Read all files before anything runs, so that a mistake in the last one comes first."""
+    """Each knowledge base with all tests about it; a mistake in the last file is told before anything runs."""
     from suave_des.kb.rule_tests import TestFile, shipped_tests
 
     suites: dict[str, Suite] = {}
     for file in [TestFile.read(path) for path in files or shipped_tests()]:
         about = options.apply(file.about)
         if str(about) not in suites:
-            suites[str(about)] = Suite(about, options.load(about), [])
-        suites[str(about)].tests.extend(file.tests(suites[str(about)].knowledge))
+            suites[str(about)] = about, options.load(about), []
+        _, knowledge, tests = suites[str(about)]
+        tests.extend(file.tests(knowledge))
     return list(suites.values())
 
 
@@ -173,9 +168,9 @@ def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[
     from suave_des.kb.rule_tests import run_test
 
     chosen = [
-        (suite.knowledge, test)
-        for suite in suites
-        for test in suite.tests
+        (knowledge, test)
+        for _, knowledge, tests in suites
+        for test in tests
         if select is None or select.lower() in test.name.lower()
     ]
     if not chosen:
@@ -253,8 +248,8 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
 def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
     from suave_des.kb.adequacy import mutants_of, mutate, mutation_lines, mutation_table, sample
 
-    for suite in suites:
-        found = mutants_of(suite.knowledge.base)
+    for _, knowledge, tests in suites:
+        found = mutants_of(knowledge.base)
         names, only = list(dict.fromkeys(mutant.name for mutant in found)), options.only or ()
         for name in only:
             if name not in names:
@@ -265,7 +260,7 @@ def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions)
             task = progress.add_task("mutants", total=len(chosen))
             advance = partial(progress.advance, task)
             began = time.perf_counter()
-            results, states = mutate(suite.knowledge, suite.tests, chosen, options.max_failed, advance)
+            results, states = mutate(knowledge, tests, chosen, options.max_failed, advance)
             duration_s = time.perf_counter() - began
         lines = mutation_lines(results, states, options.max_failed)
         print("", shown(mutation_table(results)).rstrip("\n"), *lines, sep="\n")
