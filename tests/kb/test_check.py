@@ -8,7 +8,8 @@ from decimal import Decimal
 import pytest
 
 from suave_des.errors import KnowledgeError, Level
-from suave_des.kb.check import Subject, check, states_to_ask
+from suave_des.kb.check import check, states_to_ask
+from suave_des.knowledge.checks import Subject
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.reasoner import regions_of
