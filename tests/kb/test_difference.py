@@ -57,8 +57,8 @@ def test_rules_count_with_their_text(tmp_path):
 
 
 def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other():
-    (search, _, *_) = compare_missions("seams2023", 1, {}, {"values": {"mission.time_limit_s": 20}}).metrics
-    _, pairs, difference, _ = search
+    found = compare_missions("seams2023", 1, {}, {"values": {"mission.time_limit_s": 20}})
+    _, pairs, difference, _ = found.metrics[0]
     one, other = pairs.loc[1]
     assert other <= 21 < one and difference.value == other - one
 
@@ -106,8 +106,7 @@ def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_mis
     after = before.assign(mean_reaction_time_s=[2.5, 3.0])
     found = paired(before, after)
     assert [metric.name for metric, *_ in found.metrics] == [*METRICS, "mean_reaction_time_s"]
-    _, _, difference, changed = found.metrics[2]
-    assert (difference.value, changed) == (0.5, 2)
+    assert (found.metrics[2][2].value, found.metrics[2][3]) == (0.5, 2)
 
 
 @pytest.mark.parametrize("change", ["inconsistent", "none left", "other statuses"])

@@ -124,8 +124,7 @@ class TestDecisions:
 
     def test_a_design_that_is_merely_worse_is_compared_with_the_best(self, knowledge):
         (decision,) = knowledge.explain(knowledge.state(), "why not fd_spiral_low?").decisions
-        answer = "fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
-        assert decision[0] == f"{SEARCH}: {answer}"
+        assert decision[0].endswith(": fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high")
 
     def test_nothing_to_adapt_is_said(self, knowledge):
         state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
