@@ -103,10 +103,7 @@ def effects(simulator: Simulator, manager: str, run: int, *, record: bool) -> tu
 def each_pair(fewest: Iterable[Any], second: Iterable[Any], third: Iterable[Any]) -> list[Any]:
     """Return all cells as parameters of a test, of which those are quick that have each pair of levels among them.
 
-    Args:
-        fewest: levels of the factor with fewest; its pairs with the others are all there, as its levels take turns.
-        second: levels of another factor; all its pairs with the third are there.
-        third: levels of the last.
+    `fewest` are the levels of the factor with fewest, which take turns.
     """
     levels = [list(enumerate(each)) for each in (fewest, second, third)]
     return [

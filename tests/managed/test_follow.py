@@ -3,6 +3,7 @@
 import math
 from itertools import pairwise
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -220,20 +221,13 @@ def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[flo
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(1.0, 0.3, -18.75, 0.0, 0.0, 0.0), 120.0)
     follow = follow_of(env, name, vehicle)
-    queue_waypoints, acting_s = vehicle.queue_waypoints, []
-
-    def queue(t_s, waypoints, sent_as_m, check, ticks, **others):
-        sends, is_due = queue_waypoints(t_s, waypoints, sent_as_m, check, ticks, **others)
-        acting_s.append(check.time_s(sends[-1][0]))
-        return sends, is_due
-
-    vehicle.queue_waypoints = queue
+    follow._alarm.set = alarm = mock.Mock(wraps=follow._alarm.set)
     if changed_s is not None:
         for state in ("dead", "works"):
             env.timeout(changed_s).callbacks.append(lambda _, state=state: vehicle.set_thruster(env.now, 1, state))
     follow.apply(ACTIVE)
     env.run(until=follow.finished)
-    return env.now, follow.distance_m, acting_s
+    return env.now, follow.distance_m, [call.args[0] for call in alarm.call_args_list]
 
 
 @BOTH
