@@ -352,7 +352,7 @@ def fly_waypoints(
                 continue
         place += is_reached
         again = tick + (most if is_reached else most_again)
-        sends[sent] = tick, int(is_reached), again
+        sends[sent, 0], sends[sent, 1], sends[sent, 2] = tick, is_reached, again
         sent += 1
         if place == waypoints.shape[0] or sent == sends.shape[0] or again == tick:
             return sent, True, computed
