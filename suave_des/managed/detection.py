@@ -47,6 +47,7 @@ class PipelineDetector:
 
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
+        self._bounds_m = tuple(self.points.min(axis=0).tolist()), tuple(self.points.max(axis=0).tolist())
         self._alarm = Alarm(self.env, self._ring)
         self.vehicle.control_listeners.append(self._control_changed)
         self._look_ahead(0)
@@ -62,9 +63,8 @@ class PipelineDetector:
             self._alarm.cancel()
             return
         self.vehicle.look_ahead(last)
-        seen_row, self._seen = first_detection(
-            self.vehicle.track, (row, last), STEP_S, self.visibility, self.points, self.view_tangent
-        )
+        seen = self.points, self._bounds_m, self.view_tangent
+        seen_row, self._seen = first_detection(self.vehicle.track, (row, last), STEP_S, self.visibility, *seen)
         if self._seen < 0:
             self._row = last
             self._alarm.set(last * STEP_S + _AFTER_CONTROL_S)

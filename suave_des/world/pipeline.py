@@ -47,6 +47,7 @@ def first_detection(
     row_s: float,
     visibility: tuple[Array, Array],
     points: Array,
+    bounds_m: tuple[tuple[float, float, float], tuple[float, float, float]],
     view_tangent: float,
 ) -> tuple[int, int]:
     """Find the first row from which a point is seen, and the point's index; (-1, -1) if none.
@@ -56,13 +57,11 @@ def first_detection(
         rows: the first and the last row that count.
         row_s: time between rows.
         visibility: measured water visibility: the times, s, ascending, of the values, m; none before the first one.
-        points: points as the detection places them, shape (n, 3), m.
+        points, bounds_m: points as the detection places them, shape (n, 3), m; the least and the greatest coordinates.
         view_tangent: tangent of half the camera's field of view.
     """
-    low_x, low_y, low_z = points[:, 0].min(), points[:, 1].min(), points[:, 2].min()
-    high_x, high_y, high_z = points[:, 0].max(), points[:, 1].max(), points[:, 2].max()
-    times_s, visibility_m = visibility
-    measured = 0
+    (low_x, low_y, low_z), (high_x, high_y, high_z) = bounds_m  # finding them here would take 2 s to compile
+    (times_s, visibility_m), measured = visibility, 0
     for row in range(rows[0], rows[1] + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
         # Far from the pipeline's bounding box no point can be in view: most rows of a search end here.

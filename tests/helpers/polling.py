@@ -101,10 +101,7 @@ def effects(simulator: Simulator, manager: str, run: int, *, record: bool) -> tu
 
 
 def each_pair(fewest: Iterable[Any], second: Iterable[Any], third: Iterable[Any]) -> list[Any]:
-    """Return all cells as parameters of a test, of which those are quick that have each pair of levels among them.
-
-    `fewest` are the levels of the factor with fewest, which take turns.
-    """
+    """Make all cells parameters of a test; quick are those in which the levels of the factor with fewest take turns."""
     levels = [list(enumerate(each)) for each in (fewest, second, third)]
     return [
         pytest.param(one, two, three, marks=() if i == (j + k) % len(levels[0]) else pytest.mark.slow)

@@ -10,6 +10,7 @@ from suave_des.world.pipeline import first_detection, first_point_in_view, sampl
 from suave_des.world.signals import sinusoid, step, table
 
 POINTS = sample_points(Pipeline().vertices_m)
+BOUNDS = tuple(POINTS.min(axis=0).tolist()), tuple(POINTS.max(axis=0).tolist())
 HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
 
 
@@ -73,13 +74,13 @@ def test_first_detection_is_the_first_row_with_a_point_in_view():
         for row, position in enumerate(track)
         if (point := first_point_in_view(*position, 3.0, POINTS, HALF_WIDTH_AT_1_M)) >= 0
     )
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == expected
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M) == expected
 
 
 def test_first_detection_waits_for_the_visibility():
     track = line_of_positions(0.0)
     visibility = np.array([3.0, 250.0]), np.array([1.0, 2.5])
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M)[0] == 250
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M)[0] == 250
 
 
 PAPER = sinusoid(80.0, 1.25, 3.75)
