@@ -14,6 +14,7 @@ from typing import Any
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _REPEAT_S = 0.05
 _received: list[int] = []
+_blocks: list[int] = []  # of signals_raised that have not ended: at most one
 _Handler = Callable[[int, FrameType | None], object]
 
 
@@ -33,7 +34,11 @@ def signals_raised() -> Iterator[None]:
         yield
         return
     with handled(not_ignored(), _stop), _repeated_if_lost():
-        yield
+        _blocks.append(1)
+        try:
+            yield
+        finally:
+            _blocks.pop()
 
 
 def not_ignored() -> list[int]:
@@ -125,6 +130,11 @@ def end_interrupted(number: int, frame: FrameType | None) -> None:
 def was_interrupted() -> bool:
     """Return whether a signal has asked this process to stop since signals_raised began."""
     return bool(_received)
+
+
+def is_stopping() -> bool:
+    """Return whether that was so in a block of signals_raised that has not ended."""
+    return bool(_received and _blocks)
 
 
 def exit_status() -> int:

@@ -19,7 +19,7 @@ from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, remove_results, write_files
-from suave_des.interrupts import Stopped, was_interrupted
+from suave_des.interrupts import Stopped, is_stopping
 from suave_des.records.metrics import COLUMNS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 
@@ -159,7 +159,6 @@ class Store:
         Whoever interprets its content does so in this, as there is no end to what a file from elsewhere can hold. An
         error after a signal asked to stop is no damage: it may be that of a module whose import the signal broke off.
         """
-        stopped_before = was_interrupted()
         try:
             yield
         except (SuaveDesError, MemoryError):
@@ -173,7 +172,7 @@ class Store:
                 raise StoreError(f"{self.path or 'temporary files'}: results cannot be kept: {error}") from None
             raise _damaged(self.path, error) from None
         except Exception as error:
-            if was_interrupted() and not stopped_before:
+            if is_stopping():
                 raise Stopped from error
             raise _damaged(self.path, error) from error
 

@@ -182,3 +182,11 @@ def test_an_error_that_the_signal_led_to_is_no_damage(scenario, tmp_path, monkey
     monkeypatch.setattr("suave_des.campaign.campaign.gather", broken_import)
     with signals_raised(), pytest.raises(KeyboardInterrupt, match=r"nothing is lost: .* --resume .* writes the files"):
         run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
+
+
+def test_nor_is_one_that_an_earlier_signal_led_to(tmp_path):
+    with signals_raised():
+        with pytest.raises(Stopped):
+            signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(Stopped), Store(tmp_path / STORE_FILE).reading():
+            raise AttributeError("module 'numpy' has no attribute 'dtype'")
