@@ -133,7 +133,7 @@ def was_interrupted() -> bool:
 
 
 def is_stopping() -> bool:
-    """Return whether that was so in a block of signals_raised that has not ended."""
+    """Return whether a signal has asked to stop in a block of signals_raised that has not ended."""
     return bool(_received and _blocks)
 
 
