@@ -111,6 +111,8 @@ class GenerateSearchPath(WaypointFunction):
         if self.altitude_m != self._last_altitude_m:
             self._step += 1
             self._last_altitude_m = self.altitude_m
+        elif self._ahead is not None and len(self._ahead) > count:
+            return self._ahead[:count]
         waypoints = np.empty((count + 1, 4))  # the last one is current when all others are reached
         form = self.revision.angle_step_rad, self.view_tangent
         if self._ahead is None:
