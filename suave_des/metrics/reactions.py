@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -63,11 +62,10 @@ class ReactionMeter:
         """The messages from which on another altitude fits than before."""
         measured, thresholds_m = self.visibility, self.settings.visibility_thresholds_m[::-1]
         altitudes_m = (None, *self.settings.expected_altitudes_m[::-1])
-        for t_s in measured.crossings_s(thresholds_m):
+        for t_s, region in zip(*measured.crossings(thresholds_m), strict=True):
             if t_s > self.env.now:
                 break
-            visibility_m = measured.values[measured.count_until(t_s) - 1]
-            yield t_s, _OpenEvents.expect, altitudes_m[bisect_right(thresholds_m, visibility_m)]
+            yield t_s, _OpenEvents.expect, altitudes_m[(region + 1) // 2]
 
     def _low_battery(self) -> Iterator[_Entry]:
         if self.battery is not None:

@@ -6,7 +6,7 @@ Managers look values up here; a monitor publishes them on the diagnostics bus on
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -32,14 +32,6 @@ Thresholds = tuple[float, ...]
 """Numbers, ascending, that measured values are compared with."""
 Loss = Callable[[float], bool]
 """Says whether a monitor's message at a mission time is lost."""
-
-
-def region_of(value: float, thresholds: Thresholds) -> int:
-    """Number the region of a value: two values are in one region if no comparison with a threshold tells them apart.
-
-    A threshold is a region of its own, as a rule may say `<` or `<=`. Use the numbers only to see whether they differ.
-    """
-    return bisect_left(thresholds, value) + bisect_right(thresholds, value)
 
 
 class Timing(NamedTuple):
@@ -91,7 +83,7 @@ class Measurements:
     times_s: list[float] = field(repr=False)
     values: list[float] = field(repr=False)
     arrays: tuple[Array, Array] = field(repr=False)
-    _crossings: dict[Thresholds, list[float]] = field(default_factory=dict, repr=False, init=False)
+    _crossings: dict[Thresholds, tuple[list[float], list[int]]] = field(default_factory=dict, repr=False, init=False)
 
     @classmethod
     def of(
@@ -131,22 +123,27 @@ class Measurements:
         published = self.count_until(t_s)
         return self.values[published - 1] if published and self.times_s[published - 1] >= since_s else None
 
+    def crossings(self, thresholds: Thresholds) -> tuple[list[float], list[int]]:
+        """Find the times at which a value in another region is published, the first one included, and the regions.
+
+        Two values are in one region if no comparison with a threshold tells them apart. Regions between thresholds have
+        even numbers, from 0; a threshold itself, as a rule may say `<` or `<=`, has the odd one between.
+        """
+        crossings = self._crossings.get(thresholds)
+        if crossings is None:
+            indices, regions = _crossings(self.arrays[1].tobytes(), thresholds)
+            crossings = self._crossings[thresholds] = [self.times_s[index] for index in indices], regions
+        return crossings
+
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         """Number the region of the value last published by mission time t; -1 if there is none."""
-        value = self.value(t_s)
-        return -1 if value is None else region_of(value, thresholds)
-
-    def crossings_s(self, thresholds: Thresholds) -> list[float]:
-        """Find the times at which a value in another region is published, that of the first value included."""
-        crossings_s = self._crossings.get(thresholds)
-        if crossings_s is None:
-            indices = _crossings(self.arrays[1].tobytes(), thresholds)
-            crossings_s = self._crossings[thresholds] = [self.times_s[index] for index in indices]
-        return crossings_s
+        crossings_s, regions = self.crossings(thresholds)
+        passed = bisect_right(crossings_s, t_s)
+        return regions[passed - 1] if passed else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         """Find the time of the first value after mission time t that is in another region, or inf."""
-        crossings_s = self.crossings_s(thresholds)
+        crossings_s, _ = self.crossings(thresholds)
         passed = bisect_right(crossings_s, t_s)
         return crossings_s[passed] if passed < len(crossings_s) else math.inf
 
@@ -256,9 +253,9 @@ def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, IntArray, list[floa
 
 
 @lru_cache(maxsize=64)
-def _crossings(values: bytes, thresholds: Thresholds) -> list[int]:
-    """Find the indices of values whose region differs from that of the one before, the first included."""
+def _crossings(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
+    """Find the indices of values whose region differs from that of the one before, the first included; and regions."""
     measured = np.frombuffer(values)
     regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
-    indices: list[int] = np.flatnonzero(np.diff(regions, prepend=-1)).tolist()
-    return indices
+    indices = np.flatnonzero(np.diff(regions, prepend=-1))
+    return indices.tolist(), regions[indices].tolist()

@@ -1,5 +1,6 @@
 """Managers as a user would write them, some of them with mistakes."""
 
+from bisect import bisect_left, bisect_right
 from dataclasses import replace
 from typing import ClassVar
 from weakref import WeakSet
@@ -9,7 +10,6 @@ from suave_des.knowledge.state import Plan
 from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
-from suave_des.monitor.measurements import region_of
 
 
 class Deliberate(ManagingSubsystem):
@@ -145,7 +145,8 @@ class TakesTime(EventTriggered):
 
     def adapt(self):
         super().adapt()
-        state = self.reports, region_of(self.system.measured("water_visibility") or 0.0, (2.0, 3.0))
+        visibility_m, edges_m = self.system.measured("water_visibility") or 0.0, (2.0, 3.0)
+        state = self.reports, bisect_left(edges_m, visibility_m) + bisect_right(edges_m, visibility_m)
         return None if state == self.handled else self._act(state)
 
     def _act(self, state):

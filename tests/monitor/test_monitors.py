@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from bisect import bisect_left, bisect_right
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing, region_of
+from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing
 from suave_des.monitor.thrusters import thruster_monitor
 from suave_des.scenario.models import ThrusterEvent
 from suave_des.world.signals import constant, sinusoid, step
@@ -99,10 +100,10 @@ LEVELS = st.sampled_from([0.5, 1.0, 1.5, 2.0]) | st.floats(0.0, 3.0)
 )
 def test_crossings_are_those_found_by_going_through_all_values(values, thresholds, t_s):
     measured = measurements(tuple(values))
-    regions = [region_of(value, thresholds) for value in values]
+    regions = [bisect_left(thresholds, value) + bisect_right(thresholds, value) for value in values]
     pairs = enumerate(itertools.pairwise([-1, *regions]), start=1)
     crossings = [(float(n), region) for n, (before, region) in pairs if region != before]
-    assert measured.crossings_s(thresholds) == [t_s for t_s, _ in crossings]
+    assert measured.crossings(thresholds) == tuple(map(list, zip(*crossings, strict=True)))
     passed = int(min(t_s, len(values)))
     assert measured.region(t_s, thresholds) == (regions[passed - 1] if passed else -1)
     assert measured.next_crossing_s(t_s, thresholds) == next((s for s, _ in crossings if s > t_s), math.inf)
