@@ -8,6 +8,7 @@ earlier, it counts what has been reached by then, and looks ahead again at the n
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -47,6 +48,7 @@ class WaypointFunction(FunctionNode):
     _due: Due = field(default=Due.SEND, init=False)
     _act_at: int = field(default=0, init=False)  # the next tick at which it acts
     _sends: Sends = field(default_factory=list, init=False)  # what is queued, and what is due
+    _counted: int = field(default=0, init=False)  # how many way-points of the last look ahead have been reached
     _resend_at: int = field(default=0, init=False)  # tick that sends the current way-point again if it is not reached
 
     def __post_init__(self) -> None:
@@ -148,10 +150,10 @@ class WaypointFunction(FunctionNode):
         first = tick + (check.first_check_ticks if send else self._due is Due.LOOK_ON)
         ticks, z_m = (first, self._resend_at, until), self.set_point_z_m()
         self._sends, is_due = self.sender.queue(waypoints, z_m, check, ticks, most=most, send=send)
-        self._due, act_at = Due.LOOK_ON, until
+        self._counted, self._due, act_at = 0, Due.LOOK_ON, until
         if is_due:
-            act_at, is_reached, _ = self._sends[-1]
-            self._due = Due.SEND if is_reached else Due.RESEND
+            *before, (act_at, reached, _) = self._sends
+            self._due = Due.SEND if reached > (before[-1][1] if before else 0) else Due.RESEND
         if act_at > tick:
             self._set_alarm(check, act_at)
         else:
@@ -170,14 +172,14 @@ class WaypointFunction(FunctionNode):
         return check.last_tick_until(until_s) + 1
 
     def _count_arrivals(self, tick: int) -> None:
-        past = [each for each in self._sends if each[0] <= tick]
-        if past:
-            del self._sends[: len(past)]
-            self._resend_at = past[-1][2]
+        if past := bisect_right(self._sends, [tick + 1]):
+            _, reached, self._resend_at = self._sends[past - 1]
+            del self._sends[:past]
             is_sent_separately = self._due in _SENDS and not self._sends  # the last one is left to the function
-            self.sender.queued_were_sent(len(past) - is_sent_separately)
-            if count := sum([is_reached for _, is_reached, _ in past]):
-                self.reached(count)
+            self.sender.queued_were_sent(past - is_sent_separately)
+            if reached > self._counted:
+                self.reached(reached - self._counted)
+                self._counted = reached
 
     def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
         self._act_at = tick

@@ -325,9 +325,9 @@ def fly_waypoints(
         timer: time of tick 0, time between ticks, and time between rows, s.
         window: first tick to check, the one that sends the first way-point again, and last one to check; and how many
             there are from sending one to its first check, to sending it again, and again (0: the caller does it).
-        sends: shape (m, 3); receives for each set-point its tick, whether that finds the way-point before reached, and
-            the tick that sends it again. The last that has room, the one after the last way-point, and one that the
-            caller sends again are not given.
+        sends: shape (m, 3); receives for each set-point its tick, how many way-points are reached by then, and the tick
+            that sends it again. The last that has room, the one after the last way-point, and one that the caller sends
+            again are not given.
 
     Returns:
         How many set-points there are; whether the last of them is left to the caller; and the last row of the track
@@ -352,7 +352,7 @@ def fly_waypoints(
                 continue
         place += is_reached
         again = tick + (most if is_reached else most_again)
-        sends[sent, 0], sends[sent, 1], sends[sent, 2] = tick, is_reached, again
+        sends[sent, 0], sends[sent, 1], sends[sent, 2] = tick, place, again
         sent += 1
         if place == waypoints.shape[0] or sent == sends.shape[0] or again == tick:
             return sent, True, computed

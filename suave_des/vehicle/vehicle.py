@@ -22,8 +22,7 @@ that were sent or cancelled, unless something else has changed control.
 """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ArrivalCheck:
+class ArrivalCheck(NamedTuple):
     """The times at which arrival at a way-point is checked, and the box in which a way-point counts as reached.
 
     Attributes:
@@ -59,7 +58,7 @@ class ArrivalCheck:
 Ticks = tuple[int, int, int]
 """The first tick that checks a way-point, the one that sends it again if it is not reached, and the last to look at."""
 Sends = list[list[int]]
-"""Set-points to be sent: tick, whether that finds a way-point reached (1) or not in time, tick that sends it again."""
+"""Set-points to be sent: tick, how many of the way-points are reached by then, tick that sends it again."""
 
 
 class _Queue(NamedTuple):
@@ -153,8 +152,8 @@ class Vehicle:
         limit_n = self.model.thrust_limit_n if state == "works" else 0.0
         thrust_n = 0.0
         if state == "frozen":  # the next step tells what it gives
-            rows = np.repeat(self.track[[self.computed_row]], 2, axis=0)
-            kernel.advance(rows, 0, 1, self._dynamics, *kernel.UNCHECKED)
+            row = self.computed_row
+            kernel.advance(self.track, row, min(row + 1, self.last_row), self._dynamics, *kernel.UNCHECKED)
             thrust_n = float(self._thrust_n[thruster - 1, kernel.LAST])
         self.thrusters[thruster - 1] = state
         self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
@@ -255,8 +254,7 @@ class Vehicle:
         if queue is not None:
             self._set_point[:] = queue.before
             if sent := queue.sent_until(t_s):
-                place = sum([is_reached for _, is_reached, _ in queue.sends[:sent]])
-                self._replace_set_point(queue.waypoints, place, queue.sent_as_m, new=sent)
+                self._replace_set_point(queue.waypoints, queue.sends[sent - 1][1], queue.sent_as_m, new=sent)
 
     def _notify(self, t_s: float, check: ArrivalCheck | None = None) -> None:
         row = row_at(t_s)
