@@ -69,6 +69,11 @@ def stop_at(event: simpy.Event) -> None:
     event.callbacks.append(StopSimulation.callback)
 
 
+def drop_events(env: simpy.Environment) -> None:
+    """Drop all that is still to happen."""
+    env._queue.clear()
+
+
 class Alarm:
     """Calls a function at a mission time; setting it again replaces the pending call."""
 

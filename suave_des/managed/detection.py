@@ -8,7 +8,7 @@ import simpy
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
+from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Point, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _MIN_ROWS_AHEAD = 22
@@ -27,6 +27,7 @@ class PipelineDetector:
     Attributes:
         visibility: measured water visibility: the times, s, at which the value changes, and the values, m.
         points: points as the detection places them, shape (n, 3), m.
+        bounds_m: the least and the greatest coordinates of the points.
         view_tangent: tangent of half the camera's field of view.
         detected: the event of the first sight; its value is the index of the point seen.
         first_point: index of the point seen, once detected.
@@ -37,6 +38,7 @@ class PipelineDetector:
     vehicle: Vehicle
     visibility: tuple[Array, Array]
     points: Array
+    bounds_m: tuple[Point, Point]
     view_tangent: float
     log: Log
     first_point: int | None = None
@@ -47,7 +49,6 @@ class PipelineDetector:
 
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
-        self._bounds_m = tuple(self.points.min(axis=0).tolist()), tuple(self.points.max(axis=0).tolist())
         self._alarm = Alarm(self.env, self._ring)
         self.vehicle.control_listeners.append(self._control_changed)
         self._look_ahead(0)
@@ -63,7 +64,7 @@ class PipelineDetector:
             self._alarm.cancel()
             return
         self.vehicle.look_ahead(last)
-        seen = self.points, self._bounds_m, self.view_tangent
+        seen = self.points, self.bounds_m, self.view_tangent
         seen_row, self._seen = first_detection(self.vehicle.track, (row, last), STEP_S, self.visibility, *seen)
         if self._seen < 0:
             self._row = last

@@ -7,13 +7,13 @@ from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from math import inf, isnan
 from pathlib import Path
-from typing import ClassVar, Self, Unpack
+from typing import ClassVar, Unpack
 
 import simpy
 
 from suave_des import domain
 from suave_des.arguments import check_names
-from suave_des.clock import advance, stop_at
+from suave_des.clock import advance, drop_events, stop_at
 from suave_des.compiling import Array
 from suave_des.domain import WATER_VISIBILITY, Task
 from suave_des.draws import Draws
@@ -134,7 +134,7 @@ class Mission:
         self._visibility = self._measurements[WATER_VISIBILITY]
 
         # The managed subsystem.
-        seen = prepared.detection_points, prepared.view_tangent
+        seen = prepared.detected_points, prepared.bounds_m, prepared.view_tangent
         self._detector = PipelineDetector(env, self._vehicle, self._visibility.arrays, *seen, recorder.log)
         mode_latency_s = draws.each_time("latencies.mode_change_s", described.latencies.mode_change_s)
         self.mode_manager = ModeManager(env, loaded.modes, self._make_nodes(), mode_latency_s, recorder.log)
@@ -220,16 +220,15 @@ class Mission:
         return self._result
 
     def close(self) -> None:
-        """Give the mission's memory back to its Simulator, for the next mission; this one cannot continue."""
+        """Give the mission's memory back to its Simulator, for the next mission; this one cannot continue.
+
+        Its parts refer to each other: cut, they are freed now, and not when Python next looks for such circles, which
+        takes 5% of a mission's time.
+        """
         self._prepared.give_back(self._track)
-
-    def __enter__(self) -> Self:
-        """Use the mission until the end of a `with` block."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close it."""
-        self.close()
+        drop_events(self.env)
+        for part in (self._vehicle, self._detector, self._host):
+            vars(part).clear()
 
     # What can be seen.
 

@@ -51,13 +51,14 @@ class PreparedScenario:
         scenario = loaded.scenario
         self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
         self.path = InspectionPath.there_and_back(self.points, scenario.revision.follow.altitude_m)
-        self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
+        detected = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
+        self.detected_points, self.view_tangent = detected, scenario.vehicle.camera.tangent
+        self.bounds_m: tuple[Point, Point] = tuple(detected.min(axis=0).tolist()), tuple(detected.max(axis=0).tolist())
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         self.custom_functions = custom_functions(loaded)
         calibrated = [name for name in Autopilot._fields if name in Calibration.model_fields]
         self.autopilot = Autopilot(**{name: getattr(scenario.calibration, name) for name in calibrated})
         self.vehicle_model = vehicle_model(scenario.vehicle)
-        self.view_tangent = scenario.vehicle.camera.tangent
         self.numbers: dict[str, float] = {}
         self._spare_tracks: list[Array] = []
         self._manager_inputs: dict[str, tuple[Mapping[str, Path], Mapping[str, Any]]] = {}

@@ -1,5 +1,7 @@
 """Runs missions of one scenario."""
 
+from contextlib import closing
+
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import ManagerLike
 from suave_des.simulation.mission import Mission
@@ -34,5 +36,5 @@ class Simulator(PreparedScenario):
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
-        with Mission(self, manager, run=run, seed=seed, record=record) as mission:
+        with closing(Mission(self, manager, run=run, seed=seed, record=record)) as mission:
             return mission.result()

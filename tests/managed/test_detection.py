@@ -16,6 +16,7 @@ from suave_des.world.pipeline import first_point_in_view, sample_points
 from tests.helpers.stand_ins import BLUEROV2, VIEW_TANGENT, silent
 
 POINTS = sample_points(Pipeline().vertices_m)
+BOUNDS_M = tuple(POINTS.min(axis=0).tolist()), tuple(POINTS.max(axis=0).tolist())
 DURATION_S = 120.0
 
 
@@ -32,8 +33,7 @@ class Sight:
             self.env,
             self.vehicle,
             (np.array([0.0]), np.array([visibility_m])),
-            POINTS,
-            VIEW_TANGENT,
+            *(POINTS, BOUNDS_M, VIEW_TANGENT),
             lambda source, event, detail: self.logged.append((self.env.now, event)),
         )
         for t_s, place in commands:
@@ -83,7 +83,7 @@ def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once():
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
     always_3_m = np.array([0.0]), np.array([3.0])
-    detector = PipelineDetector(env, vehicle, always_3_m, POINTS, VIEW_TANGENT, silent)
+    detector = PipelineDetector(env, vehicle, always_3_m, POINTS, BOUNDS_M, VIEW_TANGENT, silent)
     env.run(until=1.0)
     assert detector.detected_s == 0.0
 
