@@ -106,11 +106,18 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
             raise InputError(f"there is no manager {family!r}", remedy=f"write {family}:{wanted}")
         make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
         return make(argument)
-    target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
+    if name in _BUILT_IN:
+        return _built_in(name)
+    target = name if ":" in name else _registered().get(name)
     if target is None:
         hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     return _load(f"manager {name!r}", target, ManagingSubsystem)
+
+
+@cache
+def _built_in(name: str) -> type[ManagingSubsystem]:
+    return _load(f"manager {name!r}", _BUILT_IN[name], ManagingSubsystem)
 
 
 def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:

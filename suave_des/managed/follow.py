@@ -123,5 +123,4 @@ class FollowPipeline(WaypointFunction):
         self._has_arrived = True
         for length_m in lengths_m:
             self._travelled_m += length_m
-        if lengths_m:
             self._published_m = self._travelled_m

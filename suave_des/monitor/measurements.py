@@ -126,8 +126,7 @@ class Measurements:
     def crossings(self, thresholds: Thresholds) -> tuple[list[float], list[int]]:
         """Find the times at which a value in another region is published, the first one included, and the regions.
 
-        Two values are in one region if no comparison with a threshold tells them apart. Regions between thresholds have
-        even numbers, from 0; a threshold itself, as a rule may say `<` or `<=`, has the odd one between.
+        Regions with even numbers, from 0, lie between thresholds; a threshold itself has the odd number between.
         """
         crossings = self._crossings.get(thresholds)
         if crossings is None:

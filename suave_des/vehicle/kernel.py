@@ -62,9 +62,9 @@ Dynamics = tuple[float, Array, Array, Array, Array, Array]
 - the time between rows, as the simulated world counts it, s;
 - set-point: position, heading and number, shape (6,);
 - parameters: constants, shape (35,);
-- allocation: thrusts for a demanded wrench, shape (6 thrusters, 6);
-- wrenches: wrench for thrusts, shape (6, 6 thrusters);
-- thrusters: what each can give and gave last, shape (6 thrusters, 3).
+- allocation: thrusts for a demanded wrench, shape (6 thrusters, 6), in Fortran's order;
+- wrenches: wrench for thrusts, shape (6, 6 thrusters), in Fortran's order;
+- thrusters: what each can give and gave last, shape (6 thrusters, 3), in Fortran's order.
 """
 
 
@@ -219,13 +219,16 @@ def advance(
         d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
         d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
 
-        # Thrusters: allocate as if all worked, and limit each to what it can give.
-        t0 = t1 = t2 = t3 = t4 = t5 = 0.0
+        # Thrusters: allocate as if all worked, limit each to what it can give. In one loop, with min and max, or with
+        # arrays in C's order a step takes 8% more time.
         for i in range(6):
             thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
             thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
-            thrust = min(max(thrust, thrusters[i, LEAST]), thrusters[i, GREATEST])
-            thrusters[i, LAST] = thrust
+            least, greatest = thrusters[i, LEAST], thrusters[i, GREATEST]
+            thrusters[i, LAST] = least if thrust < least else greatest if thrust > greatest else thrust
+        t0 = t1 = t2 = t3 = t4 = t5 = 0.0
+        for i in range(6):
+            thrust = thrusters[i, LAST]
             t0 += wrenches[0, i] * thrust
             t1 += wrenches[1, i] * thrust
             t2 += wrenches[2, i] * thrust
@@ -316,8 +319,7 @@ def fly_waypoints(
     """Fly through way-points: the tick of a timer that finds one reached, or not reached in time, sends a set-point.
 
     Args:
-        track: as for `advance`.
-        computed: last row that is filled.
+        track, computed: as for `advance`; its last row that is filled.
         dynamics: as for `advance`; its set-point ends as the one that was given last.
         waypoints: x, y and z in the first columns, m, shape (n, at least 3); the set-point of the first is given.
         sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.

@@ -146,6 +146,6 @@ def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tup
 
 
 def _read_only(values: ArrayLike) -> Array:
-    matrix: Array = np.ascontiguousarray(values, dtype=np.float64)
+    matrix: Array = np.asfortranarray(values, dtype=np.float64)
     matrix.flags.writeable = False
     return matrix

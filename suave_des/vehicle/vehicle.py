@@ -129,7 +129,8 @@ class Vehicle:
         self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
         self.thrusters: list[ThrusterState] = ["works"] * len(model.thrusters)
-        self._thrust_n = np.array([[-model.thrust_limit_n, model.thrust_limit_n, 0.0]] * len(model.thrusters))
+        least_n, greatest_n = -model.thrust_limit_n, model.thrust_limit_n
+        self._thrust_n = np.array([[least_n, greatest_n, 0.0]] * len(model.thrusters), order="F")
         self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
         parameters = kernel_parameters(model, self.autopilot, self.z_limits_m).copy()
         parameters[kernel.CURRENT : kernel.FLOOR] = self.current_m_per_s
