@@ -114,9 +114,8 @@ def record(mission: Callable[[], object]) -> Replay:
 def _recording(calls: list[KernelCall], tracks: list[Array]) -> Iterator[None]:
     def recorded(function: Callable[..., object]) -> Callable[..., object]:
         def call(track: Array, first: int, *others: object) -> object:
-            if len(track) > 2:  # not the two rows by which the vehicle sees what a failing thruster gives
-                calls.append(KernelCall(function, first, track[first].copy(), _copied(others)))
-                tracks[:] = [track]
+            calls.append(KernelCall(function, first, track[first].copy(), _copied(others)))
+            tracks[:] = [track]
             return function(track, first, *others)
 
         return call

@@ -93,7 +93,7 @@ class Session:
             "task": mission.task.name if mission.task else "",
             "distance_inspected_m": mission.distance_inspected_m,
         }
-        found |= {name: mission.measured(name) for name in mission.attributes}
+        found |= {name: mission.measured(name) for name in mission.manager.system.measurements}
         found |= {name: mission.components.get(name, "") for name in THRUSTER_NAMES}
         found |= {name: mission.current_mode(name) or "" for name in self._options()}
         pose = mission.pose
@@ -128,7 +128,7 @@ class Session:
     def _monitor_schema(self) -> Json:
         number, text, either = {"type": "number"}, {"type": "string"}, {"type": ["number", "null"]}
         kinds: Json = {"is_over": {"type": "boolean"}, "task": text}
-        kinds |= dict.fromkeys(self._mission.attributes, either)
+        kinds |= dict.fromkeys(self._mission.manager.system.measurements, either)
         kinds |= dict.fromkeys((*THRUSTER_NAMES, *self._options()), text)
         return _schema({name: kinds.get(name, number) for name in self._monitor()}, required=True)
 

@@ -8,7 +8,7 @@ import simpy
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Point, Vehicle
+from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _MIN_ROWS_AHEAD = 22
@@ -53,7 +53,7 @@ class PipelineDetector:
         self.vehicle.control_listeners.append(self._control_changed)
         self._look_ahead(0)
 
-    def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
+    def _control_changed(self, row: int, is_planned: bool) -> None:
         self._rows_ahead = _MIN_ROWS_AHEAD
         self._look_ahead(row)
 

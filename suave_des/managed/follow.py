@@ -102,7 +102,7 @@ class FollowPipeline(WaypointFunction):
         # resends.
         polls = self.revision.polls_before_resending
         waits = (polls + 1, 1) if self.revision.resends_at_each_poll else (polls, polls)
-        return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits, resends_unchanged=True)
+        return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits)
 
     def waypoints(self, count: int) -> Array:
         """Return the current point and those after it; none if the end is reached."""

@@ -15,7 +15,7 @@ from suave_des.clock import Process
 from suave_des.compiling import Array
 from suave_des.monitor.diagnostics import DiagnosticsBus
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import ArrivalCheck, Point, Sends, Ticks, Vehicle
+from suave_des.vehicle.vehicle import ArrivalCheck, Course, Point, Ticks, Vehicle
 
 Log = Callable[[str, str, str], None]
 """Called with source, event and detail of something to record."""
@@ -106,24 +106,22 @@ class SetPointSender:
         """
         if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
             raise ValueError(f"the set-point ({x_m}, {y_m}, {z_m}) is not finite")
-        if not self._is_lost():
+        if not self.is_lost():
             x_error_m, y_error_m, z_error_m = self.frame_error_m
             self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
 
-    def queue(
-        self, waypoints: Array, z_m: float, check: ArrivalCheck, ticks: Ticks, *, most: int, send: bool
-    ) -> tuple[Sends, bool]:
-        """Send and queue set-points (see `Vehicle.queue_waypoints`), up to the first whose message will be lost."""
-        send = send and not self._is_lost()
+    def course(self, waypoints: Array, z_m: float, check: ArrivalCheck, ticks: Ticks, most: int) -> Course:
+        """Make a course (see there) that ends with the first set-point whose message will be lost."""
         x_error_m, y_error_m, z_error_m = self.frame_error_m
-        sent_as_m, most = (x_error_m, y_error_m, z_m + z_error_m), int(min(most, self._before_loss))
-        return self.vehicle.queue_waypoints(self.env.now, waypoints, sent_as_m, check, ticks, most=most, send=send)
+        sent_as_m = x_error_m, y_error_m, z_m + z_error_m + self.vehicle.altitude_error_m
+        return Course(check, waypoints, sent_as_m, ticks, int(min(most, self._before_loss)))
 
     def queued_were_sent(self, count: int) -> None:
         """Count set-points that were sent from the queue."""
         self._before_loss -= count
 
-    def _is_lost(self) -> bool:
+    def is_lost(self) -> bool:
+        """Say whether the next message is lost, which counts as sent then."""
         is_lost = self._before_loss == 0
         self._before_loss = self._draw() if is_lost else self._before_loss - 1
         return is_lost

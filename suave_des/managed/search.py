@@ -150,4 +150,4 @@ class GenerateSearchPath(WaypointFunction):
         # the same tick, hence one tick less.
         node = self.revision
         first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
-        return ArrivalCheck(start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again, False)
+        return ArrivalCheck(start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)

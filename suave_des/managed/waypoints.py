@@ -16,7 +16,7 @@ from typing import Final
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import FunctionNode, SetPointSender
-from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Sends
+from suave_des.vehicle.vehicle import ArrivalCheck, Course, Sends
 
 QUEUED_WAYPOINTS: Final = 20
 """Number of way-points queued in addition to the current one; with 10, missions take 7% more CPU time."""
@@ -28,10 +28,11 @@ class Due(Enum):
     SEND = "it is sent, as it is a new one"
     RESEND = "it is sent again, as it was not reached in time"
     LOOK = "nothing is sent, but looked ahead: the way-points have changed, or the last one is resumed"
-    LOOK_ON = "nothing is sent, but looked ahead from the next tick on"
+    NOTHING = "nothing: the other function acts before"
 
 
 _SENDS: Final = (Due.SEND, Due.RESEND)
+_NEVER: Final = 10**9  # a tick after every mission's end
 
 
 @dataclass(eq=False)
@@ -97,41 +98,38 @@ class WaypointFunction(FunctionNode):
         self._alarm.cancel()
         check, self._check = self._check, None
         if check is not None:
-            self.sender.vehicle.cancel_waypoints(self.env.now, check)
             self._resend_at -= check.last_tick_until(self.env.now) + 1  # on resumption the first tick is 0 again
+            self.sender.vehicle.cancel_waypoints(self.env.now)
 
     def catch_up(self) -> None:
-        """Count the way-points that have been reached by now."""
+        """Count the way-points that have been reached by now; what is due at this very time comes first."""
         if self._check is not None:
-            self._count_arrivals(self._check.last_tick_until(self.env.now))
+            tick = self._check.last_tick_until(self.env.now)
+            if self._act_at <= tick:
+                self._act()
+            self._count_arrivals(tick)
 
     def waypoints_changed(self) -> None:
         """Look ahead again at the next tick after the way-points change (call `catch_up` before they do)."""
-        check = self._check
-        if check is not None and self._act_at > (tick := check.last_tick_until(self.env.now)):
-            self.sender.vehicle.cancel_waypoints(self.env.now, check)
-            self._sends, self._due = [], Due.LOOK
-            self._set_alarm(check, tick + 1)
+        if self._check is not None:
+            self.sender.vehicle.cancel_waypoints(self.env.now)
 
-    def _control_changed(self, row: int, sent_with: ArrivalCheck | None) -> None:
-        """Look ahead again after somebody else changes control, which has cancelled queued way-points."""
+    def _control_changed(self, row: int, is_planned: bool) -> None:
+        """Look ahead again at the next tick after a change of control that was not queued; it cancels what was."""
         check = self._check
-        if check is None or check is sent_with or self._due is Due.LOOK:
-            return
-        self.catch_up()
-        tick = check.last_tick_until(self.env.now)
-        if sent_with is None:
-            self.waypoints_changed()
-        elif self._act_at > tick:
-            self._due = Due.LOOK_ON
-            self._look_ahead(check, tick, most=0)  # the other one is not done yet
+        if check is not None and not is_planned:
+            self.catch_up()
+            tick = check.last_tick_until(self.env.now)
+            if self._act_at > tick + (self._due is Due.LOOK):
+                self._sends, self._due = [], Due.LOOK
+                self._set_alarm(check, tick + 1)
 
     def _act(self) -> None:
         """Do what is due at this tick, and look ahead to the next tick at which something is."""
         check = self._check = self._check or self.arrival_check(self.env.now)
         tick = self._act_at
-        self._count_arrivals(tick)
         while self._check is not None and self._act_at == tick:
+            self._count_arrivals(tick)
             if self._due is Due.SEND:
                 self._resend_at = tick + check.resend_ticks
             elif self._due is Due.RESEND:
@@ -139,41 +137,50 @@ class WaypointFunction(FunctionNode):
                 self._resend_at = tick + check.resend_again_ticks
             self._look_ahead(check, tick)
 
-    def _look_ahead(self, check: ArrivalCheck, tick: int, most: int = QUEUED_WAYPOINTS) -> None:
-        """Queue the way-points, the current one included if it is due, and see when they will be reached."""
-        waypoints = self.waypoints(1 + most)
+    def _look_ahead(self, check: ArrivalCheck, tick: int) -> None:
+        """Queue way-points, the current one included if it is due, and see when something has to be done next.
+
+        The other function, if it ticks too, is looked ahead for at the same time, unless it is about to look by itself.
+        """
+        waypoints, vehicle, now_s = self.waypoints(1 + QUEUED_WAYPOINTS), self.sender.vehicle, self.env.now
         if len(waypoints) == 0:
             self._check = None
+            self._alarm.cancel()
             self.completed()
+            vehicle.cancel_waypoints(now_s)
             return
-        send, until = self._due in _SENDS, self._undisturbed_until(check)
-        first = tick + (check.first_check_ticks if send else self._due is Due.LOOK_ON)
-        ticks, z_m = (first, self._resend_at, until), self.set_point_z_m()
-        self._sends, is_due = self.sender.queue(waypoints, z_m, check, ticks, most=most, send=send)
-        self._counted, self._due, act_at = 0, Due.LOOK_ON, until
+        is_new, until, flying, further = self._due in _SENDS, _NEVER, [self], []
+        send = is_new and not self.sender.is_lost()
+        if (other := self.other) is not None and (others := other._check) is not None:
+            past = others.last_tick_until(now_s)
+            if other._act_at <= past or other._due is Due.LOOK:
+                until = max(tick, check.last_tick_until(others.time_s(other._act_at)))
+            else:
+                other.catch_up()
+                flying.append(other)
+                further.append(other._course(others, other.waypoints(1 + QUEUED_WAYPOINTS), past + 1, _NEVER))
+        course = self._course(check, waypoints, tick + is_new * check.first_check_ticks, until)
+        sends, is_due = vehicle.queue_waypoints(now_s, [course, *further], send=send)
+        for place, each in enumerate(flying):
+            each._sends = [send for send in sends if send[1] == place] if further else sends
+            each._counted, each._due, each._act_at = 0, Due.NOTHING, _NEVER
+            each._alarm.cancel()
         if is_due:
-            *before, (act_at, reached, _) = self._sends
-            self._due = Due.SEND if reached > (before[-1][1] if before else 0) else Due.RESEND
-        if act_at > tick:
-            self._set_alarm(check, act_at)
-        else:
-            self._act_at = tick
-            self._count_arrivals(tick)
+            acts = flying[sends[-1][1]]
+            *before, (act_at, _, reached, _) = acts._sends
+            acts._due = Due.SEND if reached > (before[-1][2] if before else 0) else Due.RESEND
+            acts._set_alarm(course.check if acts is self else further[0].check, act_at)
+        elif until < _NEVER:
+            self._due = Due.LOOK
+            self._set_alarm(check, until + 1)
 
-    def _undisturbed_until(self, check: ArrivalCheck) -> int:
-        """Find the tick up to which it is worth looking ahead: then the other function sends a set-point of its own."""
-        other = self.other
-        if other is None or other._check is None:
-            return 10**9  # a tick after every mission's end
-        other.catch_up()
-        until_s = max(self.env.now, other._check.time_s(other._resend_at))
-        if self._due not in _SENDS:  # else the track changes from now on
-            until_s = max(until_s, self.sender.vehicle.computed_row * STEP_S)
-        return check.last_tick_until(until_s) + 1
+    def _course(self, check: ArrivalCheck, waypoints: Array, first: int, until: int) -> Course:
+        ticks = first, self._resend_at, until
+        return self.sender.course(waypoints, self.set_point_z_m(), check, ticks, QUEUED_WAYPOINTS)
 
     def _count_arrivals(self, tick: int) -> None:
         if past := bisect_right(self._sends, [tick + 1]):
-            _, reached, self._resend_at = self._sends[past - 1]
+            _, _, reached, self._resend_at = self._sends[past - 1]
             del self._sends[:past]
             is_sent_separately = self._due in _SENDS and not self._sends  # the last one is left to the function
             self.sender.queued_were_sent(past - is_sent_separately)

@@ -124,10 +124,7 @@ class Measurements:
         return self.values[published - 1] if published and self.times_s[published - 1] >= since_s else None
 
     def crossings(self, thresholds: Thresholds) -> tuple[list[float], list[int]]:
-        """Find the times at which a value in another region is published, the first one included, and the regions.
-
-        Regions with even numbers, from 0, lie between thresholds; a threshold itself has the odd number between.
-        """
+        """Find when a value in another region is published, and its region: even between thresholds, odd on one."""
         crossings = self._crossings.get(thresholds)
         if crossings is None:
             indices, regions = _crossings(self.arrays[1].tobytes(), thresholds)

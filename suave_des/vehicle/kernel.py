@@ -54,6 +54,13 @@ LEAST, GREATEST, LAST = 0, 1, 2
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
 
+# Columns of a course: a timer's start and period, s; half the width and height of the box around a way-point in which
+# it counts as reached, m; ticks from sending it to its first check, to sending it again, and again; what is added to x
+# and y in its set-point, and the set-point's z, m; the next tick that checks it, the one that sends it again, the last
+# to look at; its row, the first, the one after the last; how many set-points can be sent; time between rows, s.
+START, PERIOD, HALF_WIDTH, HALF_HEIGHT, FEWEST, MOST, MOST_AGAIN = range(7)
+SENT_X, SENT_Y, SENT_Z, TICK, AGAIN, UNTIL, PLACE, FIRST, END, ROOM, GRID = range(7, 18)
+
 UNCHECKED = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 1.0), -1
 """A box, a timer and a tick before row 0, for `advance` without checks."""
 Dynamics = tuple[float, Array, Array, Array, Array, Array]
@@ -132,8 +139,7 @@ def advance(
         first: row to start from.
         last: last row to fill; or the first row at a tick that finds the vehicle in the box.
         dynamics: time step, set-point and constants.
-        box, timer, tick: see `is_in_box` and `row_of`; the first tick that is checked. A call for each tick would take
-            an eighth more time.
+        box, timer, tick: see `is_in_box` and `row_of`; the first tick that is checked.
 
     Returns:
         The tick that finds the vehicle in the box; -1 if none does.
@@ -219,8 +225,7 @@ def advance(
         d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
         d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
 
-        # Thrusters: allocate as if all worked, limit each to what it can give. In one loop, with min and max, or with
-        # arrays in C's order a step takes 8% more time.
+        # Thrusters: allocate as if all worked, limit each. With one loop, min and max, or C's order it is 8% slower.
         for i in range(6):
             thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
             thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
@@ -306,61 +311,58 @@ def advance(
 
 @compiled
 def fly_waypoints(
-    track: Array,
-    computed: int,
-    dynamics: Dynamics,
-    waypoints: Array,
-    sent_as: tuple[float, float, float],
-    half_box: tuple[float, float],
-    timer: tuple[float, float, float],
-    window: tuple[int, int, int, int, int, int],
-    sends: IntArray,
+    track: Array, computed: int, dynamics: Dynamics, waypoints: Array, courses: Array, sends: IntArray
 ) -> tuple[int, bool, int]:
-    """Fly through way-points: the tick of a timer that finds one reached, or not reached in time, sends a set-point.
+    """Fly along one course or two: a tick that finds a way-point reached, or not in time, sends a set-point.
 
     Args:
-        track, computed: as for `advance`; its last row that is filled.
-        dynamics: as for `advance`; its set-point ends as the one that was given last.
-        waypoints: x, y and z in the first columns, m, shape (n, at least 3); the set-point of the first is given.
-        sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.
-        half_box: half the width and half the height of the box around a way-point in which it counts as reached, m.
-        timer: time of tick 0, time between ticks, and time between rows, s.
-        window: first tick to check, the one that sends the first way-point again, and last one to check; and how many
-            there are from sending one to its first check, to sending it again, and again (0: the caller does it).
-        sends: shape (m, 3); receives for each set-point its tick, how many way-points are reached by then, and the tick
-            that sends it again. The last that has room, the one after the last way-point, and one that the caller sends
-            again are not given.
+        track, computed, dynamics: as for `advance`, and the last row that is filled; the set-point given last remains.
+        waypoints: x, y and z in the first columns, m, shape (n, at least 3).
+        courses: shape (courses, 18), see `START` and the others.
+        sends: shape (m, 4); receives for each set-point its tick, its course, how many of the course's way-points are
+            reached by then, and the tick that sends it again. The last of them is not given if there is no room for
+            more, if it leads to no way-point, or if the one before is reached but for its height.
 
     Returns:
         How many set-points there are; whether the last of them is left to the caller; and the last row of the track
         that is now filled. Ticks beyond the track do not count.
     """
-    tick, again, until, fewest, most, most_again = window
-    set_point, place, sent, last_row = dynamics[1], 0, 0, track.shape[0] - 1
-    while tick <= until and row_of(tick, timer) <= last_row:
-        row, box = row_of(tick, timer), (waypoints[place, 0], waypoints[place, 1], waypoints[place, 2], *half_box)
-        if row > computed:
-            end = min(row_of(min(again, until), timer), last_row)
+    set_point, sent, last_row, courses = dynamics[1], 0, track.shape[0] - 1, courses.copy()
+    while True:
+        course = 0
+        if courses.shape[0] > 1:
+            first_s = courses[0, START] + courses[0, TICK] * courses[0, PERIOD]
+            course = int(courses[1, START] + courses[1, TICK] * courses[1, PERIOD] < first_s)
+        this = courses[course]
+        timer, until = (this[START], this[PERIOD], this[GRID]), this[UNTIL]
+        tick, again, place = int(this[TICK]), int(this[AGAIN]), int(this[PLACE])
+        if tick > until or row_of(tick, timer) > last_row:
+            return sent, False, computed
+        box = waypoints[place, 0], waypoints[place, 1], waypoints[place, 2], this[HALF_WIDTH], this[HALF_HEIGHT]
+        if row_of(tick, timer) > computed:
+            goal = again if courses.shape[0] == 1 else tick
+            end = min(row_of(int(min(goal, until)), timer), last_row)
             found = advance(track, computed, end, dynamics, box, timer, tick)
-            is_reached = 0 <= found <= min(again, until)
-            tick = found if is_reached else again
+            is_reached = 0 <= found <= min(goal, until)
+            tick = found if is_reached else goal
             computed = row_of(tick, timer) if is_reached else end
             if tick > until or row_of(tick, timer) > last_row:
-                break
+                return sent, False, computed
         else:
-            is_reached = is_in_box(track, row, box)
-            if not is_reached and tick < again:
-                tick += 1
-                continue
+            is_reached = is_in_box(track, row_of(tick, timer), box)
+        if not is_reached and tick < again:
+            this[TICK] = tick + 1
+            continue
+        row = row_of(tick, timer)
+        is_level = is_reached or not is_in_box(track, row, (*box[:4], np.inf))
         place += is_reached
-        again = tick + (most if is_reached else most_again)
-        sends[sent, 0], sends[sent, 1], sends[sent, 2] = tick, place, again
+        again = tick + int(this[MOST] if is_reached else this[MOST_AGAIN])
+        sends[sent, 0], sends[sent, 1], sends[sent, 2], sends[sent, 3] = tick, course, place - int(this[FIRST]), again
         sent += 1
-        if place == waypoints.shape[0] or sent == sends.shape[0] or again == tick:
+        if place == this[END] or this[ROOM] == 0.0 or not is_level:
             return sent, True, computed
-        set_point[0], set_point[1] = waypoints[place, 0] + sent_as[0], waypoints[place, 1] + sent_as[1]
-        set_point[2] = sent_as[2]
+        set_point[0], set_point[1] = waypoints[place, 0] + this[SENT_X], waypoints[place, 1] + this[SENT_Y]
+        set_point[2] = this[SENT_Z]
         set_point[NUMBER] += 1.0
-        computed = row_of(tick, timer)  # rows beyond it were flown to another set-point
-        tick += fewest
-    return sent, False, computed
+        computed = row  # rows beyond it were flown to another set-point
+        this[TICK], this[AGAIN], this[PLACE], this[ROOM] = tick + this[FEWEST], again, place, this[ROOM] - 1.0

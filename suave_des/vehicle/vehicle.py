@@ -1,8 +1,7 @@
 """A vehicle in mission time: events command and disturb it, it can be read at any time, and is integrated lazily."""
 
 import math
-from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, InitVar, dataclass, field
 from typing import Literal, NamedTuple
 
@@ -16,10 +15,8 @@ STEP_S = 0.05
 Point = tuple[float, float, float]
 ThrusterState = Literal["works", "frozen", "dead"]
 """A frozen thruster keeps the thrust that it had when it failed; a dead one gives none."""
-ControlListener = Callable[[int, "ArrivalCheck | None"], None]
-"""Called after a change of control with the first row that it affects; and with the arrival check of the way-points
-that were sent or cancelled, unless something else has changed control.
-"""
+ControlListener = Callable[[int, bool], None]
+"""Called after a change of control with the first row that it affects, and whether way-points were sent or queued."""
 
 
 class ArrivalCheck(NamedTuple):
@@ -33,7 +30,6 @@ class ArrivalCheck(NamedTuple):
         first_check_ticks: from the tick that finds a way-point reached to the first check of the next one.
         resend_ticks: from the tick that sends a way-point's set-point to the one that sends it again.
         resend_again_ticks: the same, once it has been sent again.
-        resends_unchanged: whether a way-point is sent again just as it was.
     """
 
     start_s: float
@@ -43,7 +39,6 @@ class ArrivalCheck(NamedTuple):
     first_check_ticks: int
     resend_ticks: int
     resend_again_ticks: int
-    resends_unchanged: bool
 
     def time_s(self, tick: int) -> float:
         """Return the time of a tick."""
@@ -57,22 +52,41 @@ class ArrivalCheck(NamedTuple):
 
 Ticks = tuple[int, int, int]
 """The first tick that checks a way-point, the one that sends it again if it is not reached, and the last to look at."""
+
+
+class Course(NamedTuple):
+    """The way-points that a function flies through.
+
+    Attributes:
+        check: the ticks, and the box in which a way-point counts as reached.
+        waypoints: positions to reach: x, y, z in the first three columns, m, shape (n, at least 3).
+        sent_as_m: offset added to a way-point's x and y in its set-point, and the set-points' z.
+        ticks: of the first way-point.
+        most: how many set-points are queued at most.
+    """
+
+    check: ArrivalCheck
+    waypoints: Array
+    sent_as_m: Point
+    ticks: Ticks
+    most: int
+
+
 Sends = list[list[int]]
-"""Set-points to be sent: tick, how many of the way-points are reached by then, tick that sends it again."""
+"""Set-points to be sent: tick, course, how many of its way-points are reached by then, tick that sends it again."""
 
 
 class _Queue(NamedTuple):
     """Queued set-points: `before` is in force until the first of them is sent."""
 
-    check: ArrivalCheck
+    courses: Sequence[Course]
     sends: Sends
     before: Array
-    waypoints: Array
-    sent_as_m: Point
 
     def sent_until(self, t_s: float) -> int:
         """Count the set-points that have been sent by time t."""
-        return bisect_right(self.sends, [self.check.last_tick_until(t_s) + 1])
+        last = [course.check.last_tick_until(t_s) for course in self.courses]
+        return sum([tick <= last[course] for tick, course, _, _ in self.sends])
 
 
 @dataclass(eq=False)
@@ -160,60 +174,49 @@ class Vehicle:
         self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
         self._notify(t_s)
 
-    def queue_waypoints(
-        self,
-        t_s: float,
-        waypoints: Array,
-        sent_as_m: Point,
-        check: ArrivalCheck,
-        ticks: Ticks,
-        *,
-        most: int,
-        send: bool,
-    ) -> tuple[Sends, bool]:
+    def queue_waypoints(self, t_s: float, courses: Sequence[Course], *, send: bool) -> tuple[Sends, bool]:
         """Look ahead, and queue set-points: the tick that finds a way-point reached commands the next one.
 
-        One that is not reached in time is commanded again, if the check says that it is the same then. A change of
-        control cancels the set-points that are still queued then. While there are any, none is added.
+        One that is not reached in time is commanded again, unless it is reached but for its height. A change of control
+        cancels the set-points that are still queued then. Ticks after the mission's end do not count.
 
         Args:
-            t_s: mission time.
-            waypoints: positions to reach: x, y, z in the first three columns, m, shape (n, at least 3).
-            sent_as_m: offset added to a way-point's x and y in its set-point, and the set-points' z.
-            check: the ticks, and the box in which a way-point counts as reached.
-            ticks: for the first way-point; those after the mission's end do not count.
-            most: how many set-points are queued at most.
-            send: whether to command the first way-point's set-point now; otherwise it is already commanded.
+            courses: one, or two that are flown at the same time.
+            send: whether to command the first way-point of the first course now; the others are already commanded.
 
         Returns:
             The set-points as they will be sent if control does not change; and whether the last of them is left to the
-            caller: it is one too many, leads to none of the way-points, or is not the same as before.
+            caller: it is one too many, leads to none of the way-points, or might not be the same as before.
         """
-        sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.altitude_error_m
-        if send:
+        is_new = send or (self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.sends))
+        if is_new:
             self._cancel_after(t_s)
-            self._replace_set_point(waypoints, 0, sent_as_m, new=1)
-        elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.sends):
-            most = 0
-        before, sends = self._set_point.copy(), np.empty((most + 1, 3), dtype=np.int64)
-        box, timer = (check.half_width_m, check.half_height_m), (check.start_s, check.period_s, STEP_S)
-        window = *ticks, check.first_check_ticks, check.resend_ticks, check.resend_again_ticks * check.resends_unchanged
+        if send:
+            self._replace_set_point(courses[0], 0, new=1)
+        waypoints = courses[0].waypoints
+        if len(courses) > 1:
+            waypoints = np.concatenate([each.waypoints[:, :3] for each in courses])
+        numbers, first = [], 0
+        for each in courses:
+            end = first + len(each.waypoints)
+            numbers.append((*each.check, *each.sent_as_m, *each.ticks, first, first, end, each.most, STEP_S))
+            first = end
+        before, sends = self._set_point.copy(), np.empty((first + 1, 4), np.int64)
         count, is_due, self.computed_row = kernel.fly_waypoints(
-            self.track, self.computed_row, self._dynamics, waypoints, sent_as_m, box, timer, window, sends
+            self.track, self.computed_row, self._dynamics, waypoints, np.array(numbers), sends
         )
         found: Sends = sends[:count].tolist()
         queued = found[: count - is_due]
         if queued:
-            self._queue = _Queue(check, queued, before, waypoints, sent_as_m)
-        if queued or send:
-            self._notify(t_s, check)
+            self._queue = _Queue(courses, queued, before)
+        if queued or is_new:
+            self._notify(t_s, is_planned=True)
         return found, is_due
 
-    def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
-        """Cancel the set-points after time t that were queued with a check, if any remain."""
-        if self._queue is not None and self._queue.check is check:
-            self._cancel_after(t_s)
-            self._notify(t_s, check)
+    def cancel_waypoints(self, t_s: float) -> None:
+        """Cancel the set-points that are queued after time t; whoever looks ahead does so again."""
+        self._cancel_after(t_s)
+        self._notify(t_s)
 
     def position(self, t_s: float) -> Point:
         """Read the position at time t: x, y, z in m."""
@@ -242,9 +245,9 @@ class Vehicle:
         self.look_ahead(row)
         return row
 
-    def _replace_set_point(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
-        set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m
-        set_point[0], set_point[1] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m
+    def _replace_set_point(self, course: Course, place: int, *, new: int) -> None:
+        set_point, (x_m, y_m, z_m) = self._set_point, course.sent_as_m
+        set_point[0], set_point[1] = course.waypoints.item(place, 0) + x_m, course.waypoints.item(place, 1) + y_m
         set_point[2] = z_m
         set_point[kernel.NUMBER] += new
 
@@ -255,12 +258,13 @@ class Vehicle:
         if queue is not None:
             self._set_point[:] = queue.before
             if sent := queue.sent_until(t_s):
-                self._replace_set_point(queue.waypoints, queue.sends[sent - 1][1], queue.sent_as_m, new=sent)
+                _, course, place, _ = queue.sends[sent - 1]
+                self._replace_set_point(queue.courses[course], place, new=sent)
 
-    def _notify(self, t_s: float, check: ArrivalCheck | None = None) -> None:
+    def _notify(self, t_s: float, *, is_planned: bool = False) -> None:
         row = row_at(t_s)
         for listener in self.control_listeners:
-            listener(row, check)
+            listener(row, is_planned)
 
 
 def track_rows(duration_s: float) -> int:

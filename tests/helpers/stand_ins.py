@@ -13,7 +13,7 @@ from suave_des.scenario.modes import Mode
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle import kernel
 from suave_des.vehicle.model import GRAVITY_M_PER_S2
-from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener, Vehicle, row_at
+from suave_des.vehicle.vehicle import ControlListener, Vehicle, row_at
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -29,8 +29,8 @@ class PlacedVehicle:
         self.control_listeners: list[ControlListener] = []
         self._place = place
         self.obeys = obeys
-        self.sends: ArrivalCheck | None = None  # whose way-point is being sent
-        self.rise_m = rise_m
+        self.sends = False  # whether a way-point is being sent
+        self.rise_m, self.altitude_error_m = rise_m, 0.0
         self.commands: list[tuple[float, Place]] = []
 
     @property
@@ -47,21 +47,24 @@ class PlacedVehicle:
     def position(self, t_s: float) -> Place:
         return self.place
 
-    def queue_waypoints(self, t_s, waypoints, sent_as_m, check, ticks, *, most, send):
+    def queue_waypoints(self, t_s, courses, *, send):
         """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
+        ((check, waypoints, sent_as_m, (first, again, _), _),) = courses
         if send:
-            self.sends = check
+            self.sends = True
             self.command(t_s, *(waypoints[0, :2] + sent_as_m[:2]).tolist(), sent_as_m[2])
-            self.sends = None
-        (first, again, _), halves_m = ticks, (check.half_width_m, check.half_width_m, check.half_height_m)
+            self.sends = False
+        halves_m = check.half_width_m, check.half_width_m, check.half_height_m
         for tick in range(first, again + 1):
             errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
             if all(error_m <= half_m for error_m, half_m in zip(errors_m, halves_m, strict=True)):
-                return [[tick, 1, tick + check.resend_ticks]], True
-        return [[again, 0, again]], True
+                return [[tick, 0, 1, tick + check.resend_ticks]], True
+        return [[again, 0, 0, again]], True
 
-    def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
-        """Do nothing: no set-point is ever queued."""
+    def cancel_waypoints(self, t_s: float) -> None:
+        """Tell the listeners, although no set-point is ever queued."""
+        for listener in self.control_listeners:
+            listener(0, False)
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         self.commands.append((t_s, (x_m, y_m, z_m)))

@@ -57,6 +57,11 @@ FRAMES = {
     "revision.set_points.node_frame_offset_x_m": normal(0.3),
     "revision.set_points.node_frame_offset_z_m": normal(0.2),
 }
+IN_STEP = {  # modes take effect at the very time of a poll
+    "managers.random.adaptation_period_s": 1.0,
+    "revision.follow.poll_period_s": 1.0,
+    "latencies.mode_change_s": 1.7,
+}
 CONDITIONS = {
     "as shipped": {},
     "noise": NOISE,
@@ -124,7 +129,9 @@ def test_looking_ahead_changes_nothing_whatever_the_scenario(
     assert_same(Simulator(with_values(LOADED[name], values)), manager, run)
 
 
+@pytest.mark.parametrize("values", [CONDITIONS["all of it"], IN_STEP], ids=["all of it", "in step"])
 @pytest.mark.parametrize("name", sorted(LOADED))
-def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(name):
+def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(name, values):
+    restless = Simulator(with_values(LOADED[name], values))
     for run in range(1, 21):
-        assert_same(simulator(name, "all of it"), Restless, run)
+        assert_same(restless, Restless, run)
