@@ -27,7 +27,7 @@ class Due(Enum):
 
     SEND = "it is sent, as it is a new one"
     RESEND = "it is sent again, as it was not reached in time"
-    LOOK = "nothing is sent, but looked ahead: the way-points have changed, or the last one is resumed"
+    LOOK = "nothing is sent, but looked ahead: something has changed, or the last way-point is resumed"
     NOTHING = "nothing: the other function acts before"
 
 
