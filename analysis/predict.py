@@ -223,7 +223,7 @@ def _difference(ours: pandas.DataFrame, theirs: pandas.DataFrame, metric: str) -
     cells = [
         of.dropna(subset=metric).groupby("condition")[metric].agg(["mean", "var", "count"]) for of in (ours, theirs)
     ]
-    both = cells[0].join(cells[1], lsuffix="_ours", rsuffix="_theirs", how="inner").dropna()
+    both = cells[0].add_suffix("_ours").join(cells[1].add_suffix("_theirs"), how="inner").dropna()
     freedom = (both["count_ours"] + both["count_theirs"] - 2).sum()
     if freedom < 1:
         return float("nan"), float("nan")

@@ -19,7 +19,7 @@ from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.vehicle.vehicle import ArrivalCheck, Course, Sends
 
 QUEUED_WAYPOINTS: Final = 20
-"""Number of way-points queued in addition to the current one; with 10, missions take 7% more CPU time."""
+"""Number of way-points queued in addition to the current one; with 14 or 30, some missions take 5% less, some more."""
 
 
 class Due(Enum):
@@ -162,7 +162,7 @@ class WaypointFunction(FunctionNode):
         course = self._course(check, waypoints, tick + is_new * check.first_check_ticks, until)
         sends, is_due = vehicle.queue_waypoints(now_s, [course, *further], send=send)
         for place, each in enumerate(flying):
-            each._sends = [send for send in sends if send[1] == place] if further else sends
+            each._sends = [sent for sent in sends if sent[1] == place] if further else sends
             each._counted, each._due, each._act_at = 0, Due.NOTHING, _NEVER
             each._alarm.cancel()
         if is_due:
