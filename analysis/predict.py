@@ -2,8 +2,9 @@
 
 Predicted are the experiments of the study of July 2025 and of its extended mission, from the configurations of the
 exemplar's runner: six conditions as its seed 100 draws them, five runs of each manager in each. predictions/ has what
-`import-config --base planta_exp1 --runner-seed 100` makes of each configuration. Each simulated run has a member of the
-ensemble of parameter sets that fit the known runs (those of experiment 1 and of 2023) about equally well.
+an earlier `import-config --base planta_exp1 --runner-seed 100` made of each configuration; today's makes the same
+campaigns, but its scenarios are based on release15. Each simulated run has a member of the ensemble of parameter sets
+that fit the known runs (those of experiment 1 and of 2023) about equally well.
 
     python analysis/predict.py [--out DIR] [--runs N] [--workers N]
     python analysis/predict.py --score EXPERIMENT FILE...
