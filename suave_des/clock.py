@@ -82,9 +82,9 @@ class Alarm:
         self._callback = callback
         self._pending: simpy.Event | None = None
 
-    def set(self, t_s: float) -> None:
-        """Call the function at mission time t, or as the next thing now if t has passed."""
-        self._pending = event = until(self._env, t_s)
+    def set(self, t_s: float, *, exactly: bool = False) -> None:
+        """Call the function at mission time t (see `exactly_at`), or as the next thing now if t has passed."""
+        self._pending = event = (exactly_at if exactly else until)(self._env, t_s)
         event.callbacks.append(self._ring)
 
     def cancel(self) -> None:

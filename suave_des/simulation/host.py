@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import simpy
 
-from suave_des.clock import Process, exactly_at, until
+from suave_des.clock import Alarm, Process
 from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
@@ -54,7 +54,8 @@ class ManagerHost:
     learned: Mapping[str, Any]
     training: bool
     manager: ManagingSubsystem = field(init=False)
-    _is_waiting: bool = field(default=False, init=False)  # for an event
+    _is_waiting: bool = field(default=False, init=False)  # for a change
+    _due_s: float = field(default=inf, init=False)  # next time of `adapt`, or the first that is waited for
     _idle_regions: set[tuple[int, ...]] = field(default_factory=set, init=False)  # in which calls change nothing
     _depends_on: list[tuple[Measurements, Thresholds]] = field(default_factory=list, init=False)
 
@@ -78,7 +79,9 @@ class ManagerHost:
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         if times is not None:
-            self._process = self.system.env.process(self._adapt_periodically(*times, is_event_triggered))
+            (self._period_s, self._due_s), self._is_event_triggered = times, is_event_triggered
+            self._alarm = Alarm(self.system.env, self._adapt)
+            self._alarm.set(self._due_s)
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""
@@ -110,58 +113,46 @@ class ManagerHost:
         self.state_changed()
 
     def state_changed(self) -> None:
-        """Wake a manager that waits for an event: its next periodic call is made."""
+        """Make the next periodic call of a manager that waits for a change."""
         self._idle_regions.clear()
         if self._is_waiting:
             self._is_waiting = False
-            self._process.interrupt()
+            self._alarm.set(_tick_at_or_after(self.system.env.now, self._due_s, self._period_s))
 
     def _diagnostic(self, diagnostic: Diagnostic) -> None:
         self._guarded(self.manager.diagnostic, diagnostic)
         self.state_changed()
 
-    def _adapt_periodically(self, period_s: float, starts_s: float, is_event_triggered: bool) -> Process:
-        env, modes = self.system.env, self.system.modes
-        yield until(env, starts_s)
-        due_s = env.now
-        while True:
-            requests = modes.requests
-            adaptation = self._guarded(self.manager.adapt)
-            if adaptation is not None:
-                if not isinstance(adaptation, Generator):
-                    raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
-                yield from self._guarded_process(adaptation)
-            if adaptation is not None or modes.requests > requests:
-                self._idle_regions.clear()
-            now_s = env.now
-            while due_s <= now_s:
-                due_s += period_s
-            if adaptation is None and is_event_triggered and period_s <= now_s:
-                due_s = yield from self._wait_for_event(due_s, period_s)
-            else:
-                yield until(env, due_s)
+    def _adapt(self) -> None:
+        """Call `adapt`, at one of its times."""
+        self._is_waiting, requests = False, self.system.modes.requests
+        adaptation = self._guarded(self.manager.adapt)
+        if adaptation is None:
+            self._go_on(changed=self.system.modes.requests > requests, waits=self._is_event_triggered)
+        elif isinstance(adaptation, Generator):
+            self.system.env.process(self._guarded_process(adaptation))
+        else:
+            raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
 
-    def _wait_for_event(self, due_s: float, period_s: float) -> Generator[simpy.Event, Any, float]:
-        """Wait until the first time of `adapt`, from `due_s` on, at which a call may change something; return it."""
-        env = self.system.env
-        tick_s, next_due_s = env.now, due_s
+    def _go_on(self, *, changed: bool, waits: bool) -> None:
+        """Set the alarm to the next time of `adapt`, or, if it waits, to the next one that may change something."""
+        now_s, period_s = self.system.env.now, self._period_s
+        while self._due_s <= now_s:
+            self._due_s += period_s
+        if changed:
+            self._idle_regions.clear()
+        if not waits or now_s < period_s:
+            self._alarm.set(self._due_s)
+            return
+        self._is_waiting, tick_s, next_due_s = True, now_s, self._due_s
         self._idle_regions.add(self._regions(tick_s))
-        self._is_waiting = True
-        try:
-            while True:
-                event_s = min([each.next_crossing_s(tick_s, limits) for each, limits in self._depends_on], default=inf)
-                if event_s == inf:
-                    yield env.event()  # until interrupted
-                tick_s = _tick_at_or_after(event_s, next_due_s, period_s)
-                if self._regions(tick_s) not in self._idle_regions:
-                    yield exactly_at(env, tick_s)
-                    self._is_waiting = False
-                    return tick_s
-                next_due_s = tick_s + period_s
-        except simpy.Interrupt:
-            tick_s = _tick_at_or_after(env.now, due_s, period_s)
-            yield until(env, tick_s)
-            return tick_s
+        while self._regions(tick_s) in self._idle_regions:
+            event_s = min([each.next_crossing_s(tick_s, limits) for each, limits in self._depends_on], default=inf)
+            if event_s == inf:
+                return
+            tick_s = _tick_at_or_after(event_s, next_due_s, period_s)
+            next_due_s = tick_s + period_s
+        self._alarm.set(tick_s, exactly=True)
 
     def _regions(self, t_s: float) -> tuple[int, ...]:
         return tuple([each.region(t_s, thresholds) for each, thresholds in self._depends_on])
@@ -178,6 +169,7 @@ class ManagerHost:
                 if not isinstance(event, simpy.Event):
                     raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")
             except StopIteration:
+                self._go_on(changed=True, waits=False)
                 return
             except RAISED as error:
                 raise self.error_of(error) from error
