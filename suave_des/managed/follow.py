@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import pairwise
+from operator import add
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -121,6 +123,5 @@ class FollowPipeline(WaypointFunction):
         lengths_m = self.path.lengths_m[self._next + (not self._has_arrived) : self._next + count]
         self._next += count
         self._has_arrived = True
-        for length_m in lengths_m:
-            self._travelled_m += length_m
-            self._published_m = self._travelled_m
+        if lengths_m:
+            self._published_m = self._travelled_m = reduce(add, lengths_m, self._travelled_m)

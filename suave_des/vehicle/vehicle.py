@@ -1,6 +1,7 @@
 """A vehicle in mission time: events command and disturb it, it can be read at any time, and is integrated lazily."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, InitVar, dataclass, field
 from typing import Literal, NamedTuple
@@ -86,7 +87,7 @@ class _Queue(NamedTuple):
     def sent_until(self, t_s: float) -> int:
         """Count the set-points that have been sent by time t."""
         last = [course.check.last_tick_until(t_s) for course in self.courses]
-        return sum([tick <= last[course] for tick, course, _, _ in self.sends])
+        return bisect_left(self.sends, True, key=lambda send: send[0] > last[send[1]])
 
 
 @dataclass(eq=False)
