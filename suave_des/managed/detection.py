@@ -50,10 +50,10 @@ class PipelineDetector:
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
         self._alarm = Alarm(self.env, self._ring)
-        self.vehicle.control_listeners.append(self._control_changed)
+        self.vehicle.track_listeners.append(self._track_changed)
         self._look_ahead(0)
 
-    def _control_changed(self, row: int, is_planned: bool) -> None:
+    def _track_changed(self, row: int) -> None:
         self._rows_ahead = _MIN_ROWS_AHEAD
         self._look_ahead(row)
 
@@ -77,7 +77,7 @@ class PipelineDetector:
             self._rows_ahead *= 2
             self._look_ahead(self._row)
             return
-        self.vehicle.control_listeners.remove(self._control_changed)
+        self.vehicle.track_listeners.remove(self._track_changed)
         self.first_point = self._seen
         self.detected_s = float(self.env.now)
         self.log("detection", "pipeline_detected", f"point {self.first_point}")

@@ -114,10 +114,10 @@ class WaypointFunction(FunctionNode):
         if self._check is not None:
             self.sender.vehicle.cancel_waypoints(self.env.now)
 
-    def _control_changed(self, row: int, is_planned: bool) -> None:
+    def _control_changed(self) -> None:
         """Look ahead again at the next tick after a change of control that was not queued; it cancels what was."""
         check = self._check
-        if check is not None and not is_planned:
+        if check is not None:
             self.catch_up()
             tick = check.last_tick_until(self.env.now)
             if self._act_at > tick + (self._due is Due.LOOK):
@@ -167,9 +167,10 @@ class WaypointFunction(FunctionNode):
             each._alarm.cancel()
         if is_due:
             acts = flying[sends[-1][1]]
-            *before, (act_at, _, reached, _) = acts._sends
-            acts._due = Due.SEND if reached > (before[-1][2] if before else 0) else Due.RESEND
-            acts._set_alarm(course.check if acts is self else further[0].check, act_at)
+            last = acts._sends[-1]
+            is_reached = last[2] > (acts._sends[-2][2] if len(acts._sends) > 1 else 0)
+            acts._due = Due.SEND if is_reached else Due.RESEND
+            acts._set_alarm(course.check if acts is self else further[0].check, last[0])
         elif until < _NEVER:
             self._due = Due.LOOK
             self._set_alarm(check, until + 1)

@@ -47,6 +47,7 @@ class System:
         measurements: the monitors' measurements, by quality attribute; see `measured`.
         scenario: the mission's scenario.
         settings: the scenario's entry for this manager, under `managers:`.
+        recorded: whether the mission is recorded; if not, work that only serves the log can be skipped.
         state_changed: call this when something that `adapt` depends on has changed outside a hook.
 
     Example:
@@ -60,6 +61,7 @@ class System:
     measurements: Mapping[str, Measurements]
     scenario: Scenario
     settings: Mapping[str, Any]
+    recorded: bool
     _manager: str
     _coordinator: MissionCoordinator
     _vehicle: Vehicle
@@ -111,11 +113,6 @@ class System:
             Whether the modes file has such a mode.
         """
         return self.modes.change_mode(function, mode)
-
-    @property
-    def recorded(self) -> bool:
-        """Whether the mission is recorded; if not, work that only serves the log can be skipped."""
-        return self._recorder.enabled
 
     def log(self, event: str, detail: str) -> None:
         """Add an event and its detail to the mission's record."""

@@ -131,17 +131,16 @@ class Measurements:
             crossings = self._crossings[thresholds] = [self.times_s[index] for index in indices], regions
         return crossings
 
-    def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Number the region of the value last published by mission time t; -1 if there is none."""
+    def region_until(self, t_s: float, thresholds: Thresholds) -> tuple[int, float]:
+        """Find the region of the value last published by mission time t, and when the first one after it is in another.
+
+        Returns:
+            The region, -1 if nothing was published; and the time, inf if there is no such value.
+        """
         crossings_s, regions = self.crossings(thresholds)
         passed = bisect_right(crossings_s, t_s)
-        return regions[passed - 1] if passed else -1
-
-    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Find the time of the first value after mission time t that is in another region, or inf."""
-        crossings_s, _ = self.crossings(thresholds)
-        passed = bisect_right(crossings_s, t_s)
-        return crossings_s[passed] if passed < len(crossings_s) else math.inf
+        until_s = crossings_s[passed] if passed < len(crossings_s) else math.inf
+        return regions[passed - 1] if passed else -1, until_s
 
     def next_message_s(self, t_s: float) -> float:
         """Find the time of the first message, changed or not, at or after t."""

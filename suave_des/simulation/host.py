@@ -144,18 +144,21 @@ class ManagerHost:
         if not waits or now_s < period_s:
             self._alarm.set(self._due_s)
             return
-        self._is_waiting, tick_s, next_due_s = True, now_s, self._due_s
-        self._idle_regions.add(self._regions(tick_s))
-        while self._regions(tick_s) in self._idle_regions:
-            event_s = min([each.next_crossing_s(tick_s, limits) for each, limits in self._depends_on], default=inf)
+        self._is_waiting, next_due_s = True, self._due_s
+        regions, event_s = self._regions_until(now_s)
+        self._idle_regions.add(regions)
+        while regions in self._idle_regions:
             if event_s == inf:
                 return
             tick_s = _tick_at_or_after(event_s, next_due_s, period_s)
             next_due_s = tick_s + period_s
+            regions, event_s = self._regions_until(tick_s)
         self._alarm.set(tick_s, exactly=True)
 
-    def _regions(self, t_s: float) -> tuple[int, ...]:
-        return tuple([each.region(t_s, thresholds) for each, thresholds in self._depends_on])
+    def _regions_until(self, t_s: float) -> tuple[tuple[int, ...], float]:
+        """Find the regions of measured values at mission time t, and until when they stay the same."""
+        found = [each.region_until(t_s, thresholds) for each, thresholds in self._depends_on]
+        return tuple([region for region, _ in found]), min([until_s for _, until_s in found], default=inf)
 
     def _guarded_process(self, adaptation: AdaptationProcess) -> Process:
         resume: Callable[[Any], object] = adaptation.send

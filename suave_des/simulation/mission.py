@@ -155,6 +155,7 @@ class Mission:
             measurements=self._measurements,
             scenario=described,
             settings=loaded.manager_settings(self._manager_name),
+            recorded=record,
             _manager=self._manager_name,
             _coordinator=self._coordinator,
             _vehicle=self._vehicle,

@@ -16,8 +16,6 @@ STEP_S = 0.05
 Point = tuple[float, float, float]
 ThrusterState = Literal["works", "frozen", "dead"]
 """A frozen thruster keeps the thrust that it had when it failed; a dead one gives none."""
-ControlListener = Callable[[int, bool], None]
-"""Called after a change of control with the first row that it affects, and whether way-points were sent or queued."""
 
 
 class ArrivalCheck(NamedTuple):
@@ -78,11 +76,12 @@ Sends = list[list[int]]
 
 
 class _Queue(NamedTuple):
-    """Queued set-points: `before` is in force until the first of them is sent."""
+    """Queued set-points: `before` is in force until the first of them is sent; `last_s` is the time of the last one."""
 
     courses: Sequence[Course]
     sends: Sends
     before: Array
+    last_s: float
 
     def sent_until(self, t_s: float) -> int:
         """Count the set-points that have been sent by time t."""
@@ -111,7 +110,8 @@ class Vehicle:
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
-        control_listeners: each is called after a change of control.
+        track_listeners: each is called after a change of control with the first row that it affects.
+        control_listeners: each is called after that, unless way-points were sent or queued.
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
 
@@ -132,7 +132,8 @@ class Vehicle:
     time_scale: float = 1.0
     z_limits_m: tuple[float, float] = (-math.inf, math.inf)
     memory: InitVar[Array | None] = None
-    control_listeners: list[ControlListener] = field(default_factory=list, init=False)
+    track_listeners: list[Callable[[int], None]] = field(default_factory=list, init=False)
+    control_listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
     computed_row: int = field(default=0, init=False)
     _queue: _Queue | None = field(default=None, init=False)
 
@@ -158,7 +159,7 @@ class Vehicle:
         self._cancel_after(t_s)
         self._set_point[:3] = x_m, y_m, z_m + self.altitude_error_m
         self._set_point[kernel.NUMBER] += 1.0
-        self._notify(t_s)
+        self._control_changed(t_s)
 
     def set_thruster(self, t_s: float, thruster: int, state: ThrusterState) -> None:
         """Let one of thrusters 1 .. n fail, or work again. The autopilot is not informed."""
@@ -173,7 +174,7 @@ class Vehicle:
             thrust_n = float(self._thrust_n[thruster - 1, kernel.LAST])
         self.thrusters[thruster - 1] = state
         self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
-        self._notify(t_s)
+        self._control_changed(t_s)
 
     def queue_waypoints(self, t_s: float, courses: Sequence[Course], *, send: bool) -> tuple[Sends, bool]:
         """Look ahead, and queue set-points: the tick that finds a way-point reached commands the next one.
@@ -189,35 +190,36 @@ class Vehicle:
             The set-points as they will be sent if control does not change; and whether the last of them is left to the
             caller: it is one too many, leads to none of the way-points, or might not be the same as before.
         """
-        is_new = send or (self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.sends))
+        is_new = send or (self._queue is not None and t_s < self._queue.last_s)
         if is_new:
             self._cancel_after(t_s)
         if send:
             self._replace_set_point(courses[0], 0, new=1)
-        waypoints = courses[0].waypoints
+        waypoints, first = courses[0].waypoints, 0
         if len(courses) > 1:
             waypoints = np.concatenate([each.waypoints[:, :3] for each in courses])
-        numbers, first = [], 0
-        for each in courses:
+        numbers = np.empty((len(courses), 18))
+        for n, each in enumerate(courses):
             end = first + len(each.waypoints)
-            numbers.append((*each.check, *each.sent_as_m, *each.ticks, first, first, end, each.most, STEP_S))
+            numbers[n] = *each.check, *each.sent_as_m, *each.ticks, first, first, end, each.most, STEP_S
             first = end
         before, sends = self._set_point.copy(), np.empty((first + 1, 4), np.int64)
         count, is_due, self.computed_row = kernel.fly_waypoints(
-            self.track, self.computed_row, self._dynamics, waypoints, np.array(numbers), sends
+            self.track, self.computed_row, self._dynamics, waypoints, numbers, sends
         )
         found: Sends = sends[:count].tolist()
         queued = found[: count - is_due]
         if queued:
-            self._queue = _Queue(courses, queued, before)
+            last_s = courses[queued[-1][1]].check.time_s(queued[-1][0])
+            self._queue = _Queue(courses, queued, before, last_s)
         if queued or is_new:
-            self._notify(t_s, is_planned=True)
+            self._track_changed(t_s)
         return found, is_due
 
     def cancel_waypoints(self, t_s: float) -> None:
         """Cancel the set-points that are queued after time t; whoever looks ahead does so again."""
         self._cancel_after(t_s)
-        self._notify(t_s)
+        self._control_changed(t_s)
 
     def position(self, t_s: float) -> Point:
         """Read the position at time t: x, y, z in m."""
@@ -256,16 +258,21 @@ class Vehicle:
         """Fill the track up to time t, and no further; from there on only the current set-point remains."""
         self.computed_row = self._row(t_s)
         queue, self._queue = self._queue, None
-        if queue is not None:
+        if queue is not None and t_s < queue.last_s:
             self._set_point[:] = queue.before
             if sent := queue.sent_until(t_s):
                 _, course, place, _ = queue.sends[sent - 1]
                 self._replace_set_point(queue.courses[course], place, new=sent)
 
-    def _notify(self, t_s: float, *, is_planned: bool = False) -> None:
+    def _track_changed(self, t_s: float) -> None:
         row = row_at(t_s)
+        for listener in self.track_listeners:
+            listener(row)
+
+    def _control_changed(self, t_s: float) -> None:
+        self._track_changed(t_s)
         for listener in self.control_listeners:
-            listener(row, is_planned)
+            listener()
 
 
 def track_rows(duration_s: float) -> int:

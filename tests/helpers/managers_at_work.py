@@ -60,10 +60,10 @@ def system_of(
     seed: int = 1,
 ) -> System:
     """What a manager sees, without a vehicle and a knowledge base."""
-    recorder = SimpleNamespace(enabled=recorded, log=lambda source, event, detail: None)
+    recorder = SimpleNamespace(log=lambda source, event, detail: None)
     parts = {"_manager": "m", "_coordinator": coordinator, "_vehicle": None, "_draws": Streams(seed, 1)}
     further = {"_recorder": recorder, "_files": {}, "_open_knowledge": lambda: None}
-    return System(env, modes, measurements, scenario, settings or {}, **parts, **further)
+    return System(env, modes, measurements, scenario, settings or {}, recorded, **parts, **further)
 
 
 class AtWork:

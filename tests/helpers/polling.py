@@ -70,7 +70,7 @@ POLLING: Final = {
     "_act": tick,
     "catch_up": catch_up,
     "waypoints_changed": lambda self: None,  # the next tick asks for the way-point anyway
-    "_control_changed": lambda self, row, check: None,
+    "_control_changed": lambda self: None,
 }
 IN_EACH_CYCLE: Final = {"_analyze_and_plan": analyze_and_plan_anew, "_changes_nothing": lambda self, reasoning: False}
 

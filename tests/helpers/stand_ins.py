@@ -13,7 +13,7 @@ from suave_des.scenario.modes import Mode
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle import kernel
 from suave_des.vehicle.model import GRAVITY_M_PER_S2
-from suave_des.vehicle.vehicle import ControlListener, Vehicle, row_at
+from suave_des.vehicle.vehicle import Vehicle, row_at
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -26,7 +26,7 @@ class PlacedVehicle:
     """
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
-        self.control_listeners: list[ControlListener] = []
+        self.control_listeners: list[Callable[[], None]] = []
         self._place = place
         self.obeys = obeys
         self.sends = False  # whether a way-point is being sent
@@ -41,8 +41,8 @@ class PlacedVehicle:
     def place(self, place: Place) -> None:
         """Put it elsewhere: like a change of control, this invalidates what was looked ahead."""
         self._place = place
-        for listener in self.control_listeners:
-            listener(0, self.sends)
+        if not self.sends:
+            self.cancel_waypoints(0.0)
 
     def position(self, t_s: float) -> Place:
         return self.place
@@ -64,7 +64,7 @@ class PlacedVehicle:
     def cancel_waypoints(self, t_s: float) -> None:
         """Tell the listeners, although no set-point is ever queued."""
         for listener in self.control_listeners:
-            listener(0, False)
+            listener()
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         self.commands.append((t_s, (x_m, y_m, z_m)))

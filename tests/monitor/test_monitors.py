@@ -87,7 +87,7 @@ def measurements(values: tuple[float, ...]) -> Measurements:
     ],
 )
 def test_a_value_crosses_a_threshold_when_it_is_on_it_or_beyond(thresholds, crossing_s):
-    assert measurements((9.0, 2.7, 3.0, 2.4, 1.0)).next_crossing_s(2.0, thresholds) == crossing_s
+    assert measurements((9.0, 2.7, 3.0, 2.4, 1.0)).region_until(2.0, thresholds)[1] == crossing_s
 
 
 LEVELS = st.sampled_from([0.5, 1.0, 1.5, 2.0]) | st.floats(0.0, 3.0)
@@ -105,8 +105,8 @@ def test_crossings_are_those_found_by_going_through_all_values(values, threshold
     crossings = [(float(n), region) for n, (before, region) in pairs if region != before]
     assert measured.crossings(thresholds) == tuple(map(list, zip(*crossings, strict=True)))
     passed = int(min(t_s, len(values)))
-    assert measured.region(t_s, thresholds) == (regions[passed - 1] if passed else -1)
-    assert measured.next_crossing_s(t_s, thresholds) == next((s for s, _ in crossings if s > t_s), math.inf)
+    region, until_s = regions[passed - 1] if passed else -1, next((s for s, _ in crossings if s > t_s), math.inf)
+    assert measured.region_until(t_s, thresholds) == (region, until_s)
 
 
 def test_noise_makes_every_measurement_another_one():
@@ -223,10 +223,10 @@ def test_a_level_looked_up_is_the_one_published_last(subscriber):
 
 def test_recharging_changes_what_a_level_crosses_afterwards():
     level = battery()
-    assert (level.region(0.4, (0.25,)), level.region(149.9, (0.25,)), level.region(150.5, (0.25,))) == (-1, 2, 0)
-    assert level.next_crossing_s(120.0, (0.25,)) == 150.5
+    regions_until = [level.region_until(t_s, (0.25,)) for t_s in (0.4, 149.9, 150.5)]
+    assert regions_until == [(-1, 0.5), (2, 150.5), (0, math.inf)]
     level.recharge(130.5)
-    assert level.region(130.5, (0.25, 1.0)) == 3 and level.next_crossing_s(131.0, (0.25,)) == 280.5
+    assert level.region_until(130.5, (0.25, 1.0))[0] == 3 and level.region_until(131.0, (0.25,))[1] == 280.5
 
 
 @given(
@@ -236,9 +236,9 @@ def test_recharging_changes_what_a_level_crosses_afterwards():
 )
 def test_no_level_is_in_another_region_before_the_next_crossing(thresholds, recharged_s, later_s):
     edges, plain, t_s = tuple(thresholds), battery(*recharged_s), recharged_s[-1] + later_s
-    region, crossing_s = plain.region(t_s, edges), battery(*recharged_s).next_crossing_s(t_s, edges)
-    messages = [message + 0.5 for message in range(500) if t_s < message + 0.5 < crossing_s]
-    assert all(plain.region(message, edges) == region for message in messages)
+    region, until_s = battery(*recharged_s).region_until(t_s, edges)
+    messages = [message + 0.5 for message in range(500) if t_s < message + 0.5 < until_s]
+    assert all(plain.region_until(message, edges)[0] == region for message in messages)
 
 
 # The bus

@@ -115,13 +115,13 @@ def test_reading_at_any_times_changes_no_bit(make_vehicle, plan, readings):
 @given(st.lists(commands | faults, max_size=5), st.integers(0, 800))
 def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan, ahead):
     foresighted = make_vehicle(duration_s=DURATION_S)
-    foresighted.control_listeners.append(lambda row, _: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
+    foresighted.track_listeners.append(lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
     assert np.array_equal(carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, []))
 
 
 def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle):
     vehicle, rows = make_vehicle(), []
-    vehicle.control_listeners.append(lambda row, _: rows.append(row))
+    vehicle.track_listeners.append(rows.append)
     vehicle.set_thruster(1.0, 2, "works")
     vehicle.set_thruster(2.0, 2, "frozen")
     vehicle.set_thruster(3.0, 2, "frozen")
