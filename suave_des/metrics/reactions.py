@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -58,14 +59,13 @@ class ReactionMeter:
         reactions_s = self.reactions_s()
         return sum(reactions_s) / len(reactions_s) if reactions_s else None
 
-    def _fitting_altitudes(self) -> Iterator[_Entry]:
+    def _fitting_altitudes(self) -> list[_Entry]:
         """The messages from which on another altitude fits than before."""
-        measured, thresholds_m = self.visibility, self.settings.visibility_thresholds_m[::-1]
-        altitudes_m = (None, *self.settings.expected_altitudes_m[::-1])
-        for t_s, region in zip(*measured.crossings(thresholds_m), strict=True):
-            if t_s > self.env.now:
-                break
-            yield t_s, _OpenEvents.expect, altitudes_m[(region + 1) // 2]
+        thresholds_m, altitudes_m = self.settings.visibility_thresholds_m, self.settings.expected_altitudes_m
+        crossings_s, regions = self.visibility.crossings(thresholds_m[::-1])
+        fitting_m = [None, *(altitude_m for altitude_m in altitudes_m[::-1] for _ in range(2))]
+        passed = bisect_right(crossings_s, self.env.now)
+        return [(crossings_s[n], _OpenEvents.expect, fitting_m[regions[n]]) for n in range(passed)]
 
     def _low_battery(self) -> Iterator[_Entry]:
         if self.battery is not None:
