@@ -167,9 +167,8 @@ class WaypointFunction(FunctionNode):
             each._alarm.cancel()
         if is_due:
             acts = flying[sends[-1][1]]
-            last = acts._sends[-1]
-            is_reached = last[2] > (acts._sends[-2][2] if len(acts._sends) > 1 else 0)
-            acts._due = Due.SEND if is_reached else Due.RESEND
+            last, *before = acts._sends[:-3:-1]
+            acts._due = Due.SEND if last[2] > (before[0][2] if before else 0) else Due.RESEND
             acts._set_alarm(course.check if acts is self else further[0].check, last[0])
         elif until < _NEVER:
             self._due = Due.LOOK

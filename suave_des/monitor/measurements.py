@@ -132,11 +132,7 @@ class Measurements:
         return crossings
 
     def region_until(self, t_s: float, thresholds: Thresholds) -> tuple[int, float]:
-        """Find the region of the value last published by mission time t, and when the first one after it is in another.
-
-        Returns:
-            The region, -1 if nothing was published; and the time, inf if there is no such value.
-        """
+        """Find the region of the value last published by mission time t, or -1, and when another one begins, or inf."""
         crossings_s, regions = self.crossings(thresholds)
         passed = bisect_right(crossings_s, t_s)
         until_s = crossings_s[passed] if passed < len(crossings_s) else math.inf
