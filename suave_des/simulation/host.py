@@ -55,7 +55,7 @@ class ManagerHost:
     training: bool
     manager: ManagingSubsystem = field(init=False)
     _is_waiting: bool = field(default=False, init=False)  # for a change
-    _due_s: float = field(default=inf, init=False)  # next time of `adapt`, or the first that is waited for
+    _due_s: float = field(default=inf, init=False)  # next time of `adapt`; while it waits, the earliest
     _idle_regions: set[tuple[int, ...]] = field(default_factory=set, init=False)  # in which calls change nothing
     _depends_on: list[tuple[Measurements, Thresholds]] = field(default_factory=list, init=False)
 
