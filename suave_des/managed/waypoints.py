@@ -167,7 +167,7 @@ class WaypointFunction(FunctionNode):
             each._alarm.cancel()
         if is_due:
             acts = flying[sends[-1][1]]
-            last, *before = acts._sends[:-3:-1]
+            last, *before = reversed(acts._sends[-2:])
             acts._due = Due.SEND if last[2] > (before[0][2] if before else 0) else Due.RESEND
             acts._set_alarm(course.check if acts is self else further[0].check, last[0])
         elif until < _NEVER:

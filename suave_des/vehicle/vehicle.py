@@ -198,7 +198,7 @@ class Vehicle:
         waypoints, first = courses[0].waypoints, 0
         if len(courses) > 1:
             waypoints = np.concatenate([each.waypoints[:, :3] for each in courses])
-        numbers = np.empty((len(courses), 18))
+        numbers = np.empty((len(courses), kernel.GRID + 1))
         for n, each in enumerate(courses):
             end = first + len(each.waypoints)
             numbers[n] = *each.check, *each.sent_as_m, *each.ticks, first, first, end, each.most, STEP_S
