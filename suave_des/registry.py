@@ -10,9 +10,12 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import entry_points
-from itertools import product
+from itertools import chain, product
+from math import inf, isnan
+from numbers import Real
 from pathlib import Path
 from sysconfig import get_path
 from traceback import FrameSummary, extract_tb
@@ -20,9 +23,16 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
-from suave_des.domain import GENERATE_RECHARGE_PATH, MANAGER_GROUP, MISSION_FUNCTIONS, SURFACE
+from suave_des.domain import (
+    BATTERY_LEVEL,
+    GENERATE_RECHARGE_PATH,
+    MANAGER_GROUP,
+    MISSION_FUNCTIONS,
+    SURFACE,
+    WATER_VISIBILITY,
+)
 from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
-from suave_des.managing.base import ManagingSubsystem
+from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Kind
 from suave_des.scenario.loader import LoadedScenario
 
@@ -255,6 +265,45 @@ def _form(root: type, hook: str) -> str:
     parameters = list(inspect.signature(getattr(root, hook)).parameters)
     arguments = ", ".join(["cls", *parameters] if is_of_class else parameters)
     return f"{'@classmethod ' if is_of_class else ''}def {hook}({arguments})"
+
+
+def times_of(manager: ManagingSubsystem) -> tuple[float, float] | None:
+    """Return a manager's period and first time; None if it is not called periodically.
+
+    Raises:
+        ValueError: they are no such times.
+    """
+    period_s, starts_s = manager.period_s, manager.starts_s
+    if period_s is None:
+        return None
+    are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
+    if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
+        problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
+        raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
+    return period_s, starts_s
+
+
+def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
+    """Return what a manager's class itself declares to depend on: one derived from it may depend on more.
+
+    Raises:
+        ValueError: it is no mapping from measured quality attributes to numbers.
+    """
+    declared = manager.depends_on if "depends_on" in vars(type(manager)) else None
+    if declared is None:
+        return None
+    known = measured_somewhere(manager.system)
+    with suppress(AttributeError, TypeError, ValueError):
+        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
+        if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
+            return found
+    form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}"
+    raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None")
+
+
+def measured_somewhere(system: System) -> list[str]:
+    """List what is measured, here or in some shipped scenario: a manager may be written for all of them."""
+    return sorted({*system.measurements, WATER_VISIBILITY, BATTERY_LEVEL})
 
 
 def names_in(kind: type) -> set[str]:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import chain
-from math import inf, isnan
-from numbers import Real
+from math import inf
 from typing import Any, TypeVar
 
 import simpy
 
 from suave_des.clock import Alarm, Process
-from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
+from suave_des.domain import Task
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
-from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
+from suave_des.managing.base import AdaptationProcess, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
 from suave_des.monitor.measurements import Measurements, Thresholds
-from suave_des.registry import names_in
+from suave_des.registry import dependencies_of, measured_somewhere, names_in, times_of
 
 RAISED = (Exception, SystemExit)
 """Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
@@ -67,8 +64,8 @@ class ManagerHost:
             if not hasattr(self.manager, "system"):
                 raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(system)")
             self.manager.recall(self.learned, self.training)
-            times = _times(self.manager)
-            declared = _dependencies(self.manager)
+            times = times_of(self.manager)
+            declared = dependencies_of(self.manager)
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
@@ -97,7 +94,7 @@ class ManagerHost:
         is_own = not author.__module__.startswith("suave_des.")
         if is_own and self.manager.period_s is None and "adapt" not in names_in(author):
             yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
-        known = _measured_somewhere(self.system)
+        known = measured_somewhere(self.system)
         for name in sorted(self.system.unmeasured.difference(known), key=str):
             yield f"measured({shown(name)}) is always None: nothing measures it ({did_you_mean(name, known)})"
 
@@ -186,45 +183,6 @@ class ManagerHost:
             return hook(*arguments)
         except RAISED as error:
             raise self.error_of(error) from error
-
-
-def _times(manager: ManagingSubsystem) -> tuple[float, float] | None:
-    """Return a manager's period and first time; None if it is not called periodically.
-
-    Raises:
-        ValueError: they are no such times.
-    """
-    period_s, starts_s = manager.period_s, manager.starts_s
-    if period_s is None:
-        return None
-    are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
-    if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
-        problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
-        raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
-    return period_s, starts_s
-
-
-def _dependencies(manager: ManagingSubsystem) -> Dependencies | None:
-    """Return what a manager's class itself declares to depend on: one derived from it may depend on more.
-
-    Raises:
-        ValueError: it is no mapping from measured quality attributes to numbers.
-    """
-    declared = manager.depends_on if "depends_on" in vars(type(manager)) else None
-    if declared is None:
-        return None
-    known = _measured_somewhere(manager.system)
-    with suppress(AttributeError, TypeError, ValueError):
-        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
-        if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
-            return found
-    form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}"
-    raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None")
-
-
-def _measured_somewhere(system: System) -> list[str]:
-    """List what is measured, here or in some shipped scenario: a manager may be written for all of them."""
-    return sorted({*system.measurements, WATER_VISIBILITY, BATTERY_LEVEL})
 
 
 def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
