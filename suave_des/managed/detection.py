@@ -70,7 +70,7 @@ class PipelineDetector:
             self._row = last
             self._alarm.set(last * STEP_S + _AFTER_CONTROL_S)
         else:
-            self._alarm.set(seen_row * STEP_S)
+            self._alarm.set(seen_row * STEP_S, exactly=True)
 
     def _ring(self) -> None:
         if self._seen < 0:
