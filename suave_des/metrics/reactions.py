@@ -64,7 +64,7 @@ class ReactionMeter:
         thresholds_m, altitudes_m = self.settings.visibility_thresholds_m, self.settings.expected_altitudes_m
         crossings_s, regions = self.visibility.crossings(thresholds_m[::-1])
         fitting_m = [None, *(altitude_m for altitude_m in altitudes_m[::-1] for _ in range(2))]
-        passed = bisect_right(crossings_s, self.env.now)
+        passed = bisect_right(crossings_s, self._entries[-1][0]) if self._entries else 0  # later ones are not answered
         return [(crossings_s[n], _OpenEvents.expect, fitting_m[regions[n]]) for n in range(passed)]
 
     def _low_battery(self) -> Iterator[_Entry]:
