@@ -42,7 +42,8 @@ class MaintainMotion(ProcessNode):
 
     def activity(self) -> Process:
         """Recover the thrusters."""
-        yield self.env.timeout(self.delay_s())
+        self.thrusters.vehicle.expected_changes_s["recovery"] = self.env.now + (delay_s := self.delay_s())
+        yield self.env.timeout(delay_s)
         for number, name in enumerate(THRUSTER_NAMES, start=1):
             if self.thrusters.recover(number):
                 self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))

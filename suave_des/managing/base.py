@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the comp
     from suave_des.vehicle.model import Pose
     from suave_des.vehicle.vehicle import Vehicle
 
-AdaptationProcess = Generator[simpy.Event, Any, None]
+AdaptationProcess = Generator[simpy.Event, Any, Any]
 Dependencies = Mapping[str, tuple[float, ...]]
 """By quality attribute: the numbers, ascending, that its measured value is compared with."""
 
@@ -160,6 +160,7 @@ class ManagingSubsystem:
         period_s: time between calls of `adapt`; None: never called.
         starts_s: mission time of the first call of `adapt`.
         reasoning_time_s: mission time that reasoning took before adaptations; a further metric.
+        least_latency_s: time from a call of `adapt` to a request at the earliest; only serves the simulation's speed.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one, and a
             reasoner runs beside the simulator, which slows it down (`calibration.reasoning_slowdown`).
         subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads `system.measured`
@@ -168,9 +169,9 @@ class ManagingSubsystem:
 
     A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends only on what its hooks were
     called with, and on how measured values compare with fixed thresholds, is event-triggered, and declares it by
-    `depends_on`. After a call of `adapt` that returned None, the next call is at the first of its times after a hook
-    was called, or a measured value has crossed a threshold: fewer calls, the same mission (but for an event at the very
-    time of a call, which may come before it).
+    `depends_on`. After a call of `adapt` that returned None, or a generator that returned True (a call right then would
+    change nothing), the next call is at the first of its times after a hook was called, or a measured value has crossed
+    a threshold: fewer calls, the same mission (but for an event at the very time of a call, which may come before it).
 
     Example:
         >>> class HighInClearWater(ManagingSubsystem):
@@ -188,6 +189,7 @@ class ManagingSubsystem:
     period_s: float | None = None
     starts_s: float = 0.0
     reasoning_time_s: float = 0.0
+    least_latency_s: float = 0.0
 
     @classmethod
     def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:

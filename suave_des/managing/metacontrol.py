@@ -75,13 +75,15 @@ class Metacontrol(ManagingSubsystem):
         # Measured before the first cycle: signals of which function designs expect a value.
         expected = self._reasoner.expected_attributes if revision.waits_for_first_measurement else frozenset[str]()
         self._awaited = expected.intersection(system.measurements, scenario.signals)
-        self._longest_s = support(scenario.latencies.inference_s)[1]
+        self.least_latency_s, self._longest_s = support(scenario.latencies.inference_s)
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_tick_s("metacontrol", self.period_s)
         bridge_s = revision.task_bridge_period_s
         self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
         self._has_objectives_from_launch = bool(system.functions)
         self._add_objectives((*system.functions, *revision.objectives_at_launch))
+        may_depend_on_more = system.recorded or type(self) is not Metacontrol
+        self._is_event_triggered = not may_depend_on_more and self.depends_on is not None
 
     # The loop.
 
@@ -94,8 +96,7 @@ class Metacontrol(ManagingSubsystem):
         reasoning = self._analyze_and_plan()
         if self.system.recorded:
             self.system.log_state(reasoning.inference.state)
-        # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
-        if self._longest_s < self.period_s and self._changes_nothing(reasoning):
+        if self._changes_nothing(reasoning):
             return None
         return self.execute(reasoning, self._latency_s(self.system.now_s))
 
@@ -129,7 +130,7 @@ class Metacontrol(ManagingSubsystem):
         return self._reasoner.plan(inference, improve_exceeded=self._revision.improve_when_exceeded)
 
     def execute(self, reasoning: Reasoning, latency_s: float) -> AdaptationProcess:
-        """Request the plan's modes after the reasoner's latency; their objectives lose their status."""
+        """Request the plan's modes after the reasoner's latency; return whether another cycle would change nothing."""
         recovered = [component for component, status in self.components.items() if status == RECOVERED]
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
@@ -146,6 +147,10 @@ class Metacontrol(ManagingSubsystem):
         for component in recovered:
             if self.components.get(component) == RECOVERED:
                 del self.components[component]
+        if not self._is_event_triggered:
+            return False
+        self.monitor()
+        return not self.objectives or self._changes_nothing(self._analyze_and_plan())
 
     def _request_modes(self, plan: Plan) -> dict[str, str]:
         """Request the mode of each design of a plan, but for functions that no longer have an objective.
@@ -273,7 +278,8 @@ class Metacontrol(ManagingSubsystem):
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""
-        if RECOVERED in self.components.values():
+        # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
+        if RECOVERED in self.components.values() or self._longest_s >= self.period_s:
             return False
         if self.system.recorded:
             if reasoning.inference.statuses - self._recorded_statuses:

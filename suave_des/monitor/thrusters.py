@@ -86,6 +86,7 @@ def thruster_monitor(
     for event, time_s in schedule:
         due_s = max(counted_from_s + time_s, earliest_s)
         tick_s = tick_at_or_after(due_s, timing.phase_s, timing.period_s)
+        thrusters.vehicle.expected_changes_s["thrusters"] = tick_s
         yield until(env, tick_s)
         thrusters.apply(event)
         if is_lost is None or not is_lost(env.now):

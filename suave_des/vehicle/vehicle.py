@@ -114,6 +114,7 @@ class Vehicle:
         control_listeners: each is called after that, unless way-points were sent or queued.
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
+        expected_changes_s: the next time at which control may be changed, by what may change it.
 
     Example:
         >>> vehicle = Vehicle(model, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
@@ -135,6 +136,7 @@ class Vehicle:
     track_listeners: list[Callable[[int], None]] = field(default_factory=list, init=False)
     control_listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
     computed_row: int = field(default=0, init=False)
+    expected_changes_s: dict[str, float] = field(default_factory=dict, init=False)
     _queue: _Queue | None = field(default=None, init=False)
 
     def __post_init__(self, memory: Array | None) -> None:

@@ -120,13 +120,14 @@ class DoesNotDeclare(EventTriggered):
 
 
 class NeverIdle(EventTriggered):
-    """Each call lets mission time pass, if only none."""
+    """Each call lets mission time pass, if only none; its settings say whether another one would change nothing."""
 
     depends_on: ClassVar = EventTriggered.depends_on
 
     def adapt(self):
         super().adapt()
         yield self.system.env.timeout(0.0)
+        return self.system.settings.get("settled")
 
 
 class TakesTime(EventTriggered):

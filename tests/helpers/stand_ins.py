@@ -27,8 +27,8 @@ class PlacedVehicle:
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
         self.control_listeners: list[Callable[[], None]] = []
-        self._place = place
-        self.obeys = obeys
+        self.duration_s, self.expected_changes_s = 1000.0, dict[str, float]()
+        self._place, self.obeys = place, obeys
         self.sends = False  # whether a way-point is being sent
         self.rise_m, self.altitude_error_m = rise_m, 0.0
         self.commands: list[tuple[float, Place]] = []

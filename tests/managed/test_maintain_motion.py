@@ -24,9 +24,8 @@ class Motion:
         self.published: list[Diagnostic] = []
         self.restored: list[tuple[float, int]] = []
         bus.subscribe(self.published.append)
-        self.node = MaintainMotion(
-            self.env, bus, revision(name).recovery, SimpleNamespace(recover=self.recover), lambda: 10.0
-        )
+        thrusters = SimpleNamespace(recover=self.recover, vehicle=PlacedVehicle())
+        self.node = MaintainMotion(self.env, bus, revision(name).recovery, thrusters, lambda: 10.0)
 
     def recover(self, thruster: int) -> bool:
         self.restored.append((self.env.now, thruster))

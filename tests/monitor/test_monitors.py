@@ -16,6 +16,7 @@ from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Ti
 from suave_des.monitor.thrusters import thruster_monitor
 from suave_des.scenario.models import ThrusterEvent
 from suave_des.world.signals import constant, sinusoid, step
+from tests.helpers.stand_ins import PlacedVehicle
 
 VISIBILITY = sinusoid(80.0, 1.25, 3.75)
 
@@ -137,10 +138,10 @@ def publish_events(
 ) -> list:
     """Run a schedule to its end; the events, with the times at which they happened."""
     happened: list[tuple[float, ThrusterEvent]] = []
-    thrusters = SimpleNamespace(env=subscriber.env, apply=lambda event: happened.append((subscriber.env.now, event)))
-    timing = Timing(1.0, phase_s)
-    subscriber.env.process(thruster_monitor(thrusters, subscriber.bus, schedule, timing, after_previous))
-    subscriber.env.run()
+    env, vehicle = subscriber.env, PlacedVehicle()
+    thrusters = SimpleNamespace(env=env, vehicle=vehicle, apply=lambda event: happened.append((env.now, event)))
+    env.process(thruster_monitor(thrusters, subscriber.bus, schedule, Timing(1.0, phase_s), after_previous))
+    env.run()
     return happened
 
 

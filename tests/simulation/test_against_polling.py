@@ -15,11 +15,11 @@ MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
 
 
 class Restless(RandomManager):
-    """Picks modes of both functions at all times: often both send set-points."""
+    """Picks modes of both functions at all times: often both send set-points; and is wrong about its latency."""
 
     def __init__(self, system):
         super().__init__(system)
-        self._functions = ("f_generate_search_path", "f_follow_pipeline")
+        self._functions, self.least_latency_s = ("f_generate_search_path", "f_follow_pipeline"), 20.0
 
     task_requested = task_cancelled = diagnostic = lambda self, _: None
 

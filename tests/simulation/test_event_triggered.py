@@ -67,6 +67,8 @@ def test_no_call_is_skipped(manager, record):
 )
 def test_it_is_called_at_the_first_of_its_times_after_a_value_has_crossed_a_threshold(value, called):
     assert called_s(steps(2.5, value, 31.5)) == called
+    is_settled = with_settings("NeverIdle", settled=True)  # its generator returns True
+    assert called_s({**steps(2.5, value, 31.5), **is_settled}, "NeverIdle") == called
 
 
 def test_it_is_called_at_the_first_of_its_times_after_a_diagnostic():
