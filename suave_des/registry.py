@@ -23,14 +23,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
-from suave_des.domain import (
-    BATTERY_LEVEL,
-    GENERATE_RECHARGE_PATH,
-    MANAGER_GROUP,
-    MISSION_FUNCTIONS,
-    SURFACE,
-    WATER_VISIBILITY,
-)
+from suave_des import domain
 from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Kind
@@ -139,14 +132,14 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
         InputError: a function that the mission needs has no node, or a class cannot be used.
     """
     scenario, registered = loaded.scenario, _registered(FUNCTION_GROUP)
-    recharge = () if scenario.battery is None else (GENERATE_RECHARGE_PATH,)
-    built_in = (*MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,)))
+    recharge = () if scenario.battery is None else (domain.GENERATE_RECHARGE_PATH,)
+    built_in = (*domain.MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (domain.SURFACE,)))
     types = {name: name for name in loaded.modes.functions if name in registered and name not in built_in}
     types |= {name: settings.node for name, settings in scenario.functions.items()}
     for name in scenario.needed_functions():
         if name not in built_in and name not in types:
             remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
-            remedy = "add battery: {}" if name == GENERATE_RECHARGE_PATH else remedy
+            remedy = "add battery: {}" if name == domain.GENERATE_RECHARGE_PATH else remedy
             raise loaded.layer.error(f"function {name} has no node", ("mission", "functions"), remedy)
     if not types:
         return {}
@@ -188,7 +181,7 @@ def declared_files(
 
 
 @cache
-def _registered(group: str = MANAGER_GROUP) -> dict[str, str]:
+def _registered(group: str = domain.MANAGER_GROUP) -> dict[str, str]:
     return {point.name: point.value for point in entry_points(group=group)}
 
 
@@ -299,13 +292,13 @@ def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
         found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
         if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
             return found
-    form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}"
+    form = f"{{'{domain.WATER_VISIBILITY}': (2.25, 3.25)}}"
     raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None")
 
 
 def measured_somewhere(system: System) -> list[str]:
     """List what is measured, here or in some shipped scenario: a manager may be written for all of them."""
-    return sorted({*system.measurements, WATER_VISIBILITY, BATTERY_LEVEL})
+    return sorted({*system.measurements, domain.WATER_VISIBILITY, domain.BATTERY_LEVEL})
 
 
 def names_in(kind: type) -> set[str]:

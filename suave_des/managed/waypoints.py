@@ -173,7 +173,7 @@ class WaypointFunction(FunctionNode):
             acts._due = Due.SEND if last[2] > (before[0][2] if before else 0) else Due.RESEND
             acts._set_alarm(course.check if acts is self else further[0].check, last[0])
         else:
-            self._due = Due.NOTHING if until == horizon else Due.LOOK
+            self._due = Due.NOTHING if until == horizon else Due.LOOK  # for which the other function waits
             self._set_alarm(check, until + 1)
 
     def _course(self, check: ArrivalCheck, waypoints: Array, first: int, until: int) -> Course:
