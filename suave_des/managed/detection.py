@@ -11,7 +11,7 @@ from suave_des.managed.node import Log
 from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle
 from suave_des.world.pipeline import first_detection
 
-_MIN_ROWS_AHEAD = 22
+_MIN_ROWS_AHEAD = 60
 """Minimum look-ahead after a change of control, doubled while there is no other; or as far as guidance has computed."""
 _AFTER_CONTROL_S = 0.6 * STEP_S
 """Delay past the last checked row before more are checked: a control change that rounds to that row comes first."""

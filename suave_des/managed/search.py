@@ -77,8 +77,9 @@ class GenerateSearchPath(WaypointFunction):
 
     def _restart(self) -> None:
         self._step = 0
-        self._last_altitude_m: float | None = None  # of the way-points before
+        self._last_altitude_m: float | None = None  # at the last tick
         self._ahead: Array | None = None  # the current way-point and some that follow it; None before the first
+        self._ahead_altitude_m = self.altitude_m
 
     def configure(self, mode: Mode) -> None:
         """Apply the mode's spiral_altitude; the spiral itself continues."""
@@ -106,22 +107,26 @@ class GenerateSearchPath(WaypointFunction):
         """Stop ticking."""
         self.stop()
 
-    def waypoints(self, count: int) -> Array:
-        """Return the current way-point and those that follow it; at another altitude than before they are a step on."""
+    def ticked(self) -> None:
+        """At another altitude than at the tick before, the spiral is a step on."""
         if self.altitude_m != self._last_altitude_m:
             self._step += 1
             self._last_altitude_m = self.altitude_m
-        elif self._ahead is not None and len(self._ahead) > count:
+
+    def waypoints(self, count: int) -> Array:
+        """Return the current way-point and those that follow it."""
+        if self._ahead is not None and len(self._ahead) > count and self._ahead_altitude_m == self.altitude_m:
             return self._ahead[:count]
         waypoints = np.empty((count + 1, 4))  # the last one is current when all others are reached
+        step = self._step + (self.altitude_m != self._last_altitude_m)
         form = self.revision.angle_step_rad, self.view_tangent
         if self._ahead is None:
-            spiral(self._step, 0.0, self.altitude_m, form, self.centre_m, waypoints)
+            spiral(step, 0.0, self.altitude_m, form, self.centre_m, waypoints)
             self._step += 1
         else:
             waypoints[0] = self._ahead[0]
-            spiral(self._step, waypoints.item(0, 3), self.altitude_m, form, self.centre_m, waypoints[1:])
-        self._ahead = waypoints
+            spiral(step, waypoints.item(0, 3), self.altitude_m, form, self.centre_m, waypoints[1:])
+        self._ahead, self._ahead_altitude_m = waypoints, self.altitude_m
         return waypoints[:count]
 
     def set_point_z_m(self) -> float:

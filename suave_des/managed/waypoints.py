@@ -3,7 +3,7 @@
 The exemplar's functions check at every tick of a timer whether their way-point is reached; then they send the next one.
 Nothing else changes at most ticks, so a function looks ahead, until control may change: it queues the next way-points,
 knows the tick at which each will be reached, and sets an alarm for the tick at which it has to act. When control or the
-way-points change earlier, it counts what has been reached by then, and looks ahead again at the next tick.
+way-points change earlier, it counts what has been reached by then, and looks ahead again from the next tick on.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from suave_des.compiling import Array
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.vehicle.vehicle import ArrivalCheck, Course, Sends
 
-QUEUED_WAYPOINTS: Final = 30
-"""Number of way-points queued in addition to the current one; with 20 or 40, some missions take 3% less, some more."""
+QUEUED_WAYPOINTS: Final = 60
+"""Number of way-points queued in addition to the current one; with 30 or 80, some missions take 3% less, some more."""
 
 
 class Due(Enum):
@@ -27,11 +27,9 @@ class Due(Enum):
 
     SEND = "it is sent, as it is a new one"
     RESEND = "it is sent again, as it was not reached in time"
-    LOOK = "nothing is sent, but looked ahead: something has changed, or the last way-point is resumed"
-    NOTHING = "nothing: it looks ahead anew where control may change, or the other function acts before"
+    NOTHING = "nothing: it looks ahead anew, or resumes the last way-point"
 
 
-_SENDS: Final = (Due.SEND, Due.RESEND)
 _NEVER: Final = 10**9  # a tick after every mission's end
 
 
@@ -51,6 +49,7 @@ class WaypointFunction(FunctionNode):
     _sends: Sends = field(default_factory=list, init=False)  # what is queued, and what is due
     _counted: int = field(default=0, init=False)  # how many way-points of the last look ahead have been reached
     _resend_at: int = field(default=0, init=False)  # tick that sends the current way-point again if it is not reached
+    _changed_from: int = field(default=0, init=False)  # first tick after a change of way-points, or _NEVER
 
     def __post_init__(self) -> None:
         self._alarm = Alarm(self.env, self._act)
@@ -73,6 +72,9 @@ class WaypointFunction(FunctionNode):
         """Return the z to send, which may differ from the way-point's."""
         raise NotImplementedError
 
+    def ticked(self) -> None:
+        """React to the first tick, and to the first after a change of way-points."""
+
     def reached(self, count: int) -> None:
         """Advance by `count` way-points, which have been reached, starting with the current one."""
 
@@ -86,7 +88,8 @@ class WaypointFunction(FunctionNode):
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
         """Start ticking at mission time t, and send the current way-point, unless the last one sent is resumed."""
-        self._due, self._sends, self._act_at = Due.LOOK if resumes else Due.SEND, [], 0
+        self._due, self._sends = Due.NOTHING if resumes else Due.SEND, []
+        self._act_at = self._changed_from = 0
         if t_s > self.env.now:
             self._alarm.set(t_s)
         else:
@@ -110,19 +113,17 @@ class WaypointFunction(FunctionNode):
             self._count_arrivals(tick)
 
     def waypoints_changed(self) -> None:
-        """Look ahead again at the next tick after the way-points change (call `catch_up` before they do)."""
+        """Look ahead again after the way-points change (call `catch_up` before they do)."""
         if self._check is not None:
+            self._changed_from = self._check.last_tick_until(self.env.now) + 1
             self.sender.vehicle.cancel_waypoints(self.env.now)
 
     def _control_changed(self) -> None:
-        """Look ahead again at the next tick after a change of control that was not queued; it cancels what was."""
-        check = self._check
-        if check is not None:
-            self.catch_up()
-            tick = check.last_tick_until(self.env.now)
-            if self._act_at > tick + (self._due is Due.LOOK):
-                self._sends, self._due = [], Due.LOOK
-                self._set_alarm(check, tick + 1)
+        """Look ahead again, from the next tick on, after a change of control that was not queued."""
+        self.catch_up()
+        if (check := self._check) is not None:
+            tick, self._due = check.last_tick_until(self.env.now), Due.NOTHING
+            self._look_ahead(check, tick, tick + 1)
 
     def _act(self) -> None:
         """Do what is due at this tick, and look ahead to the next tick at which something is."""
@@ -135,12 +136,12 @@ class WaypointFunction(FunctionNode):
             elif self._due is Due.RESEND:
                 self.not_reached()
                 self._resend_at = tick + check.resend_again_ticks
-            self._look_ahead(check, tick)
+            self._look_ahead(check, tick, tick + check.first_check_ticks * (self._due is not Due.NOTHING))
 
-    def _look_ahead(self, check: ArrivalCheck, tick: int) -> None:
+    def _look_ahead(self, check: ArrivalCheck, tick: int, first: int) -> None:
         """Queue way-points, the current one included if it is due, and see when something has to be done next.
 
-        The other function, if it ticks too, is looked ahead for at the same time, unless it is about to look by itself.
+        The other function, if it ticks too, is looked ahead for at the same time, unless it acts at this very time.
         """
         waypoints, vehicle, now_s = self.waypoints(1 + QUEUED_WAYPOINTS), self.sender.vehicle, self.env.now
         if len(waypoints) == 0:
@@ -149,20 +150,20 @@ class WaypointFunction(FunctionNode):
             self.completed()
             vehicle.cancel_waypoints(now_s)
             return
-        is_new, flying, further = self._due in _SENDS, [self], []
-        changes_s = [vehicle.duration_s, *[t_s for t_s in vehicle.expected_changes_s.values() if t_s > now_s]]
-        until = horizon = max(tick, check.last_tick_until(min(changes_s)))
-        send = is_new and not self.sender.is_lost()
+        flying, further = [self], []
+        until_s = min([vehicle.duration_s, *[t_s for t_s in vehicle.expected_changes_s.values() if t_s > now_s]])
+        send = self._due is not Due.NOTHING and not self.sender.is_lost()
         if (other := self.other) is not None and (others := other._check) is not None:
             past = others.last_tick_until(now_s)
-            if other._act_at <= past or other._due is Due.LOOK:
-                until = max(tick, min(until, check.last_tick_until(others.time_s(other._act_at))))
+            if other._act_at <= past:
+                until_s = now_s
             else:
                 other.catch_up()
                 flying.append(other)
                 further.append(other._course(others, other.waypoints(1 + QUEUED_WAYPOINTS), past + 1, _NEVER))
-        course = self._course(check, waypoints, tick + is_new * check.first_check_ticks, until)
-        sends, is_due = vehicle.queue_waypoints(now_s, [course, *further], send=send)
+        until = max(tick, check.last_tick_until(until_s))
+        course = self._course(check, waypoints, first, until)
+        sends, is_due = vehicle.queue_waypoints(now_s, [course, *further], until_s, send=send)
         for place, each in enumerate(flying):
             each._sends = [sent for sent in sends if sent[1] == place] if further else sends
             each._counted, each._due, each._act_at = 0, Due.NOTHING, _NEVER
@@ -173,7 +174,6 @@ class WaypointFunction(FunctionNode):
             acts._due = Due.SEND if last[2] > (before[0][2] if before else 0) else Due.RESEND
             acts._set_alarm(course.check if acts is self else further[0].check, last[0])
         else:
-            self._due = Due.NOTHING if until == horizon else Due.LOOK  # for which the other function waits
             self._set_alarm(check, until + 1)
 
     def _course(self, check: ArrivalCheck, waypoints: Array, first: int, until: int) -> Course:
@@ -181,10 +181,15 @@ class WaypointFunction(FunctionNode):
         return self.sender.course(waypoints, self.set_point_z_m(), check, ticks, QUEUED_WAYPOINTS)
 
     def _count_arrivals(self, tick: int) -> None:
+        if tick >= self._changed_from:
+            self._changed_from = _NEVER
+            self.ticked()
         if past := bisect_right(self._sends, [tick + 1]):
             _, _, reached, self._resend_at = self._sends[past - 1]
             del self._sends[:past]
-            is_sent_separately = self._due in _SENDS and not self._sends  # the last one is left to the function
+            is_sent_separately = (
+                self._due is not Due.NOTHING and not self._sends
+            )  # the last one is left to the function
             self.sender.queued_were_sent(past - is_sent_separately)
             if reached > self._counted:
                 self.reached(reached - self._counted)

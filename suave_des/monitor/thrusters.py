@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 
 import simpy
 
@@ -82,16 +83,19 @@ def thruster_monitor(
         after_previous: whether each time counts from the event before it (revision 2023) or from the start (1.5).
         is_lost: says whether the message at a mission time is not published; None: each one is.
     """
-    env, counted_from_s, earliest_s = thrusters.env, 0.0, 0.0
-    for event, time_s in schedule:
+    env, counted_from_s, earliest_s, ticks_s = thrusters.env, 0.0, 0.0, []
+    for _, time_s in schedule:
         due_s = max(counted_from_s + time_s, earliest_s)
-        tick_s = tick_at_or_after(due_s, timing.phase_s, timing.period_s)
-        thrusters.vehicle.expected_changes_s["thrusters"] = tick_s
+        ticks_s.append(tick_s := tick_at_or_after(due_s, timing.phase_s, timing.period_s))
+        earliest_s = tick_s + timing.period_s
+        if after_previous:
+            counted_from_s = tick_s
+    expected_s = thrusters.vehicle.expected_changes_s
+    for (event, _), tick_s, next_s in zip(schedule, ticks_s, [*ticks_s[1:], inf], strict=False):
+        expected_s.setdefault("thrusters", tick_s)
         yield until(env, tick_s)
+        expected_s["thrusters"] = next_s  # known before the vehicle is affected, and looked ahead for
         thrusters.apply(event)
         if is_lost is None or not is_lost(env.now):
             status = FAILED if event.event == "failure" else RECOVERED
             bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, THRUSTER_NAMES[event.thruster - 1], status))
-        earliest_s = tick_s + timing.period_s
-        if after_previous:
-            counted_from_s = tick_s

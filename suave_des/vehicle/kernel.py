@@ -311,12 +311,13 @@ def advance(
 
 @compiled
 def fly_waypoints(
-    track: Array, computed: int, dynamics: Dynamics, waypoints: Array, courses: Array, sends: IntArray
+    track: Array, rows: tuple[int, int], dynamics: Dynamics, waypoints: Array, courses: Array, sends: IntArray
 ) -> tuple[int, bool, int]:
     """Fly along one course or two: a tick that finds a way-point reached, or not in time, sends a set-point.
 
     Args:
-        track, computed, dynamics: as for `advance`, and the last row that is filled; the set-point given last remains.
+        track, dynamics: as for `advance`; the set-point given last remains.
+        rows: the last row that is filled, and the one to fill in any case, if not all set-points are known before.
         waypoints: x, y and z in the first columns, m, shape (n, at least 3).
         courses: shape (courses, 18), see `START` and the others.
         sends: shape (m, 4); receives for each set-point its tick, its course, how many of the course's way-points are
@@ -327,7 +328,7 @@ def fly_waypoints(
         How many set-points there are; whether the last of them is left to the caller; and the last row of the track
         that is now filled. Ticks beyond the track do not count.
     """
-    set_point, sent, last_row, courses = dynamics[1], 0, track.shape[0] - 1, courses.copy()
+    computed, set_point, sent, last_row, courses = rows[0], dynamics[1], 0, track.shape[0] - 1, courses.copy()
     while True:
         course = 0
         if courses.shape[0] > 1:
@@ -337,7 +338,7 @@ def fly_waypoints(
         timer, until = (this[START], this[PERIOD], this[GRID]), this[UNTIL]
         tick, again, place = int(this[TICK]), int(this[AGAIN]), int(this[PLACE])
         if tick > until or row_of(tick, timer) > last_row:
-            return sent, False, computed
+            break
         box = waypoints[place, 0], waypoints[place, 1], waypoints[place, 2], this[HALF_WIDTH], this[HALF_HEIGHT]
         if row_of(tick, timer) > computed:
             goal = again if courses.shape[0] == 1 else tick
@@ -347,7 +348,7 @@ def fly_waypoints(
             tick = found if is_reached else goal
             computed = row_of(tick, timer) if is_reached else end
             if tick > until or row_of(tick, timer) > last_row:
-                return sent, False, computed
+                break
         else:
             is_reached = is_in_box(track, row_of(tick, timer), box)
         if not is_reached and tick < again:
@@ -366,3 +367,5 @@ def fly_waypoints(
         set_point[NUMBER] += 1.0
         computed = row  # rows beyond it were flown to another set-point
         this[TICK], this[AGAIN], this[PLACE], this[ROOM] = tick + this[FEWEST], again, place, this[ROOM] - 1.0
+    advance(track, computed, rows[1], dynamics, *UNCHECKED)
+    return sent, False, max(computed, rows[1])

@@ -111,7 +111,7 @@ class Vehicle:
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
         track_listeners: each is called after a change of control with the first row that it affects.
-        control_listeners: each is called after that, unless way-points were sent or queued.
+        control_listeners: called before that, unless way-points were sent or queued, until one of them queues some.
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
         expected_changes_s: the next time at which control may be changed, by what may change it.
@@ -178,7 +178,7 @@ class Vehicle:
         self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
         self._control_changed(t_s)
 
-    def queue_waypoints(self, t_s: float, courses: Sequence[Course], *, send: bool) -> tuple[Sends, bool]:
+    def queue_waypoints(self, t_s: float, courses: list[Course], until_s: float, *, send: bool) -> tuple[Sends, bool]:
         """Look ahead, and queue set-points: the tick that finds a way-point reached commands the next one.
 
         One that is not reached in time is commanded again, unless it is reached but for its height. A change of control
@@ -186,6 +186,7 @@ class Vehicle:
 
         Args:
             courses: one, or two that are flown at the same time.
+            until_s: where looking ahead ends, at the latest with the mission.
             send: whether to command the first way-point of the first course now; the others are already commanded.
 
         Returns:
@@ -207,7 +208,7 @@ class Vehicle:
             first = end
         before, sends = self._set_point.copy(), np.empty((first + 1, 4), np.int64)
         count, is_due, self.computed_row = kernel.fly_waypoints(
-            self.track, self.computed_row, self._dynamics, waypoints, numbers, sends
+            self.track, (self.computed_row, row_at(until_s)), self._dynamics, waypoints, numbers, sends
         )
         found: Sends = sends[:count].tolist()
         queued = found[: count - is_due]
@@ -272,9 +273,11 @@ class Vehicle:
             listener(row)
 
     def _control_changed(self, t_s: float) -> None:
-        self._track_changed(t_s)
         for listener in self.control_listeners:
-            listener()
+            if self._queue is None:
+                listener()
+        if self._queue is None:
+            self._track_changed(t_s)
 
 
 def track_rows(duration_s: float) -> int:

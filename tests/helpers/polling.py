@@ -29,16 +29,16 @@ def tick(self: WaypointFunction) -> None:
     """Act at each tick: send what is due, and see whether the current way-point is reached now."""
     check = self._check = self._check or self.arrival_check(self.env.now)
     now = self._act_at
+    self.ticked()
     while True:
         if not len(self.waypoints(1)):
             self._check = None
             self.completed()
             return
-        if self._due is not Due.LOOK:
+        if self._due is not Due.NOTHING:
             self.sender.send(*self.waypoints(1)[0, :2].tolist(), self.set_point_z_m())
-            again = self._due is Due.RESEND
-            self._resend_at = now + (check.resend_again_ticks if again else check.resend_ticks)
-            self._due = Due.LOOK
+            self._resend_at = now + (check.resend_ticks if self._due is Due.SEND else check.resend_again_ticks)
+            self._due = Due.NOTHING
             if check.first_check_ticks:
                 break
         here, there = self.sender.vehicle.position(check.time_s(now)), self.waypoints(1)[0, :3].tolist()

@@ -27,7 +27,7 @@ class PlacedVehicle:
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
         self.control_listeners: list[Callable[[], None]] = []
-        self.duration_s, self.expected_changes_s = 1000.0, dict[str, float]()
+        self.duration_s, self.expected_changes_s, self.thrusters = 1000.0, dict[str, float](), list[str]()
         self._place, self.obeys = place, obeys
         self.sends = False  # whether a way-point is being sent
         self.rise_m, self.altitude_error_m = rise_m, 0.0
@@ -47,7 +47,7 @@ class PlacedVehicle:
     def position(self, t_s: float) -> Place:
         return self.place
 
-    def queue_waypoints(self, t_s, courses, *, send):
+    def queue_waypoints(self, t_s, courses, until_s, *, send):
         """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
         ((check, waypoints, sent_as_m, (first, again, _), _),) = courses
         if send:

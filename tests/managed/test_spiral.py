@@ -91,10 +91,12 @@ def test_a_reached_set_point_gives_the_next_one_each_tick_in_the_nodes_phase(alt
     assert search.vehicle.times_s == [0.25 + n for n in range(40)]
 
 
-def test_a_change_of_altitude_skips_one_angle_step_but_no_radius():
+@pytest.mark.parametrize("before_m", [(), (3.0,), (3.0, 1.0)])  # which no tick sees
+def test_a_change_of_altitude_skips_one_angle_step_but_no_radius(before_m):
     search = searching("2023", obeys=True)
     search.ticks(3)
-    search.node.apply(spiral_at(2.0))
+    for altitude_m in (*before_m, 2.0):
+        search.node.apply(spiral_at(altitude_m))
     search.ticks(1)
     assert search.spiral(ORIGIN)[-1] == point(3 + 2, 5)  # at 2 m a step widens the spiral twice as much
 
