@@ -22,6 +22,13 @@ def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
     return phase_s + max(0, math.ceil((t_s - phase_s) / period_s - 1e-9)) * period_s
 
 
+def summed_tick(t_s: float, due_s: float, period_s: float) -> float:
+    """First of due, due + period, ... that is not before t, with the rounding errors of a sum."""
+    while due_s < t_s:
+        due_s += period_s
+    return due_s
+
+
 def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
     """An event at mission time t itself; a delay added to the current time may miss it by rounding."""
     event = simpy.Event(env)

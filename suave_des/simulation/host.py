@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
+from types import GeneratorType
 from typing import Any, TypeVar
 
 import simpy
 
-from suave_des.clock import Alarm, Process
+from suave_des.clock import Alarm, Process, summed_tick
 from suave_des.domain import Task
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, ManagingSubsystem, System
@@ -118,7 +119,7 @@ class ManagerHost:
         self._idle_regions.clear()
         if self._is_waiting:
             self._is_waiting = False
-            self._set_alarm(_tick_at_or_after(self.system.env.now, self._due_s, self._period_s))
+            self._set_alarm(summed_tick(self.system.env.now, self._due_s, self._period_s))
 
     def _diagnostic(self, diagnostic: Diagnostic) -> None:
         self._guarded(self.manager.diagnostic, diagnostic)
@@ -130,7 +131,7 @@ class ManagerHost:
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:
             self._go_on(changed=self.system.modes.requests > requests, waits=self._is_event_triggered)
-        elif isinstance(adaptation, Generator):
+        elif isinstance(adaptation, GeneratorType):
             self.system.env.process(self._guarded_process(adaptation))
         else:
             raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
@@ -151,7 +152,7 @@ class ManagerHost:
         while regions in self._idle_regions:
             if event_s == inf:
                 return
-            tick_s = _tick_at_or_after(event_s, next_due_s, period_s)
+            tick_s = summed_tick(event_s, next_due_s, period_s)
             next_due_s = tick_s + period_s
             regions, event_s = self._regions_until(tick_s)
         self._set_alarm(tick_s, exactly=True)
@@ -163,8 +164,9 @@ class ManagerHost:
 
     def _regions_until(self, t_s: float) -> tuple[tuple[int, ...], float]:
         """Find the regions of measured values at mission time t, and until when they stay the same."""
-        found = [each.region_until(t_s, thresholds) for each, thresholds in self._depends_on]
-        return tuple([region for region, _ in found]), min([until_s for _, until_s in found], default=inf)
+        found = [each.region_until(t_s, thresholds) for each, thresholds in self._depends_on] or [(0, inf)]
+        regions, untils_s = zip(*found, strict=True)
+        return regions, min(untils_s)
 
     def _guarded_process(self, adaptation: AdaptationProcess) -> Process:
         resume: Callable[[Any], object] = adaptation.send
@@ -192,10 +194,3 @@ class ManagerHost:
             return hook(*arguments)
         except RAISED as error:
             raise self.error_of(error) from error
-
-
-def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
-    """Find the first of due_s, due_s + period_s, ... (summed, rounding included) that is not before t."""
-    while due_s < t_s:
-        due_s += period_s
-    return due_s
