@@ -187,10 +187,8 @@ class WaypointFunction(FunctionNode):
         if past := bisect_right(self._sends, [tick + 1]):
             _, _, reached, self._resend_at = self._sends[past - 1]
             del self._sends[:past]
-            is_sent_separately = (
-                self._due is not Due.NOTHING and not self._sends
-            )  # the last one is left to the function
-            self.sender.queued_were_sent(past - is_sent_separately)
+            is_left = self._due is not Due.NOTHING and not self._sends  # the last one, which the function sends
+            self.sender.queued_were_sent(past - is_left)
             if reached > self._counted:
                 self.reached(reached - self._counted)
                 self._counted = reached

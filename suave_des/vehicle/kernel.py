@@ -317,7 +317,7 @@ def fly_waypoints(
 
     Args:
         track, dynamics: as for `advance`; the set-point given last remains.
-        rows: the last row that is filled, and the one to fill in any case, if not all set-points are known before.
+        rows: the last row that is filled; and the one to fill up to, with no more set-points, where the ticks end.
         waypoints: x, y and z in the first columns, m, shape (n, at least 3).
         courses: shape (courses, 18), see `START` and the others.
         sends: shape (m, 4); receives for each set-point its tick, its course, how many of the course's way-points are
