@@ -79,7 +79,6 @@ class GenerateSearchPath(WaypointFunction):
         self._step = 0
         self._last_altitude_m: float | None = None  # at the last tick
         self._ahead: Array | None = None  # the current way-point and some that follow it; None before the first
-        self._ahead_altitude_m = self.altitude_m
 
     def configure(self, mode: Mode) -> None:
         """Apply the mode's spiral_altitude; the spiral itself continues."""
@@ -87,6 +86,7 @@ class GenerateSearchPath(WaypointFunction):
         if altitude is not None and altitude != self.altitude_m:
             self.catch_up()
             self.altitude_m = float(altitude)
+            self._keep_current()
             self.waypoints_changed()
 
     def activated(self) -> None:
@@ -98,6 +98,7 @@ class GenerateSearchPath(WaypointFunction):
         is_first = self._ahead is None
         if self.revision.centre == "activation" or (self.revision.centre == "first_activation" and is_first):
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
+            self._keep_current()
         if self._ready_s is None:
             self._ready_s = self.env.now + self.start_latency_s
         first_s = tick_at_or_after(max(self.env.now, self._ready_s), self.phase_s, self.revision.tick_period_s)
@@ -107,6 +108,10 @@ class GenerateSearchPath(WaypointFunction):
         """Stop ticking."""
         self.stop()
 
+    def _keep_current(self) -> None:
+        """Have the way-points after the current one generated anew."""
+        self._ahead = None if self._ahead is None else self._ahead[:1]
+
     def ticked(self) -> None:
         """At another altitude than at the tick before, the spiral is a step on."""
         if self.altitude_m != self._last_altitude_m:
@@ -115,7 +120,7 @@ class GenerateSearchPath(WaypointFunction):
 
     def waypoints(self, count: int) -> Array:
         """Return the current way-point and those that follow it."""
-        if self._ahead is not None and len(self._ahead) > count and self._ahead_altitude_m == self.altitude_m:
+        if self._ahead is not None and len(self._ahead) > count:
             return self._ahead[:count]
         waypoints = np.empty((count + 1, 4))  # the last one is current when all others are reached
         step = self._step + (self.altitude_m != self._last_altitude_m)
@@ -126,7 +131,7 @@ class GenerateSearchPath(WaypointFunction):
         else:
             waypoints[0] = self._ahead[0]
             spiral(step, waypoints.item(0, 3), self.altitude_m, form, self.centre_m, waypoints[1:])
-        self._ahead, self._ahead_altitude_m = waypoints, self.altitude_m
+        self._ahead = waypoints
         return waypoints[:count]
 
     def set_point_z_m(self) -> float:

@@ -73,7 +73,7 @@ class WaypointFunction(FunctionNode):
         raise NotImplementedError
 
     def ticked(self) -> None:
-        """React to the first tick, and to the first after a change of way-points."""
+        """React to the first tick, and to the first after a change of way-points; others may be reported, too."""
 
     def reached(self, count: int) -> None:
         """Advance by `count` way-points, which have been reached, starting with the current one."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
-from types import GeneratorType
 from typing import Any, TypeVar
 
 import simpy
@@ -131,7 +130,7 @@ class ManagerHost:
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:
             self._go_on(changed=self.system.modes.requests > requests, waits=self._is_event_triggered)
-        elif isinstance(adaptation, GeneratorType):
+        elif isinstance(adaptation, Generator):
             self.system.env.process(self._guarded_process(adaptation))
         else:
             raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))

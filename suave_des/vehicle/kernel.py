@@ -317,12 +317,13 @@ def fly_waypoints(
 
     Args:
         track, dynamics: as for `advance`; the set-point given last remains.
-        rows: the last row that is filled; and the one to fill up to, with no more set-points, where the ticks end.
+        rows: the last row that is filled; and the one up to which to fill, after the first course's last tick.
         waypoints: x, y and z in the first columns, m, shape (n, at least 3).
         courses: shape (courses, 18), see `START` and the others.
-        sends: shape (m, 4); receives for each set-point its tick, its course, how many of the course's way-points are
-            reached by then, and the tick that sends it again. The last of them is not given if there is no room for
-            more, if it leads to no way-point, or if the one before is reached but for its height.
+        sends: shape (m, 4), with one more than the courses' room in all; receives for each set-point its tick, its
+            course, how many of the course's way-points are reached by then, and the tick that sends it again. The last
+            of them is not given if there is no room for more, if it leads to no way-point, or if the one before is
+            reached but for its height.
 
     Returns:
         How many set-points there are; whether the last of them is left to the caller; and the last row of the track

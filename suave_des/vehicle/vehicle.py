@@ -111,7 +111,7 @@ class Vehicle:
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
         track_listeners: each is called after a change of control with the first row that it affects.
-        control_listeners: called before that, unless way-points were sent or queued, until one of them queues some.
+        control_listeners: called after a change of control by others, one after the other until one queues way-points.
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
         expected_changes_s: the next time at which control may be changed, by what may change it.
@@ -186,7 +186,7 @@ class Vehicle:
 
         Args:
             courses: one, or two that are flown at the same time.
-            until_s: where looking ahead ends, at the latest with the mission.
+            until_s: up to where the track is filled if no set-point is left to the caller; not after the mission's end.
             send: whether to command the first way-point of the first course now; the others are already commanded.
 
         Returns:
@@ -206,7 +206,7 @@ class Vehicle:
             end = first + len(each.waypoints)
             numbers[n] = *each.check, *each.sent_as_m, *each.ticks, first, first, end, each.most, STEP_S
             first = end
-        before, sends = self._set_point.copy(), np.empty((first + 1, 4), np.int64)
+        before, sends = self._set_point.copy(), np.empty((sum([each.most + 1 for each in courses]), 4), np.int64)
         count, is_due, self.computed_row = kernel.fly_waypoints(
             self.track, (self.computed_row, row_at(until_s)), self._dynamics, waypoints, numbers, sends
         )

@@ -36,32 +36,24 @@ def normal(std: float) -> dict[str, object]:
 
 
 def faults(*events: tuple[int, str, object]) -> dict[str, object]:
-    return {
-        "thruster_events": [{"thruster": thruster, "event": event, "time_s": t_s} for thruster, event, t_s in events]
-    }
+    return {"thruster_events": [dict(zip(("thruster", "event", "time_s"), each, strict=True)) for each in events]}
 
 
 NOISE = {"signals.water_visibility.noise": normal(0.1)}
 DRAWN_LATENCIES = {"latencies.inference_s": uniform(0.1, 3.0), "latencies.mode_change_s": uniform(0.1, 2.0)}
 LOST_SET_POINTS = {"revision.set_points.loss_probability": 0.3}
 BATTERY = {"battery": {}, "mission.time_limit_s": 400.0}
-FAULTS = faults(
-    (1, "failure", 20.0),
-    (3, "failure", 5.0),
-    (1, "recovery", 15.0),
-    (5, "failure", uniform(40.0, 90.0)),
-    (2, "failure", 60.0),
-)
+FAILURES = [(1, "failure", 20.0), (3, "failure", 5.0)]
+FAULTS = faults(*FAILURES, (1, "recovery", 15.0), (5, "failure", uniform(40.0, 90.0)), (2, "failure", 60.0))
 CURRENT = {"current.x_m_per_s": normal(0.08), "current.y_m_per_s": 0.1, "current.z_m_per_s": -0.02}
 FRAMES = {
     "revision.set_points.node_frame_offset_x_m": normal(0.3),
     "revision.set_points.node_frame_offset_z_m": normal(0.2),
 }
-IN_STEP = {  # modes take effect at the very time of a poll
-    "managers.random.adaptation_period_s": 1.0,
-    "revision.follow.poll_period_s": 1.0,
-    "latencies.mode_change_s": 1.7,
-}
+FOLLOW_POLL, SPIRAL = "revision.follow.poll_period_s", "revision.spiral"
+IN_STEP = {"managers.random.adaptation_period_s": 1.0, FOLLOW_POLL: 1.0, "latencies.mode_change_s": 1.7}  # at a poll
+LONG = {"mission.time_limit_s": 600.0, FOLLOW_POLL: 0.5, "revision.set_points.loss_probability": 0.0}
+MOVED = {f"{SPIRAL}.centre": "activation", f"{SPIRAL}.restarts_on_activation": False}
 CONDITIONS = {
     "as shipped": {},
     "noise": NOISE,
@@ -129,7 +121,12 @@ def test_looking_ahead_changes_nothing_whatever_the_scenario(
     assert_same(Simulator(with_values(LOADED[name], values)), manager, run)
 
 
-@pytest.mark.parametrize("values", [CONDITIONS["all of it"], IN_STEP], ids=["all of it", "in step"])
+def test_set_points_may_be_sent_more_often_than_there_are_way_points_left():
+    """The last ones are not reached: thrusters have failed."""
+    assert_same(Simulator(with_values(LOADED["planta_exp1"], LONG)), "none", 1)
+
+
+@pytest.mark.parametrize("values", [CONDITIONS["all of it"], IN_STEP, MOVED], ids=["all of it", "in step", "moved"])
 @pytest.mark.parametrize("name", sorted(LOADED))
 def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(name, values):
     restless = Simulator(with_values(LOADED[name], values))
