@@ -311,13 +311,13 @@ def advance(
 
 @compiled
 def fly_waypoints(
-    track: Array, rows: tuple[int, int], dynamics: Dynamics, waypoints: Array, courses: Array, sends: IntArray
+    track: Array, computed: int, end: int, dynamics: Dynamics, waypoints: Array, courses: Array, sends: IntArray
 ) -> tuple[int, bool, int]:
     """Fly along one course or two: a tick that finds a way-point reached, or not in time, sends a set-point.
 
     Args:
-        track, dynamics: as for `advance`; the set-point given last remains.
-        rows: the last row that is filled; and the one up to which to fill, after the first course's last tick.
+        track, computed, dynamics: as for `advance`, and the last row that is filled; the set-point given last remains.
+        end: the row up to which to fill, after the first course's last tick.
         waypoints: x, y and z in the first columns, m, shape (n, at least 3).
         courses: shape (courses, 18), see `START` and the others.
         sends: shape (m, 4), with one more than the courses' room in all; receives for each set-point its tick, its
@@ -329,7 +329,7 @@ def fly_waypoints(
         How many set-points there are; whether the last of them is left to the caller; and the last row of the track
         that is now filled. Ticks beyond the track do not count.
     """
-    computed, set_point, sent, last_row, courses = rows[0], dynamics[1], 0, track.shape[0] - 1, courses.copy()
+    set_point, sent, last_row, courses = dynamics[1], 0, track.shape[0] - 1, courses.copy()
     while True:
         course = 0
         if courses.shape[0] > 1:
@@ -343,11 +343,11 @@ def fly_waypoints(
         box = waypoints[place, 0], waypoints[place, 1], waypoints[place, 2], this[HALF_WIDTH], this[HALF_HEIGHT]
         if row_of(tick, timer) > computed:
             goal = again if courses.shape[0] == 1 else tick
-            end = min(row_of(int(min(goal, until)), timer), last_row)
-            found = advance(track, computed, end, dynamics, box, timer, tick)
+            last = min(row_of(int(min(goal, until)), timer), last_row)
+            found = advance(track, computed, last, dynamics, box, timer, tick)
             is_reached = 0 <= found <= min(goal, until)
             tick = found if is_reached else goal
-            computed = row_of(tick, timer) if is_reached else end
+            computed = row_of(tick, timer) if is_reached else last
             if tick > until or row_of(tick, timer) > last_row:
                 break
         else:
@@ -368,5 +368,5 @@ def fly_waypoints(
         set_point[NUMBER] += 1.0
         computed = row  # rows beyond it were flown to another set-point
         this[TICK], this[AGAIN], this[PLACE], this[ROOM] = tick + this[FEWEST], again, place, this[ROOM] - 1.0
-    advance(track, computed, rows[1], dynamics, *UNCHECKED)
-    return sent, False, max(computed, rows[1])
+    advance(track, computed, end, dynamics, *UNCHECKED)
+    return sent, False, max(computed, end)

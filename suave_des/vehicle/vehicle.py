@@ -208,7 +208,7 @@ class Vehicle:
             first = end
         before, sends = self._set_point.copy(), np.empty((sum([each.most + 1 for each in courses]), 4), np.int64)
         count, is_due, self.computed_row = kernel.fly_waypoints(
-            self.track, (self.computed_row, row_at(until_s)), self._dynamics, waypoints, numbers, sends
+            self.track, self.computed_row, row_at(until_s), self._dynamics, waypoints, numbers, sends
         )
         found: Sends = sends[:count].tolist()
         queued = found[: count - is_due]
