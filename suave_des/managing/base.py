@@ -171,7 +171,8 @@ class ManagingSubsystem:
     called with, and on how measured values compare with fixed thresholds, is event-triggered, and declares it by
     `depends_on`. After a call of `adapt` that returned None, or a generator that returned True (a call right then would
     change nothing), the next call is at the first of its times after a hook was called, or a measured value has crossed
-    a threshold: fewer calls, the same mission (but for an event at the very time of a call, which may come before it).
+    a threshold: fewer calls, the same mission (but for an event at the very time of a call, which may come before it;
+    and if a call that changes nothing takes time, in which something happens).
 
     Example:
         >>> class HighInClearWater(ManagingSubsystem):

@@ -17,6 +17,9 @@ from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import ReactionMetric
 from suave_des.scenario.modes import Mode
 
+_LATER_S = 1e-4
+"""From a time to the times after it, with all rounding errors."""
+
 
 @dataclass(eq=False)
 class ReactionMeter:
@@ -127,8 +130,9 @@ class _OpenEvents:
             if self._altitude_m == self._expected_m and "mismatch" in self._since_s:
                 self._answer("mismatch", t_s)
             else:
-                # The next message finds the mismatch, if there is one, though its value may not be new.
-                self._compare_at(self._next_message_s(t_s))
+                # The next message finds the mismatch, if there is one, though its value may not be new; one at this
+                # very time came before.
+                self._compare_at(self._next_message_s(t_s + _LATER_S))
 
     def _answer(self, kind: str, t_s: float) -> None:
         since_s = self._since_s.pop(kind, math.inf)
@@ -136,8 +140,8 @@ class _OpenEvents:
             self.completed_s.append(t_s - since_s)
 
     def _compare_at(self, message_s: float) -> None:
-        if not self._battery_low and self._expected_m is not None:
-            if self._altitude_m != self._expected_m:
+        if not self._battery_low:
+            if self._expected_m not in (None, self._altitude_m):
                 self._since_s.setdefault("mismatch", message_s)
             elif self._since_s.get("mismatch", -math.inf) >= message_s:
                 del self._since_s["mismatch"]

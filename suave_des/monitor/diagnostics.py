@@ -51,15 +51,21 @@ class DiagnosticsBus:
 
     def __init__(self) -> None:
         self._subscribers: defaultdict[Kind, list[Subscriber]] = defaultdict(list)
+        self._waiting: defaultdict[Kind, list[Callable[[], object]]] = defaultdict(list)  # monitors, for a subscriber
 
     def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = EXEMPLAR_KINDS) -> None:
         """Pass every later diagnostic of some kinds to `subscriber`."""
         for kind in kinds:
             self._subscribers[kind].append(subscriber)
+            for start in self._waiting.pop(kind, ()):
+                start()
 
-    def has_subscribers(self, kind: Kind) -> bool:
-        """Return whether anybody subscribes to a kind of diagnostic."""
-        return bool(self._subscribers[kind])
+    def when_subscribed(self, kind: Kind, start: Callable[[], object]) -> None:
+        """Start a monitor at the first subscription to its kind of diagnostic, or now if there has been one."""
+        if self._subscribers[kind]:
+            start()
+        else:
+            self._waiting[kind].append(start)
 
     def publish(self, diagnostic: Diagnostic) -> None:
         """Pass a diagnostic to the subscribers to its kind."""

@@ -75,6 +75,7 @@ class Measurements:
         times_s: when the values are published, ascending.
         values: these values.
         arrays: both as arrays, for vectorised computations.
+        sent_s: when messages are published, changed or not, and inf, if some are lost; None: none is.
     """
 
     key: str
@@ -83,6 +84,7 @@ class Measurements:
     times_s: list[float] = field(repr=False)
     values: list[float] = field(repr=False)
     arrays: tuple[Array, Array] = field(repr=False)
+    sent_s: Array | None = field(default=None, repr=False)
     _crossings: dict[Thresholds, tuple[list[float], list[int]]] = field(default_factory=dict, repr=False, init=False)
 
     @classmethod
@@ -111,8 +113,8 @@ class Measurements:
             times, values = _published(times, values, noise, is_lost)
             changes = _changes(values)
             numbers = values[changes].tolist()
-        times = times[changes]
-        return Measurements(key, signal, timing, times.tolist(), numbers, (times, values[changes]))
+        sent_s, times = None if is_lost is None else np.append(times, math.inf), times[changes]
+        return Measurements(key, signal, timing, times.tolist(), numbers, (times, values[changes]), sent_s)
 
     def count_until(self, t_s: float) -> int:
         """Count the values published by mission time t."""
@@ -139,12 +141,14 @@ class Measurements:
         return regions[passed - 1] if passed else -1, until_s
 
     def next_message_s(self, t_s: float) -> float:
-        """Find the time of the first message, changed or not, at or after t."""
-        return tick_at_or_after(t_s, self.timing.phase_s, self.timing.period_s)
+        """Find the time of the first message, changed or not, at or after t; inf if there is none."""
+        if self.sent_s is None:
+            return tick_at_or_after(t_s, self.timing.phase_s, self.timing.period_s)
+        return self.sent_s.item(np.searchsorted(self.sent_s, t_s - _ROUNDING))
 
     def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
-        """Publish the values at their times."""
-        t_s = -math.inf
+        """Publish the values at their times, from now on."""
+        t_s = env.now or -math.inf
         while (published := self.count_until(t_s)) < len(self.times_s):
             t_s = self.times_s[published]
             yield exactly_at(env, t_s)

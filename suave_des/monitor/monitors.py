@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from math import ceil
 
 import simpy
 
-from suave_des.clock import Process, until
+from suave_des.clock import Process, exactly_at, until
 from suave_des.draws import Draws
 from suave_des.monitor.diagnostics import HULL, LEAK, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing, message_loss
@@ -59,7 +61,7 @@ def start_monitors(
     states: dict[tuple[Kind, str], Callable[[], Pose | float]],
     detected: simpy.Event,
 ) -> None:
-    """Start the monitors of what has subscribers.
+    """Start the monitors of what has subscribers, and the others when they have one.
 
     Args:
         env, bus: when and where they publish.
@@ -67,14 +69,10 @@ def start_monitors(
         states: what is published once a second, by kind and key.
         detected: the event of the pipeline's first sight; its value is the index of the point seen.
     """
-    if bus.has_subscribers(Kind.QA_STATUS):
-        for each in measurements:
-            env.process(each.publish(env, bus))
-    for (kind, key), state in states.items():
-        if bus.has_subscribers(kind):
-            env.process(_each_second(env, bus, kind, key, state))
-    if bus.has_subscribers(Kind.DETECTION):
-        env.process(_detection(env, bus, detected))
+    monitors = [(Kind.QA_STATUS, each.publish(env, bus)) for each in measurements]
+    monitors += [(kind, _each_second(env, bus, kind, key, state)) for (kind, key), state in states.items()]
+    for kind, monitor in [*monitors, (Kind.DETECTION, _detection(env, bus, detected))]:
+        bus.when_subscribed(kind, partial(env.process, monitor))
 
 
 def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, leak: Callable[[], None]) -> Process:
@@ -85,13 +83,16 @@ def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, lea
 
 
 def _detection(env: simpy.Environment, bus: DiagnosticsBus, detected: simpy.Event) -> Process:
-    point = yield detected
-    bus.publish(Diagnostic(env.now, Kind.DETECTION, "pipeline", float(point)))
+    if not detected.processed:
+        point = yield detected
+        bus.publish(Diagnostic(env.now, Kind.DETECTION, "pipeline", float(point)))
 
 
 def _each_second(
     env: simpy.Environment, bus: DiagnosticsBus, kind: Kind, key: str, state: Callable[[], Pose | float]
 ) -> Process:
+    if env.now != (second := ceil(env.now)):
+        yield exactly_at(env, second)
     while True:
         bus.publish(Diagnostic(env.now, kind, key, state()))
         yield env.timeout(1.0)

@@ -169,7 +169,7 @@ class ManagerHost:
 
     def _guarded_process(self, adaptation: AdaptationProcess) -> Process:
         resume: Callable[[Any], object] = adaptation.send
-        outcome, yields, since_s = None, 0, self.system.env.now
+        outcome, yields, since_s = None, 0, (began_s := self.system.env.now)
         while True:
             yields, since_s = (yields + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
             try:
@@ -179,7 +179,8 @@ class ManagerHost:
                 if not isinstance(event, simpy.Event):
                     raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")
             except StopIteration as end:
-                self._go_on(changed=True, waits=self._is_event_triggered and end.value is True)
+                in_time = self.system.env.now - began_s < self._period_s  # no call was due meanwhile
+                self._go_on(changed=True, waits=in_time and self._is_event_triggered and end.value is True)
                 return
             except RAISED as error:
                 raise self.error_of(error) from error

@@ -88,14 +88,7 @@ class PreparedScenario:
         return files, learned if self.training is None else self.training.setdefault(manager, {})
 
     def make_vehicle(self, draws: Draws, start_m: tuple[float, float], track: Array, reasons: bool) -> Vehicle:
-        """Make the vehicle of one mission.
-
-        Args:
-            draws: of the run.
-            start_m: x and y of the place where it begins.
-            track: to be filled with the vehicle's states, a row for each time step.
-            reasons: whether a reasoner runs on the simulator's computer, and slows it down.
-        """
+        """Make the vehicle of one mission; if the manager reasons, it slows the simulator down."""
         scenario, value = self.loaded.scenario, draws.value
         loss = value("calibration.real_time_factor_loss")
         if reasons:

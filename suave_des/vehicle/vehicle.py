@@ -115,11 +115,6 @@ class Vehicle:
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
         expected_changes_s: the next time at which control may be changed, by what may change it.
-
-    Example:
-        >>> vehicle = Vehicle(model, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
-        >>> vehicle.command(0.0, 1.0, 0.0, -18.0)
-        >>> x_m, y_m, z_m = vehicle.position(10.0)
     """
 
     model: VehicleModel

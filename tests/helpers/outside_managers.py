@@ -126,7 +126,7 @@ class NeverIdle(EventTriggered):
 
     def adapt(self):
         super().adapt()
-        yield self.system.env.timeout(0.0)
+        yield self.system.env.timeout(self.system.settings.get("takes_s", 0.0))
         return self.system.settings.get("settled")
 
 
@@ -273,8 +273,6 @@ class DoesMore(Metacontrol):
             yield from execution
         CALLED_S.append(self.system.now_s)
 
-
-"""Whether missions were recorded, as managers saw it."""
 
 CALLED_S: list[float] = []
 """When the last mission's manager was called."""

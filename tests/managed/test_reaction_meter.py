@@ -92,11 +92,8 @@ THRUSTERS = {
     ),
     "a second failure after the answer is another reaction": (
         [
-            reports(35.0, "FALSE"),
-            begins(37.5, MOTION),
-            ends(50.0, MOTION),
-            reports(60.0, "FALSE", 2),
-            begins(61.0, MOTION),
+            *(reports(35.0, "FALSE"), begins(37.5, MOTION), ends(50.0, MOTION)),
+            *(reports(60.0, "FALSE", 2), begins(61.0, MOTION)),
         ],
         [2.5, 1.0],
     ),
@@ -133,6 +130,11 @@ ALTITUDE = {
         [0.5, 2.0],
     ),
     "no mismatch if put right before the next message": ([*CLEAR, flies(10.5, 1.0), flies(11.0, 3.0)], [0.5]),
+    "the next message is not one at the very time": ([*CLEAR, flies(11.2, 1.0), flies(13.2, 3.0)], [0.5, 1.0]),
+    "nor one for which no altitude fits": (
+        [*CLEAR, flies(11.9, 1.0), sees(12.2, 1.0), sees(42.2, 3.6), flies(52.2, 3.0)],
+        [0.5, 10.0],
+    ),
     "nor if the next message finds it fitting": ([*CLEAR, flies(11.5, 2.0), sees(12.2, 3.2), flies(13.0, 2.0)], [0.5]),
     "below all thresholds none is asked for": ([sees(0.2, 1.0), flies(1.2, 1.0), flies(2.2, 2.0)], []),
     "while following too": (

@@ -11,8 +11,10 @@ import simpy
 from hypothesis import given
 from hypothesis import strategies as st
 
+from suave_des.clock import call_at
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing
+from suave_des.monitor.monitors import start_monitors
 from suave_des.monitor.thrusters import thruster_monitor
 from suave_des.scenario.models import ThrusterEvent
 from suave_des.world.signals import constant, sinusoid, step
@@ -116,6 +118,11 @@ def test_noise_makes_every_measurement_another_one():
     assert measured.values == [3.0, 4.0, 5.0, 6.0, 7.0]
 
 
+def test_a_lost_message_is_not_the_next_one():
+    measured = Measurements.of("v", constant(2.0), 5.0, Timing(1.0, 0.2), is_lost=lambda t_s: 1.0 < t_s < 3.0)
+    assert [measured.next_message_s(t_s) for t_s in (0.2, 0.3, 3.2, 4.3)] == pytest.approx([0.2, 3.2, 3.2, math.inf])
+
+
 def test_signal_monitor_publishes_measurements_at_their_times(subscriber):
     measured = Measurements.of("current", step(1.0, 0.1, 0.4), 5.0, Timing(0.5, 0.2))
     subscriber.env.process(measured.publish(subscriber.env, subscriber.bus))
@@ -214,12 +221,11 @@ def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):
 def test_a_level_looked_up_is_the_one_published_last(subscriber):
     received = battery_levels(subscriber, 200.0, 160.7)
     level = battery()
-    assert level.count_until(0.4) == 0 and level.count_until(150.4) == 150
+    assert [level.count_until(t_s) for t_s in (0.4, 30.5, 150.4)] == [0, 31, 150]
     level.recharge(160.7)
     assert level.count_until(160.7) == 162 and level.values[161] == 1.0 and level.recharges == 1
     published = level.count_until(199.9)
     assert list(zip(level.times_s[:published], level.values[:published], strict=True)) == received
-    assert level.count_until(30.5) == 31
 
 
 def test_recharging_changes_what_a_level_crosses_afterwards():
@@ -247,16 +253,22 @@ def test_no_level_is_in_another_region_before_the_next_crossing(thresholds, rech
 
 def test_subscribers_get_the_kinds_that_they_subscribe_to(subscriber):
     statuses: list[Diagnostic] = []
-    assert not DiagnosticsBus().has_subscribers(Kind.COMPONENT_STATUS)
     subscriber.bus.subscribe(statuses.append, (Kind.COMPONENT_STATUS,))
     subscriber.bus.publish(Diagnostic(0.0, Kind.QA_STATUS, "v", 1.0))
     subscriber.bus.publish(Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", "FALSE"))
     assert [each.key for each in statuses] == ["c_thruster_1"] and len(subscriber.received) == 2
 
 
-def test_every_subscriber_gets_everything_in_order_of_subscription(subscriber):
-    order: list[str] = []
-    for name in "ab":
-        subscriber.bus.subscribe(lambda _, name=name: order.append(name))
-    subscriber.bus.publish(Diagnostic(0.0, Kind.QA_STATUS, "v", 1.0))
-    assert order == ["a", "b"]
+@pytest.mark.parametrize(("t_s", "first"), [(0.0, ["pose", "v", "pose", "v", "pose", "v"]), (2.5, []), (3.0, [])])
+def test_a_monitor_starts_when_somebody_subscribes(t_s, first):
+    """So its messages do not depend on whether somebody else has subscribed, such as the recorder."""
+    env, bus, received = simpy.Environment(), DiagnosticsBus(), []
+    measured = Measurements.of("v", lambda t_s: t_s, 5.0, Timing(1.0, 0.2))
+    start_monitors(env, bus, [measured], {(Kind.POSE, "pose"): lambda: 0.0}, env.timeout(3.3, 7))
+    for _ in "ab":
+        call_at(env, t_s, lambda: bus.subscribe(received.append, tuple(Kind)))
+    env.run(until=4.1)
+    assert [each.key for each in received[::2]] == [*first, "pose", "v", "pipeline", "pose"]
+    call_at(env, 4.1, lambda: bus.subscribe(received.append, tuple(Kind)))
+    env.run(until=5.1)
+    assert [(each.time_s, each.key) for each in received[-6:]] == [(4.2, "v")] * 3 + [(5.0, "pose")] * 3

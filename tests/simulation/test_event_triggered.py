@@ -71,6 +71,13 @@ def test_it_is_called_at_the_first_of_its_times_after_a_value_has_crossed_a_thre
     assert called_s({**steps(2.5, value, 31.5), **is_settled}, "NeverIdle") == called
 
 
+def test_after_a_call_that_took_a_period_or_more_it_is_called_again():
+    slow = with_settings("NeverIdle", settled=True, takes_s=3.0)
+    called = called_s({**steps(2.5, 2.6, 30.0), **slow}, "NeverIdle")
+    assert called == called_s({**steps(2.5, 2.6, 30.0), **slow}, "NeverIdle", record=True)
+    assert called == pytest.approx([13.0 + 4.0 * count for count in range(12)])
+
+
 def test_it_is_called_at_the_first_of_its_times_after_a_diagnostic():
     assert called_s({**steps(2.5, 2.6, 30.0), "thruster_events": failure(40.0)}) == [41.0]
 
@@ -89,9 +96,8 @@ def test_thresholds_may_come_from_its_settings():
 
 
 def test_one_that_depends_on_no_measured_value_is_called_after_its_hooks_alone():
-    manager = "DependsOnNoMeasuredValue"
-    assert called_s({**steps(2.5, 1.0, 31.5), "thruster_events": failure(40.0)}, manager) == [41.0]
-    assert called_s(steps(2.5, 1.0, 31.5), manager) == []
+    for events, called in (([], []), (failure(40.0), [41.0])):
+        assert called_s({**steps(2.5, 1.0, 31.5), "thruster_events": events}, "DependsOnNoMeasuredValue") == called
 
 
 # Metacontrol
@@ -160,8 +166,6 @@ def assert_same_missions(simulator: Simulator, manager: str, runs: range) -> Non
 
 SLOW = {"managers.metacontrol.reasoning_period_s": 7.3, "latencies.inference_s": 5.0}
 FAULT = {"thruster_events": failure(40.0), "mission.time_limit_s": 60.0}
-
-
 DERIVED = ("metacontrol", *(f"{OUTSIDE}:{name}" for name in ("Hasty", "DoesMore", "Meddling")))
 CHANGES = {
     "as shipped": {},
@@ -210,8 +214,6 @@ AGAIN = {
         for thruster, event in ((1, "failure"), (2, "failure"), (1, "recovery"), (2, "failure"))
     ]
 }
-
-
 CONDITIONS = {
     "as shipped": {},
     "noise": NOISE,
@@ -232,27 +234,17 @@ def test_outside_managers(period_s, condition, manager):
 VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(0.5, 4.5)
 TIMES_S = st.floats(5.0, 110.0)
 SIGNALS = st.one_of(
-    st.builds(lambda value: {"kind": "constant", "value": value}, VALUES),
-    st.builds(
-        lambda before, after, time_s: {"kind": "step", "before": before, "after": after, "time_s": time_s},
-        VALUES,
-        VALUES,
-        TIMES_S,
-    ),
-    st.builds(
-        lambda low, more, period_s, shift_s, step_s: {
-            "kind": "sinusoid",
-            "minimum": low,
-            "maximum": low + more,
-            "period_s": period_s,
-            "shift_s": shift_s,
-            "time_step_s": step_s,
-        },
-        VALUES,
-        st.floats(0.1, 3.0),
-        st.floats(5.0, 120.0),
-        st.floats(0.0, 80.0),
-        st.sampled_from([0.0, 1.0]),
+    st.fixed_dictionaries({"kind": st.just("constant"), "value": VALUES}),
+    st.fixed_dictionaries({"kind": st.just("step"), "before": VALUES, "after": VALUES, "time_s": TIMES_S}),
+    st.fixed_dictionaries(
+        {
+            "kind": st.just("sinusoid"),
+            "minimum": VALUES,
+            "maximum": st.floats(4.6, 7.5),
+            "period_s": st.floats(5.0, 120.0),
+            "shift_s": st.floats(0.0, 80.0),
+            "time_step_s": st.sampled_from([0.0, 1.0]),
+        }
     ),
 )
 
@@ -283,9 +275,7 @@ def test_built_in_managers(name, signal, other, inference_s, mode_change_s, faul
         "latencies.mode_change_s": mode_change_s,
         "thruster_events": failure(fault_s),
     }
-    if battery is not None:
-        values["battery"] = battery
-    if other is not None:
-        values["signals.performance"] = other
+    values |= {} if battery is None else {"battery": battery}
+    values |= {} if other is None else {"signals.performance": other}
     loaded = LOADED[name] if other is None else with_another_signal(name)
     assert_same_missions(Simulator(with_values(loaded, values)), manager, range(run, run + 1))
