@@ -53,6 +53,7 @@ _FAMILIES = {
 """Managers with an argument after a colon: module and function that make the class, and what the argument is."""
 _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
+_MOST_SAID = 5_000  # characters of an exception's text
 _MAY_YIELD = ("adapt", "input_files")
 _checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
 
@@ -313,7 +314,10 @@ def cause_of(error: BaseException, function: str = "") -> str:
     `function` is the user-defined one that raised it.
     """
     of = f"function {function}: " if function else ""
-    text = re.sub(r" at 0x[0-9a-f]+", "", f"{of}{type(error).__name__}: {error}")
+    said = "its text cannot be made"
+    with suppress(Exception):
+        said = str(error)
+    text = re.sub(r" at 0x[0-9a-f]+", "", f"{of}{type(error).__name__}: {said[:_MOST_SAID]}")
     frames = _users_frames(error)
     return f"{text} ({_line(frames[-1])})" if frames else text
 

@@ -206,6 +206,11 @@ def vary(
             loaded = with_values(loaded, {path: dict(distribution)})
     found, places = _sweep(sweep)
     paths = {name: path_of(places[name], name) for name in found.parameters}
+    for names in (*([name] for name in found.grid), list(found.zip)):
+        rows = zip(*[(found.grid | found.zip)[name] for name in names], strict=True)
+        points = [tuple(float(cell) if isinstance(cell, int | float) else repr(cell) for cell in row) for row in rows]
+        if len(set(points)) < len(points):
+            raise InputError("has a point twice", place=places[names[0]], remedy="give each point once")
     variation = Variation(found, drawn, paths, runs_per_draw)
     with located(place=next(iter(places.values())) if len(places) == 1 else "sweep"):
         for point in islice(found.each_value(), _CHECKED_POINTS):

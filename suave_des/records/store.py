@@ -388,7 +388,7 @@ def tidy(folder: Path, *, is_new: bool) -> None:
 
 def is_left_over(name: str) -> bool:
     """Return whether a file of a folder that has no campaign was left by one that was killed at its start."""
-    return name in (SUAVE_FOLDER, *FILES) or name.startswith(STORE_FILE)
+    return name.startswith(STORE_FILE)
 
 
 def runs_pieces(columns: Sequence[str], rows: Iterable[Row]) -> Iterator[str]:

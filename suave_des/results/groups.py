@@ -124,12 +124,12 @@ def grouped(
     names = _names([key for key, _ in found], by)
     alike = _alike_by_source(frame) if averages else {}
     points = {
-        key: len(part[averaged].drop_duplicates()) if averaged else 1
+        repr(key): len(part[averaged].drop_duplicates()) if averaged else 1
         for key, part in frame.groupby(["source", *by], dropna=False, observed=True)
     }
     groups, lacking = [], []
     for (name, end), (key, part) in zip(names, found, strict=True):
-        source, number = str(key[1]), points[key[1:]]
+        source, number = str(key[1]), points[repr(key[1:])]
         rows = _means(part, number) if number > 1 else part
         if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
             lacking.append(f"{name} {left} of {left + len(rows)}")
@@ -180,10 +180,17 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[
         sources.setdefault(manager, set()).add(source)
     ends = [name.rpartition(".")[2] for name in by]
     labels = ends if len(set(ends)) == len(ends) else by
+    numbers = {value for _, _, *values in keys for value in values if isinstance(value, float) and value == value}
+    form = "g" if len({f"{number:g}" for number in numbers}) == len(numbers) else ""  # or all digits
+
+    def text(value: object) -> str:
+        if value != value:
+            return "not swept"
+        return f"{value:{form}}" if isinstance(value, float) else printable(str(value))
+
     names = []
     for manager, source, *values in keys:
-        texts = (f"{value:g}" if isinstance(value, float) else printable(str(value)) for value in values)
-        point = "".join(f", {label} {text}" for label, text in zip(labels, texts, strict=True))
+        point = "".join(f", {label} {text}" for label, text in zip(labels, map(text, values), strict=True))
         of_source = f" ({printable(str(source))})" if len(sources[manager]) > 1 else ""
         names.append((f"{printable(str(manager))}{of_source}{point}", point))
     return names

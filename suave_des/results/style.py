@@ -112,14 +112,14 @@ _FUNCTIONS = {
 }
 _MODES = {
     "": "before the first mode",
-    domain.UNGROUND_MODE: "no function moves it",
+    domain.UNGROUND_MODE: "no active function",
     domain.DEFAULT_MODE: "search, default altitude",
     "fd_spiral_low": "search, low",
     "fd_spiral_medium": "search, medium",
     "fd_spiral_high": "search, high",
     "fd_follow_pipeline": "follow the pipeline",
     "normal": "to the recharge station",
-    "inactive": "no function moves it",
+    "inactive": "no active function",
 }
 """Modes of the functions that move the vehicle."""
 _OTHER_MODES = {

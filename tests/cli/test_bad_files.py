@@ -28,6 +28,8 @@ def _awkward_files(tmp_path: Path) -> None:
     for name, content in contents.items():
         (tmp_path / name).write_bytes(content)
     (tmp_path / "folder").mkdir()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "runs.csv").write_text("mine")
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "dangling").symlink_to("nowhere")
     os.mkfifo(tmp_path / "pipe")
@@ -106,6 +108,7 @@ def test_in_place_of_another_file(command, tmp_path, arguments, name):
         ("/proc/out", "cannot be written"),
         (LONG, "y...: the output folder cannot be written"),
         ("", "not empty"),
+        ("mine", "runs.csv"),
     ],
 )
 def test_in_place_of_an_output_folder(command, tmp_path, arguments, out, words):

@@ -166,14 +166,13 @@ class TestSweep:
 
 
 def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_named_as_such(tmp_path):
-    values = {"thruster_events.0.time_s": [400.0, 500.0]}  # after the time limit
+    values = {"thruster_events.0.time_s": [400.0, 400.0000001]}  # after the time limit
     run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
-    found = compare_folders([tmp_path / "out"], by=["thruster_events.0.time_s"])
-    assert found.conclusion.startswith("time_s 400; time_s 500: ")
+    run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "plain")
+    found = compare_folders([tmp_path / "out", tmp_path / "plain"], by=["thruster_events.0.time_s"])
+    assert found.conclusion.startswith("time_s 400.0; time_s 400.0000001: ") and "not swept: " in found.conclusion
     ties = compare_frame(runs(a=[100.0, 110.0], b=[100.0, 110.0], c=[150.0, 151.0])).conclusion
-    assert ties.startswith(
-        "No difference in search time is shown between a, which has, with others, the best mean, and"
-    )
+    assert ties.startswith("No difference in search time is shown between a, which has, with others, the best mean, ")
     assert "b (equal in all 2 pairs)" in ties
 
 

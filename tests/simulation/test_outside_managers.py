@@ -86,6 +86,7 @@ def failure(simulator, tmp_path, monkeypatch):
         ("def adapt(self): raise ValueError('not now')", "ValueError: not now", 12.0, 12.0),
         ("def adapt(self): yield self.system.env.timeout(2.5); raise ValueError('later')", "ValueError: ", 14.5, 14.5),
         ("def adapt(self): yield self.system.env.event().fail(LookupError('lost'))", "LookupError: lost", 12.0, 12.0),
+        ("def adapt(self): raise type('E', (Exception,), {'__str__': len})", "E: its text cannot be made", 12.0, 12.0),
         ("def adapt(self): yield 1.0", "TypeError: adapt yielded 1.0", 12.0, 12.0),
         ("period_s = 0.0", "ValueError: period_s is 0.0", 0.0, 0.0),
         ("least_latency_s = -1.0", "ValueError: least_latency_s is -1.0", 0.0, 0.0),

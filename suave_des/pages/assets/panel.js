@@ -154,7 +154,7 @@ function makePanel(play) {
     const until = lastAt(own, moment.t, (each) => each[0]);
     once('analyze', `own${until}`, () => (own.length
       ? own.slice(Math.max(0, until - (own[until]?.[2] === 'tick' ? 0 : 3)), until + 1).map(showOwn)
-      : [element('p', { class: 'quiet' }, `${play.manager} keeps no knowledge that is recorded: it decides in its own code`)]));
+      : [element('p', { class: 'quiet' }, `${play.manager} records no knowledge: its decisions are made in code`)]));
     once('plan', 'own', () => [element('p', { class: 'quiet' }, 'see what it requests, below')]);
     once('knowledge', 'own', () => [element('p', { class: 'quiet' }, 'no knowledge base')]);
   }
