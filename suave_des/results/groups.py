@@ -147,6 +147,9 @@ def grouped(
     notes = list(_notes(groups, averaged, frame, alike))
     if lacking:
         notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
+    by_source = [part[averaged].drop_duplicates() for _, part in frame.groupby("source", observed=True) if averaged]
+    if len({repr(sorted(map(repr, part.to_numpy().tolist()))) for part in by_source}) > 1:
+        notes.append(f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}")
     for metric in chosen:
         notes += _never_found(groups) if metric.name == SEARCH_TIME else _left_out(groups, metric)
     counted, lost = _counted(groups), dict(_mostly_lost(groups))

@@ -132,6 +132,7 @@ def test_after_a_mistake_the_other_rules_are_read():
         ("hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "no builtin lessThn in Pellet"),
         ("hasValue(?q, ?v) ^ lessThan(?v) -> Role(?q)", 23, "lessThan takes 2 arguments, not 1"),
         ("hasValue(?q, ?v) ^ lessThan(?w, 1) -> Role(?q)", 32, "?w has no value in lessThan"),
+        ("Role(?q) ^ differentFrom(?q, ?w) -> Role(?q)", 33, "?w has no value in differentFrom"),
         ("hasValue(?q, ?v) -> Role(?g)", 29, "?g occurs in the head, but the body does not bind it"),
         ("Objective(?o, ?x) -> Role(?o)", 4, "Objective is a class, but is used as a property"),
         ("o_status(?o) -> Role(?o)", 4, "o_status is a data property, but is used as a class"),

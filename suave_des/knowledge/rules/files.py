@@ -264,7 +264,8 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
     builtins = [atom for atom in rule.body if atom.kind == "builtin" and atom.arguments]
     while more := _computed(builtins, bound) - bound:
         bound |= more
-    for atom, number, name in _uses(builtins):
+    different = [atom for atom in rule.body if atom.kind == "different"]  # Pellet takes any two
+    for atom, number, name in _uses([*builtins, *different]):
         if name not in bound:
             problem = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
             yield atom.place(number), problem, nearest(name, bound)
