@@ -240,12 +240,12 @@ SIGNALS = st.one_of(
         {
             "kind": st.just("sinusoid"),
             "minimum": VALUES,
-            "maximum": st.floats(4.6, 7.5),
+            "maximum": st.floats(0.1, 3.0),  # above the minimum
             "period_s": st.floats(5.0, 120.0),
             "shift_s": st.floats(0.0, 80.0),
             "time_step_s": st.sampled_from([0.0, 1.0]),
         }
-    ),
+    ).map(lambda wave: {**wave, "maximum": wave["minimum"] + wave["maximum"]}),
 )
 
 
