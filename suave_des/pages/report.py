@@ -24,10 +24,12 @@ from suave_des.errors import InputError, SuaveDesError
 from suave_des.metrics.result import MissionResult
 from suave_des.pages.page import compressed, page
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
+from suave_des.records.mission_folder import record_of
 from suave_des.records.missions import Missions, read_missions
 from suave_des.records.store import read_manifest
 from suave_des.results.compare import compare_groups
 from suave_des.results.groups import grouped
+from suave_des.results.mission import Adaptation, adaptations
 from suave_des.results.style import looks
 from suave_des.tables import capital
 
@@ -39,8 +41,8 @@ _STYLES: Final = ("common.css", "report.css")
 _SCRIPTS: Final = ("common.js", "charts.js", "report.js")
 _PERIOD_S: Final = 1.0
 _TOLERANCE_S: Final = 1e-3
-_EVENTS: Final = ("mode_requested", "component_status", "pipeline_detected")
-"""What is kept of a mission's way."""
+_EVENTS: Final = ("component_status", "pipeline_detected")
+"""What is kept of a mission's way, besides its adaptations."""
 MOST_DRAWN: Final = 20_000
 """Missions whose values are in a page; of more, every second, third, ... run is, under all managers."""
 _DIGITS = 2
@@ -208,10 +210,11 @@ def _paths(
     for number, manager in enumerate(groups):
         for run in _representative_runs(frame, groups, runs):
             if (manager, run) in known.index:
-                result, _ = opened.run(manager, run)
+                result, loaded = opened.run(manager, run)
                 off_s = result.metrics.search_time_s - float(known[manager, run])
                 if is_swept or abs(off_s) < _TOLERANCE_S:
-                    yield {"group": number, "run": run, **_path(result)}
+                    changes = adaptations(record_of(result, loaded))
+                    yield {"group": number, "run": run, **_path(result, changes)}
 
 
 def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
@@ -226,7 +229,7 @@ def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: i
     return sorted(list(chosen)[:runs])
 
 
-def _path(result: MissionResult) -> dict[str, Any]:
+def _path(result: MissionResult, changes: Sequence[Adaptation]) -> dict[str, Any]:
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]
@@ -238,5 +241,6 @@ def _path(result: MissionResult) -> dict[str, Any]:
         "altitude_m": altitude_m,
         "visibility_m": [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
         "modes": [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
+        "adaptations": [(round(each.t_s, 1), f"{each.function} -> {each.after}") for each in changes],
         "events": [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
     }

@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SEA_BED_Z_M, UNGROUND_MODE
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SEA_BED_Z_M, SURFACE, UNGROUND_MODE
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.records.mission_folder import MissionRecord
 from suave_des.results import style
@@ -28,8 +28,6 @@ from suave_des.results.style import component_words, function_mode_words, functi
 _LATEST_REACTION_S = 5.0
 """What was reported earlier is not taken as the cause of an adaptation."""
 _RECHARGED, _ROUNDING = 0.3, 0.01
-_TASK_END_S = 3.0
-"""A function whose task has ended is deactivated within this time; this does not count as an adaptation."""
 
 
 class Span(NamedTuple):
@@ -58,12 +56,12 @@ def details(record: MissionRecord, event: str) -> list[tuple[float, str]]:
 
 
 def _spans(changes: Iterable[tuple[float, str, str]], end_s: float) -> dict[str, list[Span]]:
-    """Return the spans between changes, each with its time, of what it is, and to what; by what they are of."""
+    """Return the spans between changes, each with its time, of what it is, and to what, if to anything."""
     by_name: dict[str, list[tuple[float, str]]] = {}
     for t_s, name, what in changes:
         by_name.setdefault(name, []).append((t_s, what))
     return {
-        name: [Span(begin_s, until_s, what) for (begin_s, what), (until_s, _) in pairwise([*own, (end_s, "")])]
+        name: [Span(begin_s, until_s, what) for (begin_s, what), (until_s, _) in pairwise([*own, (end_s, "")]) if what]
         for name, own in by_name.items()
     }
 
@@ -87,37 +85,43 @@ def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of failures, by failed component."""
     changes = ((t_s, name, FAILED if is_failed else "") for t_s, name, is_failed in component_changes(record))
-    spans = _spans(changes, record.end_s)
-    return {name: [span for span in own if span.what == FAILED] for name, own in spans.items()}
+    return _spans(changes, record.end_s)
 
 
 def task_spans(record: MissionRecord) -> list[Span]:
-    """Return the spans of the tasks."""
-    open_s: dict[str, float] = {}
-    spans = []
-    for t_s, event, detail in zip(*(record.events[name] for name in ("t_s", "event", "detail")), strict=True):
-        if event == "task_requested":
-            open_s[detail] = float(t_s)
-        elif event in ("task_done", "task_cancelled") and detail in open_s:
-            spans.append(Span(open_s.pop(detail), float(t_s), detail))
-    return [*spans, *(Span(begin_s, record.end_s, task) for task, begin_s in open_s.items())]
+    """Return the spans of the tasks, one after the other."""
+    events = record.events[record.events["event"].isin(["task_requested", "task_done", "task_cancelled"])]
+    tasks = events["detail"].where(events["event"] == "task_requested", "")
+    return _spans(zip(events["t_s"], cycle(["task"]), tasks, strict=False), record.end_s).get("task", [])
 
 
 def adaptations(record: MissionRecord) -> list[Adaptation]:
-    """Return the changes of modes in order of time, without first modes and those with which a task begins or ends."""
-    ends_s = [span.end_s for span in task_spans(record)]
-    found = []
-    for function, spans in mode_spans(record).items():
-        for before, after in pairwise(spans):
-            lags_s = [after.begin_s - end_s for end_s in ends_s]
-            is_task_end = after.what == UNGROUND_MODE and any(0.0 <= lag_s < _TASK_END_S for lag_s in lags_s)
-            is_begin = before.what == UNGROUND_MODE and any(abs(before.begin_s - each) < _TASK_END_S for each in ends_s)
-            # Two names for the same, such as two ways of being off, are no change.
-            words = {function_mode_words(function, each.what) for each in (before, after)}
-            if len(words) > 1 and not is_task_end and not is_begin:
-                cause = _cause(record, function, before.what, after)
-                found.append(Adaptation(after.begin_s, function, before.what, after.what, cause))
+    """Return the changes of modes that the metric of this name counts, in order of the times at which they took effect.
+
+    The first mode of a function in a task is none, nor is what is requested between a task's end and that.
+    """
+    mode_set, in_use, modes, found = details(record, "mode_set"), set[str](), dict[str, str](), list[Adaptation]()
+    for t_s, event, detail in zip(*(record.events[name] for name in ("t_s", "event", "detail")), strict=True):
+        if event == "mode_requested":
+            function, _, mode = detail.partition(" -> ")
+            if function in in_use:
+                effect_s = next((at_s for at_s, new in mode_set if at_s >= t_s and new == f"{function} = {mode}"), t_s)
+                cause = _cause(record, function, modes[function], Span(effect_s, effect_s, mode))
+                found.append(Adaptation(effect_s, function, modes[function], mode, cause))
+            in_use |= {function} if mode != UNGROUND_MODE else set()
+            modes[function] = mode
+        elif event == "task_done":
+            in_use -= _functions_of(record, detail)
+        elif event == "task_cancelled":  # at the mission's end, or after a leak: all functions end
+            in_use.clear()
     return sorted(found, key=lambda each: each.t_s)
+
+
+def _functions_of(record: MissionRecord, task: str) -> set[str]:
+    revision, mission = (record.scenario.get(key, {}) for key in ("revision", "mission"))
+    shared = {MAINTAIN_MOTION} if revision.get("coordinator", {}).get("maintain_motion_per_task") else set()
+    own = {"search_pipeline": GENERATE_SEARCH_PATH, "inspect_pipeline": FOLLOW_PIPELINE}.get(task, SURFACE)
+    return {own, *shared, *mission.get("functions", {}).get(task, ())}
 
 
 def _cause(record: MissionRecord, function: str, before: str, after: Span) -> str:

@@ -95,6 +95,8 @@ def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign)
     assert f"{row.search_time_s:g}" in shown
     assert page.input_value("#run-number") == "2"
     assert "--run 2 --managers bt" in page.text_content("#run-command")
+    drawn = opened_report.value("document.getElementById('run-time').data.find(each => each.name === 'adaptation').x")
+    assert len(drawn) == row.adaptations > 0
 
 
 def test_names_are_text_never_markup(campaign, tmp_path, browser):
