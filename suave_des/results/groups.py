@@ -321,10 +321,8 @@ def _notes(
         )
     if len(scenarios := set(frame["scenario"]) - {""}) > 1:
         yield f"the missions are of different scenarios: {', '.join(sorted(scenarios))}"
-    few = min(len(group.frame) for group in groups)
-    if few < _FEW:
-        rough = f"intervals and numbers of runs needed from fewer than {_FEW} are rough"
-        yield f"the fewest runs of one of them are {few}: {rough}"
+    if (few := min(len(group.frame) for group in groups)) < _FEW:
+        yield f"intervals and numbers of runs needed are rough, as one of them has fewer than {_FEW} runs ({few})"
     if any(group.frame[FOUND].isna().all() for group in groups):
         yield "some files do not say which missions found the pipeline"
 
@@ -361,14 +359,13 @@ def _never_found(groups: Sequence[Group]) -> Iterator[str]:
 
 def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:
     """Say how many missions have no value of a metric; of FOUND that is said already."""
-    known = [(group, int(group.frame[metric.name].count())) for group in groups]
-    counts = [
-        f"{group.name} {len(group.frame) - n} of {len(group.frame)}" for group, n in known if 0 < n < len(group.frame)
-    ]
+    lacking = [(group, int(group.frame[metric.name].isna().sum())) for group in groups]
+    counts = [f"{group.name} {n} of {len(group.frame)}" for group, n in lacking if n]
     if counts and metric.name != FOUND:
         what = "missions" if all(group.is_of_missions for group in groups) else "missions, or averages over missions,"
+        why = ", as no reaction was completed or recorded" if metric.name == REACTION_TIME else ""
         without = f"{what} without a {metric.title} ({listed(counts)})"
-        yield f"{without} are left out of it; they may be those that went worst"
+        yield f"{without} are left out of it{why}; they may be the ones that went worst"
 
 
 def printable(name: str) -> str:

@@ -111,7 +111,7 @@ def test_a_comparison_corrects_what_the_conditions_do():
     difference = by_name.loc[("search_time_s", "a", "b")]
     assert difference["assisted"] == pytest.approx(-10.0, abs=3.0)
     assert found.estimates["conclusion"].str.contains("^a finds the pipeline.* sooner than b").any()
-    assert [note.split(" are ")[0] for note in found.notes] == ["the fewest runs of one of them"]
+    assert [note.split(" are ")[0] for note in found.notes] == ["intervals and numbers of runs needed"]
 
 
 def test_conditions_are_found_by_number_and_by_order():
