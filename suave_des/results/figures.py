@@ -51,7 +51,7 @@ _EACH_WITH_EACH = 4
 def draw_distributions(drawn: Groups) -> style.Picture:
     """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
     groups = drawn.groups
-    labels = [*map(_label, groups), "marks at 0%: means"]
+    labels = [*map(_label, groups), "markers on the axis: means"]
     rows = math.ceil(len(labels) / _legend_columns(labels))
     legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
@@ -136,6 +136,7 @@ def _draw_row_of_differences(
     ends = zip(least_and_greatest(apart), (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
         place: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
+        place["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # lest the line at 0 cross the label
         axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **place)
 
 
@@ -295,9 +296,7 @@ def _write_below(figure: Figure, text: str) -> None:
 
 def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
     """Name the curve of each mission: its manager, with its source where there are several."""
-    if frame["source"].nunique() > 1:
-        return frame["manager"] + " (" + frame["source"] + ")"
-    return frame["manager"]
+    return frame["manager"] + (" (" + frame["source"] + ")" if frame["source"].nunique() > 1 else "")
 
 
 def _draw_panel(

@@ -45,16 +45,16 @@ OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
 
 
 def looks(names: Sequence[str]) -> list[int]:
-    """Return for each manager the number of its look, which `line` and `marker` take.
+    """Return for each name the number of its look, which `line` and `marker` take.
 
-    Those of the exemplar keep theirs whoever is shown, and no other manager has one of these. A manager of several
-    sources, whose names follow it in parentheses, has one colour.
+    Managers of the exemplar keep theirs whoever is shown, and no other has one of these. Of a manager with several
+    sources, whose names follow it in parentheses, the first has it; each of the others has a look of its own.
     """
     places = {name: place for place, name in enumerate(_KNOWN_MANAGERS)}
     found: list[int] = []
     for name in names:
-        place = places.setdefault(name.partition(" (")[0], len(places))
-        found.append(next(number for number in count(place, len(CYCLE)) if number not in found))
+        place = places.pop(name.partition(" (")[0], len(_KNOWN_MANAGERS))
+        found.append(next(number for number in count(place) if number not in found))
     return found
 
 
