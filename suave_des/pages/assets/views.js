@@ -224,9 +224,11 @@ function drawTimeline(surface, plays, t, span, modeColour) {
       if (mark.kind !== 'adaptation') d.fillRect(x - 0.5, top - 4, 1, bottom - top + 4);
     }
     if (plays.length > 1) {
-      d.fillStyle = colour('--soft');
+      // Above the curves, and on a ground of its own, so that neither they nor marks strike it through.
       d.textAlign = 'right';
-      d.fillText(play.manager, width - 4, bottom - 5);
+      Object.assign(d, { fillStyle: colour('--soft'), strokeStyle: colour('--card'), lineWidth: 4, lineJoin: 'round' });
+      d.strokeText(play.manager, width - 4, top - 2);
+      d.fillText(play.manager, width - 4, top - 2);
       d.textAlign = 'left';
     }
   });
