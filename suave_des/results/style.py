@@ -41,7 +41,7 @@ MODE_COLOURS = {
 """The shipped modes: the higher the search, the darker the blue. A user's mode gets one of OTHER_MODES."""
 MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 2.0, "fd_follow_pipeline": 1.2}
 """Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
-OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
+OTHER_MODES = ("#6A3D9A", "#8C510A", "#B8860B")
 
 
 def looks(names: Sequence[str]) -> list[int]:
@@ -114,9 +114,6 @@ _MODES = {
     "": "before the first mode",
     domain.UNGROUND_MODE: "no active function",
     domain.DEFAULT_MODE: "search, default altitude",
-    "fd_spiral_low": "search, low",
-    "fd_spiral_medium": "search, medium",
-    "fd_spiral_high": "search, high",
     "fd_follow_pipeline": "follow the pipeline",
     "normal": "to the recharge station",
     "inactive": "no active function",
@@ -163,6 +160,8 @@ def value_words(value: object) -> str:
 
 def mode_words(mode: str) -> str:
     """Return what the mode of the function that moves the vehicle is called."""
+    if mode.startswith("fd_spiral_"):
+        return f"search, {plain(mode.removeprefix('fd_spiral_'))}"
     return _MODES.get(mode, plain(mode))
 
 

@@ -57,6 +57,8 @@ def test_the_map_shows_every_mode_and_what_happened(mission):
         assert (text in told) == (mode in trajectory)
     assert any(text.startswith("thruster 1 failed, 36 s") for text in told)
     assert any(text.startswith("pipeline detected, ") for text in told)
+    assert style.mode_words("fd_spiral_very_low") == "search, very low"
+    assert style.VERMILION not in style.OTHER_MODES  # the colour of failures
 
 
 def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign):
@@ -74,8 +76,8 @@ def test_no_picture_has_the_time_at_which_it_was_written(ending, date, tmp_path)
 
 
 def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path):
-    values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": ["fd_spiral_low"]}
-    values["default_modes.f_generate_search_path"].append("fd_spiral_medium")
+    designs = ["fd_spiral_low", "fd_spiral_medium"]
+    values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": designs}
     result = run_campaign("seams2023", ["none", "random"], 3, 1, out=tmp_path / "out", sweep=values)
     missions = read_missions([tmp_path / "out"])
     assert missions.swept == tuple(values)
@@ -252,16 +254,12 @@ class TestDifferences:
             draw_missions(read_missions([find("seams2023_runs.csv", "scenarios/published")]), "differences")
 
 
-def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs():
+def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs_as_a_sweep_does():
     frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
     figure = draw_heat_map(missions_of(frame), ["depth", "start.y_m"])
     assert [text.get_text() for text in figure.axes[0].texts] == ["115.00"] * 4
     assert "means of n = 2 runs, each averaged over start: x (m)" in texts_of(figure)
     with pytest.raises(InputError, match="of two swept parameters, and there are 3"):
         draw_heat_map(missions_of(frame))
-
-
-def test_a_sweep_says_of_how_many_runs_its_means_are():
-    frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
     text = "means of n = 2 runs, each averaged over the parameters of the other panels"
     assert text in texts_of(draw_sweep(missions_of(frame)))

@@ -7,7 +7,7 @@ const SEA_MODES = {
   fd_spiral_low: '#a68cff', fd_spiral_medium: '#63bdff', fd_spiral_high: '#d8fff3', fd_follow_pipeline: '#ffcb5c',
   fd_unground: '#3c5560', '': '#3c5560', fd_generate_recharge_path: '#ff8fd0', __DEFAULT__: '#ff8fd0',
 };
-const SPARE_SEA_MODES = ['#ff9e7a', '#d7f06b', '#ff8fd0', '#f4e2a0'];
+const SPARE_SEA_MODES = ['#ff8fd0', '#d7f06b', '#ff9e7a', '#f4e2a0'];
 function seaColour(mode) {
   if (!(mode in SEA_MODES)) SEA_MODES[mode] = SPARE_SEA_MODES[Object.keys(SEA_MODES).length % SPARE_SEA_MODES.length];
   return SEA_MODES[mode];
