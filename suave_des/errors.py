@@ -148,15 +148,15 @@ def unknown(problem: str, word: object, known: Iterable[str], what: str = "known
 
 
 class Level(StrEnum):
-    """Severity: an ERROR does not work as written, a WARN probably does not, an INFO is worth knowing."""
+    """Severity: an ERROR does not work as written, a WARN probably does not, a NOTE is worth knowing."""
 
     ERROR = "ERROR"
     WARN = "WARN"
-    INFO = "INFO"
+    NOTE = "NOTE"
 
 
 _SEVERITY: Final = {level: number for number, level in enumerate(Level)}
-_NOUNS: Final = {Level.ERROR: "error", Level.WARN: "warning", Level.INFO: "note"}
+_NOUNS: Final = {Level.ERROR: "error", Level.WARN: "warning", Level.NOTE: "note"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from suave_des.errors import InputError, did_you_mean
+from suave_des.errors import InputError, did_you_mean, similar
 from suave_des.files import sha256_of
 
 DEFAULT_SCENARIO = "seams2023"
@@ -56,13 +56,13 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
     path = Path(name)
     candidates = [path if beside is None else beside / path]
     if len(path.parts) == 1:
-        shipped = shipped_folder(kind) / path
-        candidates += [shipped, shipped.with_name(path.name + _KINDS[kind])]
+        candidates += [shipped_folder(kind) / f"{path}{ending}" for ending in ("", _KINDS[kind])]
     for candidate in candidates:
         if os.path.isfile(candidate):  # noqa: PTH113 - Path.is_file raises for a name that is too long
             return candidate
     if os.path.exists(candidates[0]):  # noqa: PTH110 - as above
         return candidates[0]  # whoever reads it says what it is
-    known = sorted(entry.name for entry in shipped_folder(kind).glob(f"*{_KINDS[kind]}"))
+    names = sorted(each.name if path.suffix else each.stem for each in shipped_folder(kind).glob(f"*{_KINDS[kind]}"))
+    known = [each for each in names if "modes" not in each or each == similar(path.name, names)]  # no scenarios
     remedy = did_you_mean(path.name, known, "give a path, or one of the shipped files")
     raise InputError("no such file", file=path, remedy=remedy)

@@ -199,7 +199,7 @@ def _check_knowledge(loaded: LoadedScenario) -> Sequence[Path]:
         return base.files
     _told.add(checked)
     subject = subject_of(loaded)
-    findings = [each for each in ordered(findings_in(base, subject)) if each.level is not Level.INFO]
+    findings = [each for each in ordered(findings_in(base, subject)) if each.level is not Level.NOTE]
     for each in findings:
         logger.warning("%s", each)
     if findings:

@@ -107,7 +107,7 @@ def export_config(
     make_output_folder(out)
     write_files(out, texts)
     for line in lost:
-        print(plain(f"not expressed: {line}"))
+        print(plain(f"not exported: {line}"))
     print(f"written: {', '.join(str(out / name) for name in texts)}")
 
 

@@ -252,7 +252,7 @@ class ExecManager(ManagingSubsystem):
                 raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
 
     def _error(self, problem: str) -> ProgramError:
-        return ProgramError(f"{self._command[0]} {problem}")
+        return ProgramError(f"the program {problem}")
 
 
 @cache

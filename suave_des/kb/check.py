@@ -30,7 +30,7 @@ from suave_des.resources import shipped_folder
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
-_LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.INFO}
+_LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.NOTE}
 
 
 def check(subject: Subject) -> tuple[Finding, ...]:
@@ -57,7 +57,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         findings = [*static_findings(subject, sources), *check_shapes(sources)]
         message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
         is_known = has_level(findings, Level.ERROR)
-        return ordered([*findings, Finding(Level.INFO, message) if is_known else Finding.of(error)])
+        return ordered([*findings, Finding(Level.NOTE, message) if is_known else Finding.of(error)])
     findings = [*findings_in(base, subject), *check_shapes(base.sources)]
     return ordered([*findings, *_ask_pellet(subject, base, findings)])
 
@@ -69,7 +69,7 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
     except KnowledgeError:  # it is among the findings, and contradictions follow from it
         return
     for reason in regions_of(base).reasons:
-        yield Finding(Level.INFO, f"inferences are cached for equal measured values only, which is slower: {reason}")
+        yield Finding(Level.NOTE, f"inferences are cached for equal measured values only, which is slower: {reason}")
     try:
         # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
         pellet = Reasoner(base, "cached", TimeLimit(subject.time_limit_s, "--time-limit"))
@@ -83,7 +83,7 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
             message = (
                 f"contradictions were not checked with Pellet: it does not use rule {found.rule} until it is corrected"
             )
-            yield Finding(Level.INFO, message)
+            yield Finding(Level.NOTE, message)
 
 
 def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:
@@ -153,7 +153,7 @@ def _finding(report: Graph, result: Node, thing: Node | None, sources: Sequence[
     message = ": ".join(filter(None, words))
     has_value = any((thing, URIRef(HAS_VALUE), None) in source.graph for source in sources)
     if path == URIRef(HAS_VALUE) and name.startswith(measurement_name("")) and not has_value:
-        level, message = Level.INFO, f"{name} has no hasValue: missions give it the measured one"
+        level, message = Level.NOTE, f"{name} has no hasValue: missions give it the measured one"
     described = [source for source in sources if source.line_of(name)]
     mentioning = [source for source in sources if thing in source.graph.all_nodes()]
     file, line = place_of(name, described or mentioning or sources)

@@ -136,7 +136,7 @@ class Material:
 
     def suspicious(self, rule: Rule, place: Place | None, message: str, remedy: str | None = None) -> Finding:
         """Make a finding about a rule; of one in an imported ontology it is a note."""
-        level = Level.WARN if self.is_own(rule) else Level.INFO
+        level = Level.WARN if self.is_own(rule) else Level.NOTE
         return about_rule(rule, message, place, remedy, level)
 
 
@@ -157,7 +157,7 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
     for file in files:
         findings += map(Finding.of, file.errors)
         if not file.parsed and not file.errors:
-            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(file.path)))
+            findings.append(Finding(Level.NOTE, "there is no rule in this file", file=str(file.path)))
         groups.append(group := list[Rule]())
         for rule in file.parsed:
             try:
@@ -240,7 +240,7 @@ def designs_and_modes(material: Material) -> Iterator[Finding]:
             yield material.about(Level.ERROR, design, problem, nearest(design, modes - designs) or otherwise)
         if spare := ", ".join(sorted(modes - designs)):
             problem = f"modes of {function} without function design, which metacontrol never chooses: {spare}"
-            yield material.about(Level.INFO, function, problem)
+            yield material.about(Level.NOTE, function, problem)
 
 
 def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
@@ -281,11 +281,11 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
             if name not in subject.reported and iri not in asserted:
                 nothing = f"nothing in the simulation reports the status of component {name}"
                 remedy = f"reported are {', '.join(subject.reported)}"
-                yield material.about(Level.INFO, name, f"{nothing}, so it has none in missions", remedy)
+                yield material.about(Level.NOTE, name, f"{nothing}, so it has none in missions", remedy)
     expected = _expected(material.base.model)
     for name in sorted(expected.difference(expected if subject.measured is None else subject.measured)):
         problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
-        yield material.about(Level.INFO, name, problem)
+        yield material.about(Level.NOTE, name, problem)
 
 
 def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
@@ -313,7 +313,7 @@ def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
 
 def assumed_operators(material: Material) -> Iterator[Finding]:
     """Note which comparison operators are assumed."""
-    return (material.about(Level.INFO, name, words) for name, words in material.base.assumptions.items())
+    return (material.about(Level.NOTE, name, words) for name, words in material.base.assumptions.items())
 
 
 def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
@@ -387,7 +387,7 @@ def for_other_models(material: Material) -> Iterator[Finding]:
         by_file[rule.file].append(rule.name)
     for file, names in by_file.items():
         message = f"rules for other models, which never fire in this one: {', '.join(names)}"
-        yield Finding(Level.INFO, message, str(file))
+        yield Finding(Level.NOTE, message, str(file))
 
 
 def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str | None]]:

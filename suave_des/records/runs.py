@@ -246,8 +246,8 @@ class _Cells:
             is_right &= numbers == np.round(numbers)
         if may_be_empty:
             is_right |= (self.text[name] == "").to_numpy()
-        wanted = "a whole number" if is_whole else "a finite number"
-        self._check(name, is_right, wanted + (f", at least {least:g}" if least > -math.inf else ""))
+        ends = f"at least {least:g} and at most" if least > -math.inf else "at most"
+        self._check(name, is_right, f"{'a whole' if is_whole else 'a finite'} number, {ends} {_GREATEST:g}")
         return numbers
 
     def _check(self, name: str, is_right: Iterable[bool], wanted: str) -> None:

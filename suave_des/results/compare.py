@@ -148,11 +148,8 @@ def compare_groups(
     """Compare groups of missions; see compare_folders."""
     statistics.library()
     widths, pairs = _half_widths(half_widths, groups.metrics), _pairs(groups.groups, against)
-    found = [
-        _difference(*pair, metric, widths.get(metric.name), unpaired=unpaired)
-        for metric in groups.metrics
-        for pair in pairs
-    ]
+    asked = ((*pair, metric, widths.get(metric.name)) for metric in groups.metrics for pair in pairs)
+    found = [_difference(*each, unpaired=unpaired) for each in asked]
     tested = [row for row in found if row["test"]]
     for row, p in zip(tested, statistics.holm([row["p"] for row in tested]), strict=True):
         row["p_holm"] = p
@@ -182,11 +179,8 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
         return pairs or list(combinations(groups, 2))
     by_name = {group.name: group for group in groups}
     if against in by_name:
-        chosen = by_name[against]
-        others = [group for group in groups if group is not chosen]
-        return [(group, chosen) for group in others if group.point == chosen.point] or [
-            (each, chosen) for each in others
-        ]
+        pairs = [(group, by_name[against]) for group in groups if group.name != against]
+        return [pair for pair in pairs if pair[0].point == pair[1].point] or pairs
     at_points = [(group, by_name.get(f"{against}{group.point}")) for group in groups]
     if not any(chosen for _, chosen in at_points):
         known = {group.name.removesuffix(group.point): group for group in groups}
@@ -265,7 +259,7 @@ def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tup
         why = "not paired: fewer than two runs of the same seed and number have a value under both"
         return False, why, *apart
     left = max(map(len, apart)) - len(both)
-    rest = f"; {left} of one without a counterpart are left out" if left and len(both) else ""
+    rest = f"; runs with a value under only one of them ({left}) are left out" if left and len(both) else ""
     why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
     return True, why, both["x"].to_numpy(), both["y"].to_numpy()
 

@@ -436,7 +436,8 @@ def overall_conclusion(
         sentences.append(_claims(best, metric, claimed, alike, len(tested)))
     elif alike:
         has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
-        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean,"
+        of_all = " of all its runs" if any(_favours(each, _other(each, best), metric) for each in against) else ""
+        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean{of_all},"
         over = f", after Holm's correction over {number_of(len(tested), 'test')}" if any(map(_is_open, against)) else ""
         sentences.append(f"{is_shown} and {_and(alike)}{over}.")
     others = [each["conclusion"] for each in against if each["p_holm"] < SIGNIFICANCE and each not in claimed]

@@ -73,8 +73,7 @@ def draw_distributions(drawn: Groups) -> style.Picture:
     times.set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     times.yaxis.set_major_formatter(PercentFormatter(1.0))
     curves = [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
-    handles = [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
-    _legend(figure, handles, labels)
+    _legend(figure, [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)], labels)
     return figure
 
 
@@ -198,12 +197,7 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     Raises:
         InputError: one of them is not swept, or there are too many for one figure.
     """
-    parameters = list(parameters or missions.swept)
-    check_swept(missions, parameters, "parameters")
-    for source, part in missions.frame.groupby("source", sort=False):
-        if fixed := [name for name in parameters if part[name].isna().all()]:
-            problem = f"{source} does not vary {', '.join(fixed)}"
-            raise InputError(problem, place="parameters", remedy="leave it out, or choose what all of the sweeps vary")
+    parameters = _chosen(missions, parameters)
     if len(parameters) > _MOST_PARAMETERS:
         problem = f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
         raise InputError(problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them")
@@ -243,8 +237,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     Raises:
         InputError: one of them is not swept, there are not two, or their values are too many for numbers.
     """
-    parameters = list(parameters or missions.swept)
-    check_swept(missions, parameters, "parameters")
+    parameters = _chosen(missions, parameters)
     if len(parameters) != 2:
         problem = f"a heat map is of two swept parameters, and there are {len(parameters)}: {', '.join(parameters)}"
         raise InputError(problem, place="parameters", remedy="choose two with --parameters")
@@ -282,6 +275,17 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     others = [name for name in missions.swept if name not in parameters]
     _write_below(figure, _averaged(counts, others))
     return figure
+
+
+def _chosen(missions: Missions, parameters: Sequence[str]) -> list[str]:
+    parameters = list(parameters or missions.swept)
+    check_swept(missions, parameters, "parameters")
+    for source, part in missions.frame.groupby("source", sort=False):
+        if fixed := [name for name in parameters if part[name].isna().all()]:
+            problem = f"{source} does not sweep {', '.join(fixed)}, and another folder does"
+            remedy = f"leave {source} out, draw --kind distributions, or choose with --parameters what all sweep"
+            raise InputError(problem, place="parameters", remedy=remedy)
+    return parameters
 
 
 def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:

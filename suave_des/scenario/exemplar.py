@@ -138,7 +138,7 @@ EXTENDED = "suave_extended"
 TREES = {"suave_bt": "bt", "suave_bt_extended": "bt_extended"}
 """Manager by the name of the behaviour tree's executable."""
 _VISIBILITY = "signals.water_visibility."
-_NO_COSINE = "not taken over: the visibility of the base is no cosine"
+_NO_COSINE = "not imported: the visibility of the base is no cosine"
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ def import_config(
 
     mission = None if runner is None else runner.parameters.get("mission_config_file")
     if mission is not None and Path(str(mission.value)).name not in {each.path.name for each in documents}:
-        notes.append(f"{mission.place}: not taken over: {shown(mission.value)} is none of the files given")
+        notes.append(f"{mission.place}: not imported: {shown(mission.value)} is none of the files given")
     text = None
     if campaign is not None and runner is not None:
         content: Entries = {("campaign",): (1, "version of the form"), ("scenario",): (_relative(out, campaign), "")}
@@ -220,7 +220,7 @@ def import_config(
         text = _text(documents, content, ())
     elif runner is not None:
         listed = ", ".join(name for name in runner.parameters if PATHS.get((RUNNER, name), "").startswith(CAMPAIGN))
-        notes.append(f"no counterpart in a scenario; --campaign FILE writes a campaign file: {RUNNER}: {listed}")
+        notes.append(f"not part of a scenario (--campaign FILE writes it to a campaign file): {RUNNER}: {listed}")
     order = list(Scenario.model_fields)
     content = {("base",): (base, why)}
     for path in sorted(values, key=lambda path: (order.index(path.split(".")[0]), path.split(".")[:-1])):
@@ -288,12 +288,12 @@ def _parameters(documents: Sequence[Layer], notes: list[str]) -> tuple[list[Para
                 parameters.append(Parameter(document, entry, name, value, nodes[name]))
             place = f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
             if beside := [other for other in content if other != PARAMETERS]:
-                notes.append(f"{place}: not taken over: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone")
+                notes.append(f"{place}: not imported: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone")
             is_known = any(nodes.values()) or (not given and bool(node_of(entry, given, "")))
             is_ours = is_ours or is_known
             if not is_known:
                 remedy = did_you_mean(entry.removeprefix("/"), NODES)
-                notes.append(f"{place}: not taken over: {', '.join(given)}: the node is not known ({remedy})")
+                notes.append(f"{place}: not imported: {', '.join(given)}: the node is not known ({remedy})")
         if not is_ours:
             first = next(iter(document.data), "")
             remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
@@ -349,9 +349,9 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
                 raise InputError(problem, file=parameter.document.path, place=place, remedy=remedy)
             why = f"the campaign's value counts ({other.place})"
         if why is not None:
-            notes.append(f"{parameter.place}: not taken over: {why}")
+            notes.append(f"{parameter.place}: not imported: {why}")
     if unneeded:
-        notes.append(f"no counterpart here, and none needed: {', '.join(unneeded)}")
+        notes.append(f"not needed here: {', '.join(unneeded)}")
     values = {path: Value(each.value, f"{each.source}: {each.keys}", each) for path, each in found.items()}
 
     has_mission = any(each.node not in (RUNNER, REASONER) for each in parameters)
@@ -483,7 +483,7 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
             try:
                 level = float(arguments["battery_constraint_value"])
             except (KeyError, ValueError):
-                notes.append(f"{place}: not taken over: battery_constraint without a number as its value")
+                notes.append(f"{place}: not imported: battery_constraint without a number as its value")
         yield Experiment(place, manager, each.num_runs, launch, level)
 
 
@@ -493,7 +493,7 @@ def _battery_constraint(experiments: Sequence[Experiment], notes: list[str]) -> 
     why = "not all experiments have it; import this one from a file of its own"
     for each in experiments if len(levels) > 1 else ():
         if each.level is not None:
-            notes.append(f"{each.place}: not taken over: battery_constraint_value {each.level:g}: {why}")
+            notes.append(f"{each.place}: not imported: battery_constraint_value {each.level:g}: {why}")
     level = levels.pop() if len(levels) == 1 else None
     return {"battery.mission_ends_at_level": Value(level, "battery_constraint_value")} if level else {}
 
@@ -515,10 +515,10 @@ def _campaign(
     for place, manager, number, *_ in experiments:
         if manager not in known:
             remedy = did_you_mean(manager, known)
-            notes.append(f"{place}: not taken over: there is no manager {shown(manager)} ({remedy})")
+            notes.append(f"{place}: not imported: there is no manager {shown(manager)} ({remedy})")
             continue
         if manager in runs:
-            notes.append(f"{place}: not taken over: {manager} is there already, and a campaign has each manager once")
+            notes.append(f"{place}: not imported: {manager} is there already, and a campaign has each manager once")
         runs[manager] = max(runs.get(manager, 0), number)
     if not runs:
         raise InputError("none of its managers can be run", place="experiments", remedy=f"known: {', '.join(known)}")
@@ -663,7 +663,7 @@ def export_config(
     if runner:
         lost += _differences(campaign, there)
     elif campaign:
-        lost.append(f"{', '.join(campaign)}: no runner before {FIRST_WITH_RUNNER}")
+        lost.append(f"{', '.join(campaign)}: the exemplar has no experiment runner before {FIRST_WITH_RUNNER}")
     return texts, tuple(lost)
 
 

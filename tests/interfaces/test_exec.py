@@ -95,7 +95,7 @@ def test_it_is_told_what_happens():
     [
         ("time.sleep(60)", "gave no answer within 0.5 s"),
         ("print('{', end='', flush=True); time.sleep(60)", "gave no answer but half a line within 3 s"),
-        ("sys.exit(7)", "ended with status 7"),
+        ("sys.exit(7)", "ProgramError: the program ended with status 7"),
         ("os.kill(os.getpid(), 9)", "ended with status -9"),
         ("sys.stdout.close(); os.close(1); time.sleep(60)", "closed its output"),
         ("print('good morning', flush=True)", "answered 'good morning', which is not JSON"),

@@ -39,7 +39,7 @@ def test_components_that_nothing_reports_and_expectations_that_nothing_measures_
     status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
     extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
     findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=[])
-    notes = [one.message for one in findings if one.level is Level.INFO and one.line]
+    notes = [one.message for one in findings if one.level is Level.NOTE and one.line]
     assert notes[:2] == [
         "missions do not measure water_visibility, so what designs expect of it is compared with nothing",
         "nothing in the simulation reports the status of component c_camera, so it has none in missions",
@@ -58,7 +58,7 @@ def test_the_model(tmp_path):
     findings = found(tmp_path, extra=extra, modes=modes, needed=["f_follow_pipeline", "f_gone"])
     assert only(findings, "function f_new has no function design").level is Level.WARN
     assert only(findings, "fd_new has no mode").level is Level.ERROR
-    assert only(findings, "metacontrol never chooses: fd_old").level is Level.INFO
+    assert only(findings, "metacontrol never chooses: fd_old").level is Level.NOTE
     assert only(findings, "there is no function f_gone").level is Level.ERROR
     assert only(findings, "fd_new: hasQAestimation: no performance is expected of it").level is Level.WARN
     assert only(findings, "fd_lost: solvesF: a function design must solve a function").level is Level.ERROR
@@ -212,7 +212,7 @@ def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note
     files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
     note = only(findings_of(Subject(files, operators={"water_visibility": "<"})), "comparison")
     line = next(n for n, text in enumerate(files[0].read_text().splitlines(), 1) if '#water_visibility">' in text)
-    assert (note.level, note.line) == (Level.INFO, line)
+    assert (note.level, note.line) == (Level.NOTE, line)
     assert "water_visibility has no qa_comparison_operator in the ontologies: < is assumed" in note.message
     (warning,) = warnings(findings_of(Subject(files, measured=["water_visibility"])))
     assert "has no qa_comparison_operator" in warning.message
@@ -234,7 +234,7 @@ def exemplar_files(folder: Path, *, of_2023: bool = False) -> list[Path]:
 @pytest.mark.parametrize(("scenario", "of_2023"), [("seams2023", True), ("seams2023", False), ("release15", False)])
 def test_files_of_the_exemplar_have_notes_of_one_line_only(scenario, of_2023, tmp_path):
     findings = check(subject_of(load_scenario(scenario, ontologies=exemplar_files(tmp_path, of_2023=of_2023))))
-    assert {each.level for each in findings} == {Level.INFO}, findings
+    assert {each.level for each in findings} == {Level.NOTE}, findings
     messages = [each.message for each in findings]
     assert sum("for other models" in each for each in messages) == 2  # tomasys.owl and mros.owl
     assert "obs_water_visibility has no hasValue: missions give it the measured one" in messages
@@ -243,7 +243,7 @@ def test_files_of_the_exemplar_have_notes_of_one_line_only(scenario, of_2023, tm
 
 def test_files_of_2023_under_another_revision_are_one_error_that_names_the_cause(tmp_path):
     loaded = load_scenario("release15", ontologies=exemplar_files(tmp_path, of_2023=True))
-    (error,) = [each for each in check(subject_of(loaded)) if each.level is not Level.INFO]
+    (error,) = [each for each in check(subject_of(loaded)) if each.level is not Level.NOTE]
     assert (error.level, Path(error.file or "").name, error.remedy) == (
         Level.ERROR,
         "mros.owl",
@@ -269,6 +269,6 @@ def test_a_measured_attribute_without_operator_is_a_warning_before_missions(tmp_
 
 def test_a_function_that_the_scenario_adds_is_needed(tmp_path):
     findings = check(subject_of(load_scenario("extended", ontologies=exemplar_files(tmp_path))))
-    assert [each.message for each in findings if each.level is not Level.INFO] == [
+    assert [each.message for each in findings if each.level is not Level.NOTE] == [
         "there is no function generate_recharge_path, which the mission needs"
     ]

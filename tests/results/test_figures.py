@@ -204,10 +204,12 @@ def test_a_long_name_is_shown_whole(kind, campaign, tmp_path):
     assert boxes and all(box.x0 >= 0.0 and box.x1 <= width_px for box in boxes)
 
 
-def test_a_campaign_without_the_swept_parameter_is_reported(campaign, tmp_path):
-    run_campaign("seams2023", managers=["none"], runs=1, sweep={"start.y_m": [2.0, 2.5]}, out=tmp_path / "swept")
-    with pytest.raises(InputError, match=r"does not vary start\.y_m"):
-        draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png")
+@pytest.mark.parametrize("kind", ["auto", "heatmap"])
+def test_a_campaign_without_the_swept_parameter_is_reported(kind, campaign, tmp_path):
+    values = {"start.y_m": [2.0, 2.5], "start.x_m": [-17.0, -16.5]}
+    run_campaign("seams2023", managers=["none"], runs=1, sweep=values, out=tmp_path / "swept")
+    with pytest.raises(InputError, match=r"does not sweep start\.y_m, start\.x_m"):
+        draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png", kind)
 
 
 @pytest.fixture(scope="module")

@@ -113,7 +113,7 @@ class TestWhatTheExemplarCannotExpress:
     def test_is_named_for_the_shipped_scenarios(self):
         assert lost_lines("release15").startswith("battery: nothing here")
         assert lost_lines("release15").count("\n") == 0
-        assert "no runner before 1.4" in lost_lines("seams2023")
+        assert "no experiment runner before 1.4" in lost_lines("seams2023")
         assert "signals.water_visibility: constant here, sinusoid in the exemplar" in lost_lines("planta_exp1")
         words = ("revision.spiral.centre", "knowledge.ontologies", "modes_file", "metrics", "requirements.find_early")
         assert all(f"{word}: " in lost_lines("extended") for word in words)
@@ -192,5 +192,5 @@ class TestCommand:
         assert status == 2 and "exists already" in error
         assert Path("there/mission_config.yaml").read_text() == "kept"
         status, out, _ = command(*export, "there", "--overwrite")
-        assert status == 0 and out.startswith("not expressed: battery: nothing here")
+        assert status == 0 and out.startswith("not exported: battery: nothing here")
         assert command(*export, "no/where").status == 2

@@ -225,7 +225,7 @@ class TestValues:
         node = "random_reasoner_node" if revision == "2023" else "task_bridge"
         result = imported(f"{node}: {{ros__parameters: {{{key}: 30}}}}\n", revision=revision)
         is_read = (revision == "1.5") == (key == "adapt_period")
-        assert bool(notes_about(result, f"{node}.{key}: not taken over")) != is_read
+        assert bool(notes_about(result, f"{node}.{key}: not imported")) != is_read
         assert mine().managers.random.adaptation_period_s == (30 if is_read else 15)
 
     @pytest.mark.parametrize("first", [0, 1])
@@ -247,7 +247,7 @@ class TestWithoutCounterpart:
     @pytest.mark.parametrize(
         ("text", "words", "why"),
         [
-            (MISSION_2023, "mission_node.result_path (given0.yaml, line 4)", "no counterpart here, and none needed"),
+            (MISSION_2023, "mission_node.result_path (given0.yaml, line 4)", "not needed here"),
             (
                 "task_bridge: {ros__parameters: }\nmisson_node: {ros__parameters: {time_limit: 3}}\n",
                 "line 2, misson_node",
@@ -320,7 +320,7 @@ class TestCampaign:
         drawn = content_of(result)["perturbations"]["signals.water_visibility.shift_s"]
         assert (drawn["minimum"], drawn["maximum"]) == (at - 40, at + 40)
         assert mine().signals["water_visibility"].shift_s == at
-        assert notes_about(result, "water_visibility_sec_shift: not taken over")
+        assert notes_about(result, "water_visibility_sec_shift: not imported")
 
     def test_the_runner_s_events_count_over_the_mission_s_if_it_has_some(self, imported):
         result = imported(EVENTS, RUNNER_15.replace('"(1,failure,35)", ', ""), campaign=True)
@@ -491,7 +491,7 @@ class TestCommand:
         assert status == 0
         assert told[-2].startswith("mine.yaml is written, based on release15: only revision 1.5 has ")
         assert told[-1] == "sub/campaign.yaml is written"
-        assert any("no counterpart" in line and "mission_metrics.result_path" in line for line in told)
+        assert any("not needed here" in line and "mission_metrics.result_path" in line for line in told)
         assert load_scenario("mine.yaml").scenario.managers.random.adaptation_period_s == 25
         assert yaml.safe_load(Path("sub/campaign.yaml").read_text())["scenario"] == "../mine.yaml"
 
