@@ -306,7 +306,7 @@ def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
     for design in material.base.designs(GENERATE_SEARCH_PATH) if known is not None else ():
         expected_m = material.base.expected(design).get(WATER_VISIBILITY)
         if expected_m is not None and float(expected_m) not in (known or ()):
-            problem = f"{design} expects a visibility of {expected_m} m, by which mean_reaction_time_s does not judge"
+            problem = f"{design} expects {expected_m} m of visibility, which is not a threshold of mean_reaction_time_s"
             remedy = "set reaction_metric.visibility_thresholds_m and expected_altitudes_m"
             yield material.about(Level.WARN, design, problem, remedy)
 

@@ -114,11 +114,11 @@ def test_names_that_individuals_misspell_are_errors(case, tmp_path):
 
 def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path):
     known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
-    warning = only(found(tmp_path, **known), "fd_spiral_medium expects a visibility of 2.25 m")
+    warning = only(found(tmp_path, **known), "fd_spiral_medium expects 2.25 m of visibility, which is not a threshold")
     assert warning.level is Level.WARN
     assert "reaction_metric.visibility_thresholds_m" in str(warning.remedy)
     (tmp_path / "other").mkdir()
-    assert not [each for each in found(tmp_path / "other") if "expects a visibility" in each.message]
+    assert not [each for each in found(tmp_path / "other") if "of visibility" in each.message]
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"])
