@@ -58,6 +58,7 @@ KINDS: Final[dict[str, AtomKind]] = {
 }
 SAME: Final = OWL + "sameAs"
 DIFFERENT: Final = OWL + "differentFrom"
+IDENTITIES: Final = (SAME, DIFFERENT)
 #: The predicate of an atom on a class expression, which has no name.
 EXPRESSION: Final = "_:expression"
 
