@@ -147,6 +147,8 @@ def test_after_a_mistake_the_other_rules_are_read():
         ("c_status(?c, FALSE) -> Role(?c)", 17, 'FALSE is not defined (declare it, or write "FALSE" for a text'),
         ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (declare it"),
         ("hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)", 23, "not 3 (arguments are separated by"),
+        ("Role(?q) ^ date(?d, 2020, 1, 15) -> Role(?q)", 20, "?d has no value in date: no other atom binds it"),
+        ('Role(?q) ^ anyURI(?d, "a") -> Role(?q)', 15, "anyURI takes 7 arguments, not 2"),
     ],
 )
 def test_rules_that_pellet_would_ignore_are_refused(rule, column, words, tmp_path):

@@ -275,12 +275,17 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
             yield atom.place(number), problem, nearest(name, bound)
 
 
+#: What Pellet computes from variables, and refuses to compute from literals.
+_FROM_VARIABLES: Final = {rdf.SWRLB + name for name in ("booleanNot", "date", "dateTime", "time")}
+
+
 def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
     """Variables that builtins compute: the first argument, once all others have values."""
     return {
         first.name
-        for first, *others in (atom.arguments for atom in builtins if atom.computes)
-        if isinstance(first, Variable) and all(not isinstance(term, Variable) or term.name in bound for term in others)
+        for name, (first, *others) in ((atom.predicate, atom.arguments) for atom in builtins if atom.computes)
+        if isinstance(first, Variable)
+        and all(term.name in bound if isinstance(term, Variable) else name not in _FROM_VARIABLES for term in others)
     }
 
 
