@@ -342,8 +342,7 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
         problem = f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
         problem += f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator"
         remedy = f'write revision: "2023" in the scenario, or use ontologies of revision {revision}'
-        place = f"line {rule.line}" if rule.line else None
-        raise KnowledgeError(problem, file=rule.file, place=place, remedy=remedy)
+        raise KnowledgeError(problem, file=rule.file, place=f"line {rule.line}" if rule.line else None, remedy=remedy)
 
 
 def another_revision(material: Material) -> Iterator[Finding]:

@@ -75,11 +75,9 @@ class StockPellet:
 def _value(term: Node) -> str | Lit:
     """An IRI or a literal; text that Pellet returns is PlainLiteral, with its escapes left in by owlready2."""
     found = term_of(term)
-    if found == Lit("()", XSD + "string"):  # what Pellet prints for an empty text
-        return Lit("", XSD + "string")
-    if not isinstance(found, Lit) or found.datatype != _PLAIN:
-        return found
-    return Lit(owlready2.reasoning._unescape_pellet_str(found.text), XSD + "string")
+    if isinstance(found, Lit) and found.datatype == _PLAIN:
+        return Lit(owlready2.reasoning._unescape_pellet_str(found.text), XSD + "string")
+    return Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found  # () is how Pellet prints no text
 
 
 def _below(graph: Any, name: str) -> set[Node]:
