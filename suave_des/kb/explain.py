@@ -544,7 +544,7 @@ class Explainer:
         for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
             for fact in rdf.facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
-        # Where rules ask for differentFrom of two variables, not all of Pellet's inferences are the same each time.
+        # Where several rules ask for what is the same or different, Pellet's inferences are not the same each time.
         self.facts = sorted(reasoning.inference.facts & self.triples.keys(), key=str)
 
     def answer(self, question: str) -> Explanation:

@@ -213,14 +213,12 @@ def test_numbers_match_where_they_do_in_pellet(tmp_path):
     assert answers == {(fact.subject, fact.value) for fact in found if fact.property == "is" and fact.value != "sum"}
 
 
-ASKED = {  # of rules with differentFrom(?x, ?y), or several with sameAs, Pellet's inferences are not always the same
+ASKED = {  # with differentFrom(?x, ?y), or several rules with sameAs and differentFrom, Pellet's inferences are chance
     "what is the same": (("c_thruster_4", "owl:sameAs", "c_thruster_5"), "sameAs(c_thruster_4, ?x) ^ Component(?x)"),
     "what is different": (
         ("c_thruster_4", "owl:sameAs", "c_thruster_5"),
         ("c_thruster_6", "owl:differentFrom", "c_thruster_5"),
-        "Component(?x) ^ differentFrom(?x, c_thruster_6)",
-        "differentFrom(c_thruster_4, ?x) ^ Component(?x)",
-        "Component(?x) ^ sameAs(?x, c_thruster_6)",
+        "Component(?x) ^ differentFrom(?x, c_thruster_5)",
     ),
     "empty text and text in a language": (
         ("c_thruster_1", "suave:note", ""),

@@ -22,7 +22,7 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.imports import hidden
 from suave_des.knowledge.ontology import RULE_IRI, Ontology, Terms
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
-from suave_des.knowledge.rules import IDENTITIES, Atom
+from suave_des.knowledge.rules import DIFFERENT, SAME, Atom
 from suave_des.knowledge.state import ContradictionError
 
 with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
@@ -246,19 +246,19 @@ class InProcessPellet:
             self._refuse_dropped_rules()
             return found
 
-    def identities(self, assertions: Sequence[Triple]) -> frozenset[Triple]:
-        """Return which individuals are the same (owl:sameAs), and which are different (owl:differentFrom).
-
-        Raises:
-            KnowledgeError: the assertions contradict one another, or the ontologies.
-        """
+    def identities(self, assertions: Sequence[Triple]) -> set[Triple]:
+        """Which individuals are the same (owl:sameAs), and which are different (owl:differentFrom); errors as infer."""
         with one_at_a_time, _java_errors(self._ontology):
+            text = self._ontology.content.n_triples() + "".join(map(n_triple, assertions))
             copy = self._with(assertions)
-            asked = zip(IDENTITIES, (copy.getAllSames, copy.getDifferents), strict=True)
             individuals = list(copy.getIndividuals())
-            pairs = [(str(a), name, str(b)) for name, of in asked for a in individuals for b in of(a)]
-            # Pellet finds some differences in one direction only.
-            return frozenset(pair for a, name, b in pairs for pair in ((a, name, b), (b, name, a)))
+            found: set[Triple] = {(str(one), SAME, str(each)) for one in individuals for each in copy.getAllSames(one)}
+            # Pellet names some that may be the same, and others in one direction only.
+            for one, other in {tuple(sorted((str(a), str(b)))) for a in individuals for b in copy.getDifferents(a)}:
+                if not load_n_triples(text + n_triple((one, SAME, other))).isConsistent():
+                    found |= {(one, DIFFERENT, other), (other, DIFFERENT, one)}
+            take_warnings()
+            return found
 
     def _with(self, assertions: Sequence[Triple]) -> Any:
         """A copy of the knowledge base with assertions, which is consistent."""
