@@ -76,14 +76,10 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
         for state in [KnowledgeState(), *islice(states_to_ask(base, subject.measured), MAX_STATES)]:
             pellet.analyze(state)
     except InputError as error:
-        found = Finding.of(error)
-        if found.rule not in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
-            yield found
-        else:
-            message = (
-                f"contradictions were not checked with Pellet: it does not use rule {found.rule} until it is corrected"
-            )
-            yield Finding(Level.NOTE, message)
+        found, left_out = Finding.of(error), "contradictions were not checked with Pellet"
+        if found.rule in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
+            found = Finding(Level.NOTE, f"{left_out}: it does not use rule {found.rule} until it is corrected")
+        yield found
 
 
 def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:

@@ -20,16 +20,14 @@ from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.kb import matching
-from suave_des.kb.matching import FACT_KINDS, Binding, Bound, Facts, Probes, bound, with_bindings
-from suave_des.kb.space import Situation
+from suave_des.kb.matching import FACT_KINDS, Binding, Bound, Facts, bound, with_bindings
 from suave_des.kb.states import FactReader
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology
-from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed, one_at_a_time, trace_contradiction
 from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.reasoner import performance
-from suave_des.knowledge.rules import COMPARISONS, Atom, AtomKind, Rule, Variable, write_atom, write_term
+from suave_des.knowledge.rules import COMPARISONS, IDENTITIES, Atom, AtomKind, Rule, Variable, write_atom, write_term
 from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import (
     ContradictionError,
@@ -109,12 +107,14 @@ class Tracer:
         Raises:
             KnowledgeError: the state contradicts itself.
         """
-        return self.pellet.infer(self.base.assertions(self.state)) | self.asserted
+        given = self.base.assertions(self.state)
+        asks = any(atom.predicate in IDENTITIES for rule in self.base.content.enabled_rules for atom in rule.atoms)
+        return self.pellet.infer(given).union(self.asserted, self.pellet.identities(given) if asks else ())
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
         """All that follows and that rules mention, in canonical form and in a fixed order."""
-        return tuple(sorted({canonical_triple(triple) for triple in self.entailed if rdf.is_fact(triple)}, key=str))
+        return tuple(sorted({canonical_triple(triple) for triple in self.entailed if _is_told(triple)}, key=str))
 
     @cached_property
     def _facts(self) -> Facts:
@@ -123,7 +123,8 @@ class Tracer:
     @cached_property
     def _leaves(self) -> dict[Triple, Triple]:
         """What is asserted, by its canonical form."""
-        return {canonical_triple(triple): triple for triple in sorted(filter(rdf.is_fact, self.asserted), key=str)}
+        told = sorted(filter(_is_told, self.asserted), key=str)
+        return {canonical_triple(each): triple for triple in told for each in _both_ways(triple)}
 
     @cached_property
     def _schema(self) -> Content:
@@ -135,10 +136,7 @@ class Tracer:
         """Derive a triple that is entailed."""
         with one_at_a_time:
             found = self._derive(canonical_triple(triple), frozenset())
-            if found is None:  # the axioms that Pellet says that it follows from, without the steps between
-                axioms = self._axioms(triple, self.asserted, self.base.content.enabled_rules)
-                found = Derivation(self._fact(triple), "axioms", axioms=axioms)
-            return found
+            return found or self._by_all(triple)
 
     def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
@@ -165,7 +163,7 @@ class Tracer:
 
     def _by_rules(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         for rule in self.base.content.enabled_rules:
-            starts = (matching.matched(atom, triple, {}) for atom in rule.head)
+            starts = (matching.matched(atom, each, {}) for atom in rule.head for each in _both_ways(triple))
             for start in (each for each in starts if each is not None):
                 for binding in matching.matches(rule, self._facts, start):
                     said = (matching.stated(atom, binding) for atom in rule.body)
@@ -176,8 +174,16 @@ class Tracer:
                             bindings = matching.shown_bindings(binding, self.base.names)
                             yield Derivation(self._fact(triple), "rule", rule.name, bindings, premises=premises)
 
+    def _by_all(self, triple: Triple) -> Derivation:
+        """The axioms that Pellet says that a triple follows from, without the steps between."""
+        axioms = self._axioms(triple, self.asserted, self.base.content.enabled_rules)
+        return Derivation(self._fact(triple), "axioms", axioms=axioms)
+
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
+        if triple[1] in IDENTITIES:  # they follow from all that is asserted
+            yield self._by_all(triple)
+            return
         kind: AtomKind = "class" if triple[1] == rdf.RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
         asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
         for other in self.known:
@@ -202,11 +208,23 @@ class Tracer:
     def _axioms(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> tuple[str, ...]:
         """The axioms of the schema by which a triple follows from facts: domains, subclasses and the like."""
         _, used = trace_contradiction(self._text(facts, rules) + _denial(triple))
-        schema = (each for each in used if not each.startswith(("rule(", "prop(", "type(")))
+        denied = f"({triple[0]},{triple[2]})"  # what is the same or different, by _denial
+        schema = (each for each in used if not each.startswith(("rule(", "prop(", "type(")) and denied not in each)
         return tuple(_IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema)
 
     def _fact(self, triple: Triple) -> Fact:
         return rdf.fact_of(triple, self.base.names)
+
+
+def _is_told(triple: Triple) -> bool:
+    """Whether derivations tell a triple: a fact, or what is the same or different."""
+    return rdf.is_fact(triple) or triple[1] in IDENTITIES
+
+
+def _both_ways(triple: Triple) -> tuple[Triple, ...]:
+    """A triple and, where it says what is the same or different, the same from the other side."""
+    subject, name, value = triple
+    return (triple, (str(value), name, subject)) if name in IDENTITIES else (triple,)
 
 
 def canonical_triple(triple: Triple) -> Triple:
@@ -217,6 +235,8 @@ def canonical_triple(triple: Triple) -> Triple:
 def _denial(triple: Triple) -> str:
     """Say in OWL that a triple does not hold, as N-Triples."""
     subject, predicate, value = triple
+    if predicate in IDENTITIES:
+        return rdf.n_triple((subject, next(each for each in IDENTITIES if each != predicate), value))
     denied, restriction = "urn:denied", "urn:restriction"
     triples: list[Triple] = [
         (denied, rdf.OWL + "complementOf", value if predicate == rdf.RDF_TYPE else restriction),
@@ -309,10 +329,6 @@ class RuleQuestions:
         if isinstance(facts, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
         binding, failing = matching.nearest_match(rule, facts, start)
-        identities = [number for number, atom in enumerate(rule.body) if atom.kind in ("same", "different")]
-        # What is the same and what is different, Pellet alone knows.
-        if not failing and identities and not Probes(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)):
-            failing = (identities[0],)
         if not failing:
             bindings = with_bindings(matching.shown_bindings(binding, self.base.names))
             said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
@@ -383,6 +399,10 @@ class RuleQuestions:
 
 def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
     """Describe why an atom of a rule's body does not hold, with a binding, in all that follows."""
+    if atom.kind == "different":
+        return "OWL does not assume that different names mean different individuals: assert it"
+    if atom.kind == "same":
+        return "these individuals are not known to be the same"
     if atom.kind in FACT_KINDS:
         subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
         who, name = base.names.short(subject) if isinstance(subject, str) else "", local_name(atom.predicate)
@@ -400,10 +420,6 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
         return f"no {name} connects what the other atoms need"
     if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
         return _compared(base, atom, binding)
-    if atom.kind == "different":
-        return "OWL does not assume that different names mean different individuals: assert it"
-    if atom.kind == "same":
-        return "these individuals are not known to be the same"
     texts = [f"?{name} = {_show(base, binding[name])}" for name in atom.variables() if name in binding]
     return f"it is false for {', '.join(texts) or 'these values'}"
 
@@ -528,6 +544,8 @@ class Explainer:
         for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
             for fact in rdf.facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
+        # Where several rules ask for what is the same or different, Pellet's inferences are not the same each time.
+        self.facts = sorted(reasoning.inference.facts & self.triples.keys(), key=str)
 
     def answer(self, question: str) -> Explanation:
         """Answer a question; see KnowledgeBase.explain."""
@@ -538,8 +556,9 @@ class Explainer:
             raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
         if question:
             return Explanation((self.fact(question),))
-        inferred = sorted(self.reasoning.inference.facts, key=str)
-        return Explanation(tuple(map(self.derive, inferred)), tuple(map(self.decision, self.reasoning.plan.decisions)))
+        return Explanation(
+            tuple(map(self.derive, self.facts)), tuple(map(self.decision, self.reasoning.plan.decisions))
+        )
 
     def derive(self, fact: Fact) -> Derivation:
         """How a fact follows."""
@@ -580,7 +599,7 @@ class Explainer:
         function, objective = decision.function, objective_name(decision.function)
         answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
         lines: list[str] = []
-        for fact in sorted(self.reasoning.inference.facts, key=str):
+        for fact in self.facts:
             if fact.subject == objective and fact.property in ("o_status", "o_updatable"):
                 lines += ["  adapted because", *self.derive(fact).lines("    ")]
         for each in verdicts(self.base, self.reasoning, decision):

@@ -311,9 +311,8 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         remedy = "for instance SELECT ?d WHERE { ?d tomasys:solvesF ?f }"
         raise InputError(f"not a SPARQL query: {reason}", remedy=remedy) from None
     if "ServiceGraphPattern" in str(query.algebra) or query.algebra.get("datasetClause"):
-        raise InputError(
-            "SERVICE and FROM read from other sources", remedy="remove them: only the knowledge base can be queried"
-        )
+        remedy = "remove them: only the knowledge base can be queried"
+        raise InputError("SERVICE and FROM read from other sources", remedy=remedy)
     unknown = tuple(_unknown(graph, text))
     try:
         result = graph.query(query)

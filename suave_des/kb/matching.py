@@ -29,8 +29,9 @@ Body = tuple[Atom, ...]
 Binding = Mapping[str, str | Lit]
 #: The same as people write it.
 Bound = tuple[tuple[str, Value], ...]
+_BINDING: Final = ("class", "object", "data")
 #: Kinds of atoms that are about facts; the others compare or compute.
-FACT_KINDS: Final = ("class", "object", "data")
+FACT_KINDS: Final = (*_BINDING, "same", "different")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
 MOST_WAYS: Final = 20_000
 
@@ -183,15 +184,12 @@ def _ways(
 
 
 def _tested(atom: Atom, binding: Binding) -> list[Binding] | None:
-    """The bindings with which a built-in, datatype, sameAs or differentFrom holds; None if an argument has no value."""
+    """The bindings with which a built-in or datatype holds; None if an argument has no value."""
     asked = instance(atom, binding)
     unbound = [number for number, term in enumerate(asked.arguments) if isinstance(term, Variable)]
     computes = atom.computes and unbound == [0]
     if unbound and not computes:
         return None
-    if atom.kind in ("same", "different"):
-        is_same = asked.arguments[0] == asked.arguments[1]
-        return [binding] if is_same == (atom.kind == "same") else []
     values = _ask_pellet(asked, computes=computes)
     if computes:
         name = next(atom.variables())
@@ -217,7 +215,7 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
     known: set[str] = set()
     order: list[int] = []
     while waiting:
-        ready = (number for number in waiting if body[number].kind in FACT_KINDS or _inputs(body[number]) <= known)
+        ready = (number for number in waiting if body[number].kind in _BINDING or _inputs(body[number]) <= known)
         number = next(ready, waiting[0])
         waiting.remove(number)
         order.append(number)

@@ -222,8 +222,5 @@ def _others(file: OntologyFile) -> int:
 
 
 def _cannot(path: Path) -> KnowledgeError:
-    return KnowledgeError(
-        "the rule is written in a way that cannot be edited in place; nothing was changed",
-        file=path,
-        remedy="open the file in Protégé and save it, then try again",
-    )
+    problem = "the rule is written in a way that cannot be edited in place; nothing was changed"
+    return KnowledgeError(problem, file=path, remedy="open the file in Protégé and save it, then try again")

@@ -527,10 +527,8 @@ class States:
             )
             total = len(measured) * len(reports) * len(tasks)
         if total > LARGEST:
-            raise InputError(
-                f"the policy has {total:,} kinds of states, which is too many",
-                remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes",
-            )
+            remedy = f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes"
+            raise InputError(f"the policy has {total:,} kinds of states, which is too many", remedy=remedy)
         return cls(space, measured, reports, tasks)
 
     def __len__(self) -> int:
@@ -622,11 +620,9 @@ def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount
         KnowledgeError: there is nothing to decide, or the reasoner takes too long.
     """
     if not any(map(base.designs, base.functions)):
-        raise KnowledgeError(
-            "no function has a function design, so there is nothing to decide",
-            file=", ".join(map(str, base.files)),
-            remedy="give an ontology that uses TOMASys as suave.owl does",
-        )
+        problem = "no function has a function design, so there is nothing to decide"
+        remedy = "give an ontology that uses TOMASys as suave.owl does"
+        raise KnowledgeError(problem, file=", ".join(map(str, base.files)), remedy=remedy)
     kind, different, decided = kind_of(base, states.space), dict[Hashable, KnowledgeState](), dict[Hashable, Outcome]()
     for state in states:
         different.setdefault(kind(state), state)

@@ -357,11 +357,9 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
             is_any_found = True
             yield from ((each, mission) for mission in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE))
     if not is_any_found:
-        raise InputError(
-            f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
-            file=folder,
-            remedy="record with run --manager metacontrol --out, or campaign --record-knowledge",
-        )
+        problem = f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it"
+        remedy = "record with run --manager metacontrol --out, or campaign --record-knowledge"
+        raise InputError(problem, file=folder, remedy=remedy)
 
 
 def _scenario(path: Path) -> Scenario:

@@ -121,15 +121,11 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
     triples, structure, rules = dict[rdf.Triple, None](), list[str](), list[Rule]()
     shipped = shipped_folder("ontology")
     # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology replaces them.
-    given_mros = {
-        rule.name
-        for source in sources
-        if source.path.parent != shipped and supplies(source, rdf.MROS)
-        for rule in rules_of(source)
-    }
+    given_mros = (each for each in sources if each.path.parent != shipped and supplies(each, rdf.MROS))
+    replaced = {rule.name for source in given_mros for rule in rules_of(source)}
     for source in sorted(sources, key=lambda source: source.content):
         found = rules_of(source)
-        rules += [rule for rule in found if source.path.parent != shipped or rule.name not in given_mros]
+        rules += [rule for rule in found if source.path.parent != shipped or rule.name not in replaced]
         # Triples about the ontology itself (imports, versions) are no part of its content.
         ontologies = {s for s, p, o in source.triples if p == rdf.RDF_TYPE and o == rdf.OWL + "Ontology"}
         inside = {triple for rule in found for triple in rule.triples}
@@ -294,18 +290,14 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     attributes = by_name(types, "quality attribute types")
     existing = {local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)}
     named = ((functions, objective_name), (designs, grounding_name), (attributes, measurement_name))
-    groups = [
+    objectives, groundings, measurements = (
         {name: existing.get(rename(name), rdf.namespace(iri) + rename(name)) for name, iri in things.items()}
         for things, rename in named
-    ]
-    objectives, groundings, measurements = groups
+    )
     in_states = [*objectives.values(), *groundings.values(), *measurements.values()]
     if len(set(in_states)) < len(in_states):
-        raise KnowledgeError(
-            "two functions, function designs or quality attribute types differ in their prefix only",
-            file=sources[0].path,
-            remedy="rename one, for example f_search and search",
-        )
+        problem = "two functions, function designs or quality attribute types differ in their prefix only"
+        raise KnowledgeError(problem, file=sources[0].path, remedy="rename one, for example f_search and search")
     own: dict[str, list[rdf.Triple]] = {iri: [] for iri in (*in_states, *components.values())}
     individuals, kept = {*in_states}, list[rdf.Triple]()
     for triple in triples:

@@ -141,7 +141,9 @@ def text_of(content: bytes, errors: str = "strict") -> str:
     encoding = "utf-16" if marked else declared.group(1).decode() if declared else "utf-8-sig"
     try:
         return content.decode(encoding, errors)
-    except LookupError:
+    except UnicodeDecodeError:
+        raise
+    except (LookupError, UnicodeError):  # no encoding of characters, or none that is known
         return content.decode("utf-8", errors)
 
 

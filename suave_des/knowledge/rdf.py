@@ -235,7 +235,8 @@ def value_of(value: str | Lit, names: Names) -> Value:
     if value.datatype == XSD + "boolean":
         return value.text.strip() in ("true", "1")
     with suppress(InvalidOperation):
-        return Decimal(value.text.strip()) if value.datatype in NUMERIC else value.text
+        if value.datatype in NUMERIC and not (number := Decimal(value.text.strip())).is_nan():  # NaN never equals NaN
+            return number
     return value.text
 
 

@@ -218,11 +218,9 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
     for attribute, required in _values(inference, objective, "hasNFR"):
         signs = _operators(inference, attribute)
         if not signs:
-            raise KnowledgeError(
-                f"{objective} requires a value of {attribute}, which has no qa_comparison_operator",
-                remedy=f"give {attribute} one of {' '.join(OPERATORS)}: "
-                "the way in which a value is worse than the required one",
-            )
+            problem = f"{objective} requires a value of {attribute}, which has no qa_comparison_operator"
+            way = "the way in which a value is worse than the required one"
+            raise KnowledgeError(problem, remedy=f"give {attribute} one of {' '.join(OPERATORS)}: {way}")
         for expected, sign in product(_expected(inference, design, attribute), signs):
             if OPERATORS[sign](expected, required):
                 left, right = _show_pair(expected, required)

@@ -66,32 +66,17 @@ def test_a_chain_of_rules_is_told_with_its_bindings(knowledge, in_error):
 
 def test_a_fact_that_the_schema_adds_names_it(suave_copy):
     # Nothing says that c_new is a Component but the domain of requiredBy.
-    knowledge = KnowledgeBase.load(
-        [
-            suave_copy(
-                '<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_new">'
-                '<mros:requiredBy rdf:resource="http://www.metacontrol.org/suave#fd_spiral_low"/></rdf:Description>'
-            )
-        ]
+    new = (
+        '<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_new">'
+        '<mros:requiredBy rdf:resource="http://www.metacontrol.org/suave#fd_spiral_low"/></rdf:Description>'
     )
+    knowledge = KnowledgeBase.load(suave_copy(new))
     state = knowledge.state(components={"c_new": "FALSE"})
     (tree,) = knowledge.explain(state, "fd_realisability(fd_spiral_low, false)").facts
     assert tree.rule == "compError"
     kind = next(each for each in tree.premises if each.fact.property == "type")
     assert (kind.source, str(kind.fact)) == ("axioms", "Component(c_new)")
     assert {each.source for each in kind.premises} <= {"state", "ontology"}
-
-
-def test_a_rule_that_computes_is_traced(tmp_path):
-    rules = tmp_path / "margin.swrl"
-    rules.write_text(
-        "margin: FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ add(?w, ?v, 1.0) ^ "
-        'lessThan(?w, 3) -> fg_status(?fg, "IN_ERROR_FR")\n'
-    )
-    knowledge = KnowledgeBase.load(rules=[rules], disabled_rules=["QAWaterVisibility"])
-    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.5})
-    (tree,) = knowledge.explain(state, "fg_status(fg_spiral_high, IN_ERROR_FR)").facts
-    assert tree.rule == "margin"
 
 
 def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path):
@@ -181,14 +166,6 @@ def test_a_contradiction_names_the_rules(tmp_path):
         knowledge.explain(state)
     above = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2})
     assert knowledge.explain(above).facts
-
-
-def test_the_command_prints_the_tree(command):
-    words = ("--at", f"{SEARCH}=fd_spiral_high", "--at", "water_visibility=1.8")
-    status, text, _ = command("explain", "fg_status(fg_spiral_high, IN_ERROR_NFR)", *words)
-    assert status == 0
-    assert text.startswith("fg_status(fg_spiral_high, IN_ERROR_NFR)  [by rule QAWaterVisibility with ?eqa = ")
-    assert "\n  hasValue(obs_water_visibility, 1.8)  [given in the state]\n" in text
 
 
 SCHEMA = """

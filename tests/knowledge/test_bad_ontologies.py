@@ -200,13 +200,16 @@ def test_a_rule_that_uses_an_object_property_for_data_is_an_error(suave_copy):
     assert f"{path}: rule odd: typeFD is declared as object property, but used as data property" in problem
 
 
-@pytest.mark.parametrize("encoding", ["UTF-16", "ISO-8859-1"])
-def test_xml_is_read_in_the_encoding_that_it_declares(encoding, shipped, tmp_path):
+@pytest.mark.parametrize("encoding", ["UTF-16", "ISO-8859-1", "undefined"])
+def test_xml_is_read_in_the_encoding_that_it_declares_or_as_utf_8(encoding, shipped, tmp_path):
     text = (shipped / "suave.owl").read_text(encoding="utf-8")
     declared = re.sub(r"<\?xml[^>]*\?>", f'<?xml version="1.0" encoding="{encoding}"?>', text)
     path = tmp_path / "suave.owl"
-    path.write_bytes(declared.replace("fd_spiral_low", "fd_spiral_bröd").encode(encoding))
-    assert "fd_spiral_bröd" in Ontology.load([path]).designs("f_generate_search_path")
+    path.write_bytes(
+        declared.replace("fd_spiral_low", "fd_spiral_bröd").encode({"undefined": "utf-8"}.get(encoding, encoding))
+    )
+    base = Ontology.load([path])
+    assert "fd_spiral_bröd" in base.designs("f_generate_search_path") and base.sources[0].line_of("fd_spiral_bröd")
 
 
 def test_a_datatype_as_owlready2_saves_it_is_that_of_xml_schema(shipped, tmp_path):

@@ -22,7 +22,7 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.imports import hidden
 from suave_des.knowledge.ontology import RULE_IRI, Ontology, Terms
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
-from suave_des.knowledge.rules import Atom
+from suave_des.knowledge.rules import DIFFERENT, SAME, Atom
 from suave_des.knowledge.state import ContradictionError
 
 with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
@@ -123,10 +123,8 @@ def start() -> None:
 def _is_running() -> bool:
     """Whether Java runs in this process; an error when it was started in the process that this was forked from."""
     if _started_in and _started_in[0] != os.getpid():
-        raise InputError(
-            "Java was started before this process was forked, and cannot be used in it",
-            remedy='start worker processes with the "spawn" method',
-        )
+        problem = "Java was started before this process was forked, and cannot be used in it"
+        raise InputError(problem, remedy='start worker processes with the "spawn" method')
     return bool(_started_in)
 
 
@@ -173,7 +171,6 @@ def _capture_log() -> None:
 
 # Pellet.
 
-_LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
 #: An escape of N-Triples; of them all, Jena's reader does not know the one of eight digits.
 _ESCAPE: Final = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
 _RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
@@ -244,14 +241,33 @@ class InProcessPellet:
         """
         start()  # an error in a process that was forked since
         with one_at_a_time, _java_errors(self._ontology):
-            copy = self._base.copy()
-            for subject, predicate, value in assertions:
-                self._add(copy, subject, predicate, value)
-            if not copy.isConsistent():
-                raise contradiction(self._ontology, assertions)
+            copy = self._with(assertions)
             found = self._always.union(self._read(copy, self._known))
             self._refuse_dropped_rules()
             return found
+
+    def identities(self, assertions: Sequence[Triple]) -> set[Triple]:
+        """Which individuals are the same (owl:sameAs), and which are different (owl:differentFrom); errors as infer."""
+        with one_at_a_time, _java_errors(self._ontology):
+            text = self._ontology.content.n_triples() + "".join(map(n_triple, assertions))
+            copy = self._with(assertions)
+            individuals = list(copy.getIndividuals())
+            found: set[Triple] = {(str(one), SAME, str(each)) for one in individuals for each in copy.getAllSames(one)}
+            # Pellet names some that may be the same, and others in one direction only.
+            for one, other in {tuple(sorted((str(a), str(b)))) for a in individuals for b in copy.getDifferents(a)}:
+                if not load_n_triples(text + n_triple((one, SAME, other))).isConsistent():
+                    found |= {(one, DIFFERENT, other), (other, DIFFERENT, one)}
+            take_warnings()
+            return found
+
+    def _with(self, assertions: Sequence[Triple]) -> Any:
+        """A copy of the knowledge base with assertions, which is consistent."""
+        copy = self._base.copy()
+        for subject, predicate, value in assertions:
+            self._add(copy, subject, predicate, value)
+        if not copy.isConsistent():
+            raise contradiction(self._ontology, assertions)
+        return copy
 
     def _add(self, knowledge_base: Any, subject: str, predicate: str, value: str | Lit) -> None:
         individual = self._term(subject)
@@ -302,7 +318,7 @@ def _values(entries: Any, name: str) -> Iterator[Triple]:
     for entry in entries:
         subject = str(entry.getKey().toString())
         for value in entry.getValue():
-            yield subject, name, read_term(str(value.toString()))
+            yield subject, name, _read_term(value)
 
 
 def _members(individuals: Any, name: str) -> Iterator[Triple]:
@@ -363,31 +379,20 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
         problem += f", by the rule{'s' if len(rules) > 1 else ''} {', '.join(rules)}"
     if facts:
         problem += f", in the state {', '.join(facts)}"
-    return ContradictionError(
-        f"contradiction: {problem[0].lower()}{problem[1:]}",
-        file=_files(ontology),
-        remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",
-    )
+    problem = f"contradiction: {problem[0].lower()}{problem[1:]}"
+    remedy = "change a rule, so that no two of these hold at once" if rules else "correct the ontology"
+    return ContradictionError(problem, file=_files(ontology), remedy=remedy)
 
 
 def _files(ontology: Ontology) -> str:
     return ", ".join(map(str, ontology.files))
 
 
-def read_term(text: str) -> str | Lit:
-    """Read a term as Pellet prints it: an IRI, or literal(text,language,datatype)."""
-    found = _LITERAL.fullmatch(text)
-    if found is None:
-        return text
-    # Pellet keeps all text as PlainLiteral, without a language as "()".
-    datatype = found.group(3) if not found.group(3).endswith("PlainLiteral") else XSD + "string"
-    return canonical(Lit(unescape(found.group(1)), datatype))
-
-
-def unescape(text: str) -> str:
-    """Undo the escapes of text as Pellet prints it."""
-    if "\\" not in text:
-        return text
-    from owlready2.reasoning import _unescape_pellet_str
-
-    return str(_unescape_pellet_str(text))
+def _read_term(term: Any) -> str | Lit:
+    """Read one of Pellet's terms: an IRI, or a literal of text, language and datatype."""
+    if term.getArity() != 3:
+        return str(term.toString())
+    text, language, datatype = (str(term.getArgument(number).getName()) for number in range(3))
+    if datatype.endswith("PlainLiteral"):  # Pellet keeps all text so
+        datatype = f"@{language}" if language else XSD + "string"
+    return canonical(Lit(text, datatype))

@@ -20,7 +20,7 @@ from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology, Terms
-from suave_des.knowledge.pellet.in_process import java_executable, launcher_environment, unescape
+from suave_des.knowledge.pellet.in_process import java_executable, launcher_environment
 from suave_des.knowledge.rdf import RDF as RDF_IRI
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, for_pellet, n_triple, reached, term_of
 
@@ -75,7 +75,9 @@ class StockPellet:
 def _value(term: Node) -> str | Lit:
     """An IRI or a literal; text that Pellet returns is PlainLiteral, with its escapes left in by owlready2."""
     found = term_of(term)
-    return Lit(unescape(found.text), XSD + "string") if isinstance(found, Lit) and found.datatype == _PLAIN else found
+    if isinstance(found, Lit) and found.datatype == _PLAIN:
+        return Lit(owlready2.reasoning._unescape_pellet_str(found.text), XSD + "string")
+    return Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found  # () is how Pellet prints no text
 
 
 def _below(graph: Any, name: str) -> set[Node]:

@@ -58,6 +58,7 @@ KINDS: Final[dict[str, AtomKind]] = {
 }
 SAME: Final = OWL + "sameAs"
 DIFFERENT: Final = OWL + "differentFrom"
+IDENTITIES: Final = (SAME, DIFFERENT)
 #: The predicate of an atom on a class expression, which has no name.
 EXPRESSION: Final = "_:expression"
 
@@ -161,9 +162,9 @@ BUILTINS: Final[Mapping[str, tuple[int, int]]] = dict.fromkeys(TESTERS, (2, 2)) 
         ("roundHalfToEven", (2, 3)),
         ("stringConcat", (2, 99)),
         ("substring", (3, 4)),
-        ("substringAfter substringBefore tokenize", (3, 3)),
+        ("resolveURI substringAfter substringBefore tokenize", (3, 3)),
         ("replace translate", (4, 4)),
-        ("anyURI resolveURI", (2, 99)),
+        ("anyURI", (7, 7)),
         ("date", (4, 5)),
         ("dateTime", (7, 8)),
         ("time", (4, 5)),

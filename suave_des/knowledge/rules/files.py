@@ -11,6 +11,8 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Final
 
+import rdflib
+
 from suave_des.errors import Finding, InputError, KnowledgeError, Level, nearest, with_article
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge import rdf
@@ -182,8 +184,9 @@ def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem
         return atom.place(), "an atom without a kind that SWRL knows, or without a name", None
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
     if atom.kind == "range":
-        is_known = atom.predicate.startswith(rdf.XSD) or "datatype" in declared
-        return None if is_known else (atom.place(), f"datatype {name} is not defined", None)
+        known = [*map(str, dir(rdflib.XSD)), *(iri for iri, kinds in vocabulary.kinds.items() if "datatype" in kinds)]
+        problem = f"datatype {name} is not defined"
+        return None if atom.predicate in known else (atom.place(), problem, nearest(name, map(local_name, known)))
     wanted = _DECLARED_AS.get(atom.kind)
     if wanted is None or wanted in declared or atom.predicate == swrl.EXPRESSION:
         return None
@@ -275,12 +278,17 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
             yield atom.place(number), problem, nearest(name, bound)
 
 
+#: What Pellet computes from variables, and refuses to compute from literals.
+_FROM_VARIABLES: Final = {rdf.SWRLB + name for name in ("booleanNot", "date", "dateTime", "time")}
+
+
 def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
     """Variables that builtins compute: the first argument, once all others have values."""
     return {
         first.name
-        for first, *others in (atom.arguments for atom in builtins if atom.computes)
-        if isinstance(first, Variable) and all(not isinstance(term, Variable) or term.name in bound for term in others)
+        for name, (first, *others) in ((atom.predicate, atom.arguments) for atom in builtins if atom.computes)
+        if isinstance(first, Variable)
+        and all(term.name in bound if isinstance(term, Variable) else name not in _FROM_VARIABLES for term in others)
     }
 
 
