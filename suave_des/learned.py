@@ -39,8 +39,10 @@ class Learned:
     def text(self) -> str:
         """Write the file's content; an InputError if what was learned cannot be written as JSON."""
         try:
+            if not _has_text_keys(self.learned):
+                raise TypeError("a dict has a key that is no text")
             return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, RecursionError) as error:
             remedy = "it may have text, finite numbers, True, False, None, lists, and dicts by text"
             raise InputError(f"what {self.manager} has learned cannot be written: {error}", remedy=remedy) from None
 
@@ -57,6 +59,12 @@ def read_file(path: Path) -> Learned:
 def read_learned(path: Path) -> Mapping[str, Any]:
     """Read a training result as read_file does, with immutable values, so that all missions find the same."""
     return MappingProxyType({key: _frozen(value) for key, value in read_file(path).learned.items()})
+
+
+def _has_text_keys(value: Any) -> bool:
+    if isinstance(value, dict):  # JSON would write numbers as text, which no manager looks up
+        return all(isinstance(key, str) and _has_text_keys(each) for key, each in value.items())
+    return not isinstance(value, list | tuple) or all(map(_has_text_keys, value))
 
 
 def _frozen(value: Any) -> Any:

@@ -241,8 +241,7 @@ def _check_hooks(what: str, kind: type, root: type) -> None:
         except ValueError:  # no signature: compiled
             continue
         if never_runs or (inspect.isgeneratorfunction(function) and hook not in _MAY_YIELD):
-            remedy = f"write {form}; only adapt may yield"
-            raise InputError(f"{what}: {hook} cannot be called as a hook", remedy=remedy)
+            raise InputError(f"{what}: {hook} cannot be called as a hook", remedy=f"write {form}; only adapt may yield")
     classes = kind.__mro__[: kind.__mro__.index(root)]
     for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
         for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):

@@ -92,11 +92,9 @@ def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, c
     unknown = [name for name in campaign.code() if name not in named and not is_imported(name)]
     begun = dict(_begun().read()) if unknown else {}
     if not confirmed and any(_note(folder, name) not in begun for name in unknown):
-        raise InputError(
-            f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
-            file=folder,
-            remedy=f"if you trust it, give --managers {shlex.quote(','.join(unknown))} or --yes",
-        )
+        problem = f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to"
+        remedy = f"if you trust it, give --managers {shlex.quote(','.join(unknown))} or --yes"
+        raise InputError(problem, file=folder, remedy=remedy)
 
 
 def note_own(campaign: Campaign, folder: Path) -> None:
@@ -352,11 +350,9 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
     for place, old, new in _differences(before, now, ""):
         if place == "runs" and new >= old:
             continue
-        raise InputError(
-            f"the campaign cannot be resumed: {place} was {shown(old)}, and is now {shown(new)}",
-            file=folder,
-            remedy="undo that, or start a new campaign in another folder or with --overwrite",
-        )
+        problem = f"the campaign cannot be resumed: {place} was {shown(old)}, and is now {shown(new)}"
+        remedy = "undo that, or start a new campaign in another folder or with --overwrite"
+        raise InputError(problem, file=folder, remedy=remedy)
 
 
 def _differences(before: Any, now: Any, place: str) -> Iterator[tuple[str, Any, Any]]:

@@ -122,8 +122,6 @@ def tree(
 
     drawn = getattr(Mission(scenario, manager).manager, "drawing", None)
     if drawn is None:
-        raise InputError(
-            f"manager {manager!r} has no tree",
-            remedy="bt and bt_extended have one, and managers with a method drawing()",
-        )
+        remedy = "bt and bt_extended have one, and managers with a method drawing()"
+        raise InputError(f"manager {manager!r} has no tree", remedy=remedy)
     print(drawn())

@@ -145,8 +145,7 @@ def _flag(name: str) -> str:
 
 def _types_in(annotation: Any) -> set[Any]:
     parts = get_args(annotation)
-    outer = getattr(annotation, "__origin__", annotation)
-    return {outer}.union(*map(_types_in, parts))
+    return {getattr(annotation, "__origin__", annotation)}.union(*map(_types_in, parts))
 
 
 def _written(default: Any) -> str:

@@ -78,12 +78,12 @@ class Session:
     def _begin(self, run: int, seed: int) -> None:
         self._mission = Mission(self._simulator, run=run, seed=seed)
         self._mission.advance(1e-9)  # the first task is requested at t = 0
-        self._began_s = time.monotonic()
+        self._seen_s = time.monotonic()  # up to when time has passed by itself
 
     def _catch_up(self) -> None:
+        before_s, self._seen_s = self._seen_s, time.monotonic()
         if self._factor > 0.0 and not self._mission.is_over:
-            now_s = (time.monotonic() - self._began_s) * self._factor
-            self._mission.advance(max(now_s, self._mission.now_s))
+            self._mission.advance(self._mission.now_s + (self._seen_s - before_s) * self._factor)
 
     def _monitor(self) -> Json:
         mission = self._mission

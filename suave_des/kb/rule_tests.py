@@ -172,8 +172,7 @@ def _choice(base: Ontology, function: str, words: str) -> str:
         raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions))
     known, choice = (*base.designs(function), STAYS, NONE_LEFT), words.strip()
     if choice not in known:
-        problem = f"{function} has no function design {shown(choice)}"
-        raise InputError(problem, remedy=did_you_mean(choice, known))
+        raise InputError(f"{function} has no function design {shown(choice)}", remedy=did_you_mean(choice, known))
     return choice
 
 

@@ -119,11 +119,10 @@ class Metacontrol(ManagingSubsystem):
         """Infer what the rules say about the current state."""
         improves = self._revision.always_improve
         objectives = [ObjectiveState(name, status, name in improves) for name, status in self.objectives.items()]
-        return self._reasoner.analyze(
-            KnowledgeState.of(
-                objectives, groundings=self.groundings, components=self.components, measurements=self.measurements
-            )
+        state = KnowledgeState.of(
+            objectives, groundings=self.groundings, components=self.components, measurements=self.measurements
         )
+        return self._reasoner.analyze(state)
 
     def plan(self, inference: Inference) -> Plan:
         """Choose function designs for the objectives that need a different one."""

@@ -88,8 +88,7 @@ def plotly_script() -> str:
         InputError: it is not installed.
     """
     try:
-        script = files("plotly").joinpath("package_data", "plotly.min.js")
-        return compressed(script.read_text(encoding="utf-8"))
+        return compressed(files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8"))
     except (ImportError, OSError):
         remedy = "pip install 'suave-des[report]'"
         raise InputError("the report's charts need plotly, which is not installed", remedy=remedy) from None

@@ -199,9 +199,11 @@ class _Cells:
         """Check and convert the cells; a frame with COLUMNS and the further ones. Errors name the line."""
         is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
         managers = [str(name) for name in self.text["manager"].unique()]
-        are_names = {name: len(name.split()) == 1 or bool(name and not is_own) for name in managers}
+        are_names = {name: bool(name.strip()) for name in managers}  # one of exec: has spaces
         self._check("manager", self.text["manager"].map(are_names), "a manager's name")
-        self.text["manager"] = self.text["manager"].map({name: manager_of(name) for name in managers})
+        self.text["manager"] = self.text["manager"].map(
+            {name: name if is_own else manager_of(name) for name in managers}
+        )
         search_time_s = self._numbers(SEARCH_TIME)
         limit_s = self._numbers(_LIMIT, least=0.0) if _LIMIT in self.text else None
         if limit_s is not None and not is_own:
@@ -255,8 +257,7 @@ class _Cells:
         wrong = np.flatnonzero(~np.asarray(is_right, dtype=bool))
         if len(wrong):
             problem = f"{self.names.get(name, name)}: expected {wanted}, got {shown(self.text[name].iloc[wrong[0]])}"
-            remedy = "correct it, or leave the mission out"
-            raise line_error(self.path, int(self.text.index[wrong[0]]), problem, remedy)
+            raise line_error(self.path, int(self.text.index[wrong[0]]), problem, "correct it, or leave the mission out")
 
 
 def _as_numbers(text: pandas.Series[str]) -> NDArray[np.float64]:

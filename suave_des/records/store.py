@@ -138,11 +138,9 @@ class Store:
             return
         (version,) = self._db.execute("PRAGMA user_version").fetchone()
         if version != _VERSION:
-            raise InputError(
-                f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}",
-                file=self.path,
-                remedy="resume it with the suave-des version that began it, or start a new one with --overwrite",
-            )
+            problem = f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}"
+            remedy = "resume it with the suave-des version that began it, or start a new one with --overwrite"
+            raise InputError(problem, file=self.path, remedy=remedy)
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
             raise _damaged(self.path, verdict)

@@ -386,8 +386,7 @@ def _estimate(
     ):
         if number < least:
             problem = f"{metric.title} of {' - '.join(both)}: there {'is' if number == 1 else 'are'}"
-            remedy = f"at least {least} are needed: {remedy}"
-            raise InputError(f"{problem} {number_of(number, of)}", remedy=remedy)
+            raise InputError(f"{problem} {number_of(number, of)}", remedy=f"at least {least} are needed: {remedy}")
     signs = np.array([1.0, -1.0][: len(both)])
     real, same, many = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
     sizes = own["real_n"], own["same_n"], float(drawn["draw_n"].unstack().mean().mean())

@@ -391,8 +391,7 @@ def draw_results(
     if not (folders[0] / TRAJECTORY_FILE).is_file():
         figure = draw_missions(read_missions(folders), kind, parameters)
     elif len(folders) > 1:
-        problem = "has a mission, of which one is drawn at a time"
-        raise InputError(problem, file=folders[0], remedy="give one folder")
+        raise InputError("has a mission, of which one is drawn at a time", file=folders[0], remedy="give one folder")
     else:
         record = read_mission(folders[0])
         figure = draw_mission(record, MAP if kind == AUTO else kind, rules_of(record) if kind == TIMELINE else {})

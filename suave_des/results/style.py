@@ -185,8 +185,7 @@ def component_words(component: str) -> str:
 
 def plain(name: str) -> str:
     """Return a name from a file as words, without what LaTeX or a terminal would take for commands."""
-    text = name.removeprefix("fd_").strip("_").replace("_", " ") or name
-    return printable(text)
+    return printable(name.removeprefix("fd_").strip("_").replace("_", " ") or name)
 
 
 def folded(name: str, width: int = 40) -> str:

@@ -446,7 +446,7 @@ def _target(each: Row) -> tuple[str, ...]:
     what = each["what"] if kind == "share" else f"{METRICS[each['what']].brief}: {_KINDS.get(kind, kind)}"
     style = ".0%" if kind in ("conclusion", "share") else ".2f"
     value, low, high = (_CELLS.format_field(each[name], style) for name in ("value", "low", "high"))
-    must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else ""
+    must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else f"at most {high}" if high else ""
     return each["subject"], what, value, must_be, _VERDICTS[each["met"]]
 
 

@@ -309,7 +309,8 @@ def _in_time(events: Any) -> Any:
     if not isinstance(events, list):
         return events
     texts = ["".join(each.split()) if isinstance(each, str) else each for each in events]
-    return [re.sub(r",-[^,]*\)$", ",0)", each) if isinstance(each, str) else each for each in texts if each != ""]
+    before = re.compile(r",-[\d.]+(e-?\d+)?\)$")
+    return [before.sub(",0)", each) if isinstance(each, str) else each for each in texts if each != ""]
 
 
 # The scenario's values.
@@ -343,11 +344,11 @@ def _values(parameters: Sequence[Parameter], revision: str, base: LoadedScenario
         elif path in passed and parameter.node != RUNNER:
             why = f"{RUNNER} gives each mission its own; without one, 0"
         elif not path.startswith(CAMPAIGN) and (other := found.setdefault(path, parameter)).value != parameter.value:
-            if other.node != RUNNER or parameter.node == RUNNER:
+            if other is not parameter and (other.node != RUNNER or parameter.node == RUNNER):
                 problem, place = f"contradicts {other.place}", parameter.place.partition(": ")[2]
                 remedy = "make them alike, or leave one of them out"
                 raise InputError(problem, file=parameter.document.path, place=place, remedy=remedy)
-            why = f"the campaign's value counts ({other.place})"
+            why = None if other is parameter else f"the campaign's value counts ({other.place})"
         if why is not None:
             notes.append(f"{parameter.place}: not imported: {why}")
     if unneeded:
@@ -637,11 +638,11 @@ def export_config(
     if revision not in REVISIONS:
         remedy = did_you_mean(revision, REVISIONS, "give --revision, one of")
         raise InputError(f"the exemplar has no revision {shown(revision)}", file=loaded.path, remedy=remedy)
-    measured = loaded.scenario.signals[WATER_VISIBILITY]
-    if measured.publishing_period_s is None:
+    if loaded.scenario.signals[WATER_VISIBILITY].publishing_period_s is None:
         period_s = loaded.scenario.revision.monitors.visibility_publishing_period_s
         loaded = with_values(loaded, {f"signals.{WATER_VISIBILITY}.publishing_period_s": period_s})
-    mission, runner = _mission(loaded, revision), dict[str, Any]()
+    counted, runner = with_values(loaded, dict(_event_times_s(loaded, revision))), dict[str, Any]()
+    mission = _mission(counted, revision)
     if is_since(revision, FIRST_WITH_RUNNER):
         runner = {RUNNER: {**mission.pop(RUNNER, {}), **_runner_of(loaded, campaign, revision)}}
     files = {name: nodes for name, nodes in ((MISSION_FILE, mission), (RUNNER_FILE, runner)) if nodes}
@@ -659,12 +660,23 @@ def export_config(
     )
     there = yaml.safe_load(again.campaign or "{}")
     campaign = {key: value for key, value in campaign.items() if value not in (None, {}, [])}
-    lost = list(_differences(loaded.scenario.model_dump(mode="json"), again.loaded.scenario.model_dump(mode="json")))
+    lost = list(_differences(counted.scenario.model_dump(mode="json"), again.loaded.scenario.model_dump(mode="json")))
     if runner:
         lost += _differences(campaign, there)
     elif campaign:
         lost.append(f"{', '.join(campaign)}: the exemplar has no experiment runner before {FIRST_WITH_RUNNER}")
     return texts, tuple(lost)
+
+
+def _event_times_s(loaded: LoadedScenario, revision: str) -> Iterator[tuple[str, float]]:
+    """The times of thruster events where a revision counts them otherwise: from the start, or one by one."""
+    over, before_s = _layer({"revision": Value(revision, "")}, loaded.path), 0.0
+    there = load_scenario(REVISIONS[revision], over=over).scenario.revision.monitors.thruster_event_times
+    if there != loaded.scenario.revision.monitors.thruster_event_times:
+        for number, time_s in enumerate(max(0.0, mean(each.time_s)) for each in loaded.scenario.thruster_events):
+            t_s = before_s + time_s if there == "after_start" else max(before_s, time_s)
+            yield f"thruster_events.{number}.time_s", t_s if there == "after_start" else t_s - before_s
+            before_s = t_s
 
 
 def _mission(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, Any]]:

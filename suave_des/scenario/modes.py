@@ -194,8 +194,7 @@ def modes_of(document: Layer) -> ModeTable:
                 mode: _mode(document, (*path, "modes", mode), states, known) for mode, states in system.modes.items()
             }
     if not functions:
-        remedy = "a function is an entry with type: system, parts and modes"
-        raise document.error("defines no function", (), remedy)
+        raise document.error("defines no function", (), "a function is an entry with type: system, parts and modes")
     return ModeTable(str(document.path), functions)
 
 

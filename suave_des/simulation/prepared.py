@@ -83,7 +83,7 @@ class PreparedScenario:
             declared = {name: path for (_, name), path in found.items()}
             name = None if self.training is not None else self.loaded.manager_settings(manager).get("learned")
             path = None if name is None else self.loaded.manager_file(manager, str(name))
-            self._manager_inputs[manager] = declared, {} if path is None else read_learned(path)
+            self._manager_inputs[manager] = declared, MappingProxyType({}) if path is None else read_learned(path)
         files, learned = self._manager_inputs[manager]
         return files, learned if self.training is None else self.training.setdefault(manager, {})
 

@@ -105,8 +105,7 @@ def test_runs_that_are_as_predicted_score_in_full(study):
 
 
 def test_real_runs_are_scored_from_their_file(study):
-    module = study("predict")
-    said = module.scored("exp1", [ROOT / "scenarios" / "published" / "planta_exp1_runs.csv"])
+    said = study("predict").scored("exp1", [ROOT / "scenarios" / "published" / "planta_exp1_runs.csv"])
     assert re.search(r"\d+ of 11 predicted means lie in the real 95% intervals", said)
     assert "Median search times of single conditions differ by: median " in said
 

@@ -49,8 +49,7 @@ def test_resuming_gives_the_same_bytes(two, tmp_path):
 
 def test_a_campaign_file_names_its_ensemble_relative_to_itself(two, tmp_path):
     (tmp_path / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nruns: 2\nensemble: two.csv\n")
-    frame = run_campaign(tmp_path / "mine.yaml", ["none"]).frame()
-    assert frame[ENSEMBLE_COLUMN].tolist() == [1, 2]
+    assert run_campaign(tmp_path / "mine.yaml", ["none"]).frame()[ENSEMBLE_COLUMN].tolist() == [1, 2]
 
 
 def test_the_file_of_differences_has_a_row_for_each_pair_and_metric(two, tmp_path):

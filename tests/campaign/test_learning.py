@@ -10,6 +10,7 @@ import pytest
 
 from suave_des import InputError, NoManager, Simulator, load_scenario, run_campaign, run_mission
 from suave_des.campaign.campaign import train
+from suave_des.learned import Learned
 from tests.helpers import AWKWARD, OUTSIDE
 from tests.helpers.command import command_here, suave_des_command
 
@@ -66,6 +67,13 @@ def test_a_manager_that_learns_nothing_cannot_be_trained(tmp_path):
     with pytest.raises(InputError, match="has learned nothing"):
         train("seams2023", "none", 1, tmp_path / "policy.json")
     assert not (tmp_path / "policy.json").exists()
+
+
+@pytest.mark.parametrize("learned", [{1: 2.0}, {"arms": ({3: 1},)}, (deep := {})])
+def test_what_json_would_change_is_no_training_result(learned):
+    deep["deep"] = deep
+    with pytest.raises(InputError, match="cannot be written"):
+        Learned("mine", "seams2023", 1, 1, {}, learned).text()
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -91,8 +91,7 @@ class TestOnAWorker:
 
     @staticmethod
     def run(parcel: bytes, runs: range) -> list[Finished]:
-        chunk = tuple(MissionKey(0, 0, run) for run in runs)
-        return cluster.run("token", parcel, chunk)
+        return cluster.run("token", parcel, tuple(MissionKey(0, 0, run) for run in runs))
 
     def test_files_that_managers_declare_travel_each_with_its_own_content(self, tmp_path, monkeypatch):
         """Also where two managers have a file of the same name, from different folders."""

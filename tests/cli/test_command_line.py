@@ -104,8 +104,7 @@ class TestRun:
         times = [float(event["t_s"]) for event in events]
         assert times == sorted(times)
         trajectory = rows_of(out / "trajectory.csv")
-        columns = "t_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad,mode,visibility_m"
-        assert ",".join(trajectory[0]) == columns
+        assert ",".join(trajectory[0]) == "t_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad,mode,visibility_m"
         assert float(trajectory[-1]["t_s"]) >= 300.0
         mission = json.loads((out / "mission.json").read_text())
         assert mission["metrics"]["manager"] == "random"

@@ -88,8 +88,7 @@ class TestCacheFolder:
         (tmp_path / "cache").mkdir()
         (tmp_path / "cache" / "numba").symlink_to(tmp_path / "theirs")
         monkeypatch.setattr(caches.tempfile, "gettempdir", lambda: str(tmp_path))
-        found = caches.private_cache("numba")
-        assert found == tmp_path / f"suave-des-{os.getuid()}" / "numba"
+        assert caches.private_cache("numba") == tmp_path / f"suave-des-{os.getuid()}" / "numba"
         assert "is used instead" in capsys.readouterr().err
         assert not list((tmp_path / "theirs").iterdir())
 

@@ -180,8 +180,7 @@ def test_dependencies_are_explained():
         *(each for extra in project["optional-dependencies"].values() for each in extra),
     ]
     names = {re.match(r"[\w-]+", requirement)[0] for requirement in required} - {"suave-des"}
-    explained = set(re.findall(r"^- (\w[\w-]*) \(", page, flags=re.MULTILINE))
-    assert explained == names
+    assert set(re.findall(r"^- (\w[\w-]*) \(", page, flags=re.MULTILINE)) == names
 
 
 @pytest.fixture(scope="module")

@@ -105,6 +105,10 @@ def test_time_may_pass_by_a_factor_of_real_time(simulator):
     session = Session(simulator, real_time_factor=1e6)
     time.sleep(0.01)
     assert session.answer("GET", "/monitor", None)["is_over"] is True
+    session = Session(simulator, real_time_factor=10.0)
+    then_s = session.answer("POST", "/advance", {"advance_s": 60.0})["time_s"]
+    time.sleep(0.01)
+    assert then_s + 0.1 <= session.answer("GET", "/monitor", None)["time_s"] < then_s + 60.0
 
 
 @pytest.mark.parametrize(

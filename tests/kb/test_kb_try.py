@@ -31,8 +31,7 @@ def mission(tmp_path_factory):
     scenario = tmp_path_factory.mktemp("scenario") / "short.yaml"
     scenario.write_text("base: seams2023.yaml\nmission: {time_limit_s: 60}\n")
     folder = tmp_path_factory.mktemp("missions") / "one"
-    result = run_mission(scenario, "metacontrol", 1, 1, folder)
-    return folder, result
+    return folder, run_mission(scenario, "metacontrol", 1, 1, folder)
 
 
 def test_a_mission_keeps_every_state_that_differs_from_the_one_before(mission):
@@ -107,8 +106,7 @@ def test_a_campaign_keeps_the_same_states_in_less_room(mission, campaign):
     first, second = read_missions(path)
     assert knowledge_text(first.records) == knowledge_text(second.records) == knowledge_text(result.knowledge)
     assert (first.manager, first.point, first.run, second.point) == ("metacontrol", 0, 1, 1)
-    line = path.read_text().splitlines()[1]
-    assert len(line) < len((folder / KNOWLEDGE_FILE).read_text()) / 2
+    assert len(path.read_text().splitlines()[1]) < len((folder / KNOWLEDGE_FILE).read_text()) / 2
 
 
 def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission, campaign, command):

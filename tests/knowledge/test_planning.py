@@ -22,8 +22,7 @@ def decide(reasoner: Reasoner, state: KnowledgeState, **options: bool) -> dict[s
 
 
 def decide_with(file: Path, state: KnowledgeState) -> Decision:
-    base = Ontology.load([file])
-    return decide(Reasoner(base, "pellet"), state)[SEARCH]
+    return decide(Reasoner(Ontology.load([file]), "pellet"), state)[SEARCH]
 
 
 @pytest.mark.parametrize(

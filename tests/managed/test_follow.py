@@ -84,8 +84,7 @@ def test_polls_lie_on_a_grid_that_begins_with_the_activation(env, name, seen_s):
     env.run(until=1.5)
     follow.apply(ACTIVE)
     env.run(until=15.0)
-    first_to_second = next(t_s for t_s, (x, _, _) in vehicle.commands if x == -99.0)
-    assert first_to_second == pytest.approx(seen_s)
+    assert next(t_s for t_s, (x, _, _) in vehicle.commands if x == -99.0) == pytest.approx(seen_s)
 
 
 @pytest.mark.parametrize(("name", "again_s"), [("2023", 2.0), ("1.5", 20.0)])

@@ -92,8 +92,7 @@ def test_the_command_draws_the_tree_of_a_manager(manager, scenario):
 
 
 def test_a_manager_without_tree_is_refused():
-    result = CliRunner().invoke(app, ["tree", "metacontrol"])
-    assert "has no tree" in str(result.exception)
+    assert "has no tree" in str(CliRunner().invoke(app, ["tree", "metacontrol"]).exception)
 
 
 def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing():

@@ -96,8 +96,7 @@ def test_visibility_counts_as_it_was_measured_last_and_before_the_first_measurem
     rows = measured_at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
     assert [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)] == [3.0, 3.0, 2.0, 1.0]
     assert np.isnan(rows[:4]).all() and np.isnan(measured_at_rows((), (), 10)).all()
-    after_the_end = measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40)
-    assert after_the_end.tolist() == [3.0] * 20 + [2.0] * 20
+    assert measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20
 
 
 @given(st.sampled_from(["at_least", "at_most", "close_to"]), st.floats(-9, 9), st.floats(0, 9), st.floats(-99, 99))

@@ -91,8 +91,7 @@ def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign)
     row = rows[(rows.manager == "bt") & (rows.run == 2)].iloc[0]
     page = opened_report.page
     page.evaluate("document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})")
-    shown = page.text_content("#run-table tr[aria-selected=true]")
-    assert f"{row.search_time_s:g}" in shown
+    assert f"{row.search_time_s:g}" in page.text_content("#run-table tr[aria-selected=true]")
     assert page.input_value("#run-number") == "2"
     assert "--run 2 --managers bt" in page.text_content("#run-command")
     drawn = opened_report.value("document.getElementById('run-time').data.find(each => each.name === 'adaptation').x")

@@ -33,8 +33,7 @@ def test_a_campaigns_file_is_read_with_its_places_and_scenario(write):
 
 
 def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
-    path = write("runs.csv", f"\ufeff{OWN}\n\nnone,120,3\n\n")
-    assert len(read_runs(path).frame) == 1
+    assert len(read_runs(write("runs.csv", f"\ufeff{OWN}\n\nnone,120,3\n\n")).frame) == 1
 
 
 @pytest.mark.parametrize(

@@ -42,8 +42,7 @@ def test_a_sweep_averages_a_metric_only_of_runs_that_have_it_at_all_points():
     assert found.difference == 0.0
     assert [(each.n, each.missing) for each in rows(comparison.summaries)] == [(40, 0), (20, 20)]
     assert any("b 20 of 40" in note and "without a mean reaction time" in note for note in comparison.notes)
-    search = rows(compare_frame(frame, metrics=["search_time_s"]).differences)[0]
-    assert search.n == 40
+    assert rows(compare_frame(frame, metrics=["search_time_s"]).differences)[0].n == 40
 
 
 def test_so_do_means_over_the_runs_of_a_draw():
@@ -223,8 +222,7 @@ def test_so_does_that_of_a_data_frame():
     frame = api.run_campaign("seams2023", ["none", "bt"], runs=8, progress=False, **VARIED)
     assert frame.compare().differences["n"][0] == compare_frame(frame).differences["n"][0] == 2
     other = api.run_campaign("seams2023", ["none", "bt"], runs=8, seed=2, progress=False, **VARIED)
-    both = pandas.concat([frame, other])
-    assert compare_frame(both).differences["n"][0] == 4
+    assert compare_frame(pandas.concat([frame, other])).differences["n"][0] == 4
 
 
 def test_runs_without_perturbations_are_independent(tmp_path):

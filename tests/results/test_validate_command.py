@@ -54,8 +54,7 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
 def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validate, tmp_path):
     options = ("--managers", "none,random")
     validate("seams2023", "--runs", "3", "--workers", "1", "--out", "simulated", *options)
-    ended = validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options)
-    assert ended.returncode == 0
+    assert validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options).returncode == 0
     assert not (tmp_path / "recorded" / "runs.csv").exists()
     for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv"):
         assert (tmp_path / "recorded" / name).read_bytes() == (tmp_path / "simulated" / name).read_bytes()
@@ -158,7 +157,6 @@ def test_several_files_are_compared_as_one_data_set(validate, tmp_path):
         own = [line for line in lines if line.startswith(f"{manager},")]
         (tmp_path / f"{manager}.csv").write_text("\n".join([header, *own]), encoding="utf-8")
         names += ["--data", f"{manager}.csv"]
-    ended = validate(*names, "--runs-file", str(DATA), "--out", "out")
-    assert "24 of 24 targets are met" in ended.stdout
+    assert "24 of 24 targets are met" in validate(*names, "--runs-file", str(DATA), "--out", "out").stdout
     data = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]["data"]
     assert [each["file"] for each in data] == ["none.csv", "random.csv", "metacontrol.csv"]

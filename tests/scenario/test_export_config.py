@@ -109,6 +109,16 @@ def lost_lines(scenario: str | LoadedScenario, revision: str | None = None, **ca
     return "\n".join(export_config(loaded, given, revision)[1])
 
 
+@pytest.mark.parametrize(("scenario", "revision", "expected"), [("planta_exp1", "1.4", 0), ("seams2023", "1.5", 85)])
+def test_times_of_thruster_events_are_written_as_the_other_revision_counts_them(scenario, revision, expected):
+    events = ["(1,failure,35)", "(1,recovery,50)"]
+    loaded = with_values(load_scenario(scenario), {} if expected == 0 else {"thruster_events": events})
+    texts, lost = export_config(loaded, {"managers": ["none"], "runs": 1, "seed": 1}, revision)
+    written = yaml.safe_load(texts[MISSION_FILE])["/thruster_monitor"]["ros__parameters"]["thruster_events"]
+    assert written[1].endswith(f",{expected})")
+    assert "thruster_events" not in "\n".join(lost)
+
+
 class TestWhatTheExemplarCannotExpress:
     def test_is_named_for_the_shipped_scenarios(self):
         assert lost_lines("release15").startswith("battery: nothing here")

@@ -77,8 +77,7 @@ def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly):
 def test_in_an_outage_the_last_measurement_stays(fly):
     signal = "{outages_s: [[50, 120]]}"
     points = fly(f"base: release15.yaml\nsignals: {{water_visibility: {signal}}}\n").trajectory
-    during = {point.visibility_m for point in points if 51.0 < point.t_s < 119.0}
-    assert len(during) == 1
+    assert len({point.visibility_m for point in points if 51.0 < point.t_s < 119.0}) == 1
 
 
 def test_messages_are_lost_with_the_given_probability(fly):
@@ -102,8 +101,7 @@ def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly):
         "base: extended.yaml\nname: mine\nsignals: {water_visibility: {dropout_probability: 0.3}}\n"
         "battery: {dropout_probability: 0.3}\n"
     )
-    recorded = fly(text, "metacontrol")
-    assert fly(text, "metacontrol", record=False).metrics == recorded.metrics
+    assert fly(text, "metacontrol", record=False).metrics == fly(text, "metacontrol").metrics
 
 
 @pytest.mark.parametrize(

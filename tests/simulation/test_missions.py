@@ -41,6 +41,11 @@ def test_missions_of_one_simulator_do_not_disturb_one_another(simulator):
     first.advance(150.0)
     meanwhile = one.run("metacontrol", 2, 1, record=True)
     assert [first.result(), meanwhile] == alone
+    first.close()
+    first.close()
+    both = [Mission(one, "metacontrol", run=run, seed=1, record=True) for run in (1, 2)]
+    both[0].advance(150.0)
+    assert [each.result() for each in reversed(both)] == alone[::-1]
 
 
 @settings(max_examples=15)

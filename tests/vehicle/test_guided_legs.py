@@ -108,8 +108,7 @@ def carry_out(vehicle: Vehicle, plan: list[tuple], readings: list[float]) -> np.
 @given(st.lists(commands | faults, max_size=8), st.lists(times, max_size=20))
 def test_reading_at_any_times_changes_no_bit(make_vehicle, plan, readings):
     unread = carry_out(make_vehicle(duration_s=DURATION_S), plan, [])
-    read = carry_out(make_vehicle(duration_s=DURATION_S), plan, readings)
-    assert np.array_equal(unread, read)
+    assert np.array_equal(unread, carry_out(make_vehicle(duration_s=DURATION_S), plan, readings))
 
 
 @given(st.lists(commands | faults, max_size=5), st.integers(0, 800))

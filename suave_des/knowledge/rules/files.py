@@ -376,8 +376,7 @@ def _iri(
     where = str(place) if place else None
     if found:
         raise RuleError(f"{name} is ambiguous", file=file, place=where, remedy=f"write {' or '.join(map(str, found))}")
-    remedy = vocabulary.guess(name, kinds) or otherwise
-    raise RuleError(f"{name} is not defined", file=file, place=where, remedy=remedy)
+    raise RuleError(f"{name} is not defined", file=file, place=where, remedy=vocabulary.guess(name, kinds) or otherwise)
 
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:
