@@ -40,7 +40,7 @@ class Learned:
         """Write the file's content; an InputError if what was learned cannot be written as JSON."""
         try:
             if not _has_text_keys(self.learned):
-                raise TypeError("a dict has a key that is no text")
+                raise TypeError("a dict has a key that is not text")
             return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
         except (TypeError, ValueError, RecursionError) as error:
             remedy = "it may have text, finite numbers, True, False, None, lists, and dicts by text"
