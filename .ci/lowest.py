@@ -1,10 +1,14 @@
-"""Print the lowest versions that pyproject.toml allows, as constraints for pip: python .ci/lowest.py > lowest.txt."""
+"""Print the lowest versions that pyproject.toml allows, as constraints for pip: python
+.ci/lowest.py > lowest.txt.
+"""
 
 import re
 import tomllib
 from pathlib import Path
 
-PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))[
+    "project"
+]
 LOWER_BOUND = re.compile(r"^([A-Za-z0-9_.-]+)(?:\[[^]]*\])?\s*>=\s*([0-9.]+)")
 
 for dependency in (

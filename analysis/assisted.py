@@ -1,8 +1,9 @@
 """Whether intervals from few real missions, assisted by simulated ones, hold, and what they gain.
 
-Coverage: sets of parameters that fit the real runs equally well play the real system in turn, and the shipped ones the
-simulator, or a biased or a useless one; missions are drawn from 150 conditions, 8 under each, 500 times. Gains:
-the real missions of 2025 (exp1), all 30 of each manager and parts of them.
+Coverage: sets of parameters that fit the real runs equally well play the real system in turn, and
+the shipped ones the simulator, or a biased or a useless one; missions are drawn from 150
+conditions, 8 under each, 500 times. Gains: the real missions of 2025 (exp1), all 30 of each manager
+and parts of them.
 
     python analysis/assisted.py [--out DIR] [--runs N] [--workers N]
 
@@ -63,11 +64,16 @@ Cells = dict[str, NDArray[np.float64]]
 
 
 def cells(frame: pandas.DataFrame, metric: str, each: int) -> Cells:
-    """Return the values of a metric by manager, condition and mission; search times up to the limit."""
+    """Return the values of a metric by manager, condition and mission; search times up to the
+    limit.
+    """
     ordered = frame.sort_values("run")
     values = ordered[metric].astype(float)
     values = values.clip(upper=LIMIT_S) if metric == "search_time_s" else values
-    return {name: part.to_numpy().reshape(-1, each) for name, part in values.groupby(ordered["manager"], observed=True)}
+    return {
+        name: part.to_numpy().reshape(-1, each)
+        for name, part in values.groupby(ordered["manager"], observed=True)
+    }
 
 
 def simulate(values: Mapping[str, Any], workers: int) -> pandas.DataFrame:
@@ -92,17 +98,19 @@ def coverage(
 
     Args:
         real: of each system that plays it, in turn; likewise simulated.
-        cases: conditions and real runs in each. The simulator's missions are others than those with the real ones'
-            random numbers.
+        cases: conditions and real runs in each. The simulator's missions are others than those with
+            the real ones' random numbers.
         resamples: for each case, and manager or pair.
 
     Yields:
-        A row for each: group, other, conditions, runs, alone and assisted (shares of intervals that hold the mean), and
-        alone_half and assisted_half (medians of their half-widths).
+        A row for each: group, other, conditions, runs, alone and assisted (shares of intervals that
+        hold the mean), and alone_half and assisted_half (medians of their half-widths).
     """
     draws, each = next(iter(simulated.values())).shape
     for conditions, runs_each in cases:
-        for both in [[name] for name in simulated] + [list(pair) for pair in combinations(simulated, 2)]:
+        for both in [[name] for name in simulated] + [
+            list(pair) for pair in combinations(simulated, 2)
+        ]:
             chance = np.random.default_rng(studies.SEED)
             signs = (1.0, -1.0)[: len(both)]
             held, halves = [], []
@@ -113,15 +121,29 @@ def coverage(
                 ours, theirs = missions[:runs_each], missions[-LEFT:]
                 means = [
                     sum(
-                        sign * side[name][rows][:, columns].mean(axis=1) for sign, name in zip(signs, both, strict=True)
+                        sign * side[name][rows][:, columns].mean(axis=1)
+                        for sign, name in zip(signs, both, strict=True)
                     )
-                    for side, rows, columns in ((system, own, ours), (simulated, own, theirs), (simulated, others, [0]))
+                    for side, rows, columns in (
+                        (system, own, ours),
+                        (simulated, own, theirs),
+                        (simulated, others, [0]),
+                    )
                 ]
-                within = sum(float(simulated[name][own].var(axis=1, ddof=1).mean()) for name in both)
+                within = sum(
+                    float(simulated[name][own].var(axis=1, ddof=1).mean()) for name in both
+                )
                 found, _ = assisted_mean(*means, [within / runs_each, within / LEFT, within])
-                truth = sum(sign * system[name].mean() for sign, name in zip(signs, both, strict=True))
+                truth = sum(
+                    sign * system[name].mean() for sign, name in zip(signs, both, strict=True)
+                )
                 estimates = (mean_interval(means[0]), found)
-                held.append([abs(estimate.value - truth) <= estimate.high - estimate.value for estimate in estimates])
+                held.append(
+                    [
+                        abs(estimate.value - truth) <= estimate.high - estimate.value
+                        for estimate in estimates
+                    ]
+                )
                 halves.append([estimate.high - estimate.value for estimate in estimates])
             shares, widths = np.mean(held, axis=0), np.median(halves, axis=0)
             row = {"group": both[0], "other": "".join(both[1:]), "conditions": conditions}
@@ -130,11 +152,12 @@ def coverage(
 
 
 def gains(same: pandas.DataFrame, population: pandas.DataFrame) -> pandas.DataFrame:
-    """Compare parts of the real missions, one to five under each of the six conditions, with all of them.
+    """Compare parts of the real missions, one to five under each of the six conditions, with all of
+    them.
 
     Returns:
-        A row for each manager, metric and number of runs: the medians over parts that share no mission of estimates
-        and half-widths, and equal_runs.
+        A row for each manager, metric and number of runs: the medians over parts that share no
+        mission of estimates and half-widths, and equal_runs.
     """
     real = pandas.read_csv(REAL).drop(columns="run")
     simulated = missions_in(same), missions_in(population)
@@ -146,15 +169,29 @@ def gains(same: pandas.DataFrame, population: pandas.DataFrame) -> pandas.DataFr
             groups = grouped(missions_in(part), metrics=METRICS, simulated=simulated)
             found = compare_assisted(groups).estimates
             found["alone_half"] = (found["alone_ci95_high"] - found["alone_ci95_low"]) / 2.0
-            found["assisted_half"] = (found["assisted_ci95_high"] - found["assisted_ci95_low"]) / 2.0
+            found["assisted_half"] = (
+                found["assisted_ci95_high"] - found["assisted_ci95_low"]
+            ) / 2.0
             rows.append(found[found["other"] == ""])
     columns = ["alone", "alone_half", "assisted", "assisted_half", "narrower", "equal_runs"]
-    return pandas.concat(rows).groupby(["metric", "group", "runs"], sort=False)[columns].median().reset_index()
+    return (
+        pandas.concat(rows)
+        .groupby(["metric", "group", "runs"], sort=False)[columns]
+        .median()
+        .reset_index()
+    )
 
 
 def under_real_conditions(runs: int, workers: int) -> pandas.DataFrame:
     """Run missions under the six conditions of the real ones."""
-    return run_campaign("planta_exp1_campaign", MANAGERS, runs=runs, seed=studies.SEED, workers=workers, progress=False)
+    return run_campaign(
+        "planta_exp1_campaign",
+        MANAGERS,
+        runs=runs,
+        seed=studies.SEED,
+        workers=workers,
+        progress=False,
+    )
 
 
 def conclude(covered: pandas.DataFrame, gained: pandas.DataFrame) -> str:
@@ -179,24 +216,41 @@ def main() -> None:
     """Run the study."""
     chosen = studies.options(__file__, __doc__ or "", 50)
     chosen.out.mkdir(parents=True, exist_ok=True)
-    ensemble = pandas.read_csv(SCENARIOS / "ensembles" / f"{SCENARIO}.csv", index_col="member").drop(columns="loss")
+    ensemble = pandas.read_csv(
+        SCENARIOS / "ensembles" / f"{SCENARIO}.csv", index_col="member"
+    ).drop(columns="loss")
     simulators = {name: simulate(values, chosen.workers) for name, values in SIMULATORS.items()}
     real = [simulate(ensemble.loc[number].to_dict(), chosen.workers) for number in MEMBERS]
     rows = [
         {"simulator": name, "metric": metric, **row}
         for metric in METRICS
         for name, frame in simulators.items()
-        for row in coverage([cells(each, metric, EACH) for each in real], cells(frame, metric, EACH), CASES, RESAMPLES)
+        for row in coverage(
+            [cells(each, metric, EACH) for each in real],
+            cells(frame, metric, EACH),
+            CASES,
+            RESAMPLES,
+        )
     ]
     covered = pandas.DataFrame(rows)
-    covered.to_csv(chosen.out / "coverage.csv", index=False, float_format="%.4g", lineterminator="\n")
+    covered.to_csv(
+        chosen.out / "coverage.csv", index=False, float_format="%.4g", lineterminator="\n"
+    )
     same = under_real_conditions(chosen.runs, chosen.workers)
     population = run_campaign(
-        SCENARIO, MANAGERS, runs=1_000, seed=2, workers=chosen.workers, progress=False, perturbations=DRAWN
+        SCENARIO,
+        MANAGERS,
+        runs=1_000,
+        seed=2,
+        workers=chosen.workers,
+        progress=False,
+        perturbations=DRAWN,
     )
     gained = gains(same, population)
     gained.to_csv(chosen.out / "gains.csv", index=False, float_format="%.4g", lineterminator="\n")
-    conclusion = conclude(*(pandas.read_csv(chosen.out / name) for name in ("coverage.csv", "gains.csv")))
+    conclusion = conclude(
+        *(pandas.read_csv(chosen.out / name) for name in ("coverage.csv", "gains.csv"))
+    )
     (chosen.out / "conclusion.md").write_text(conclusion + "\n", encoding="utf-8")
     print(conclusion)
 

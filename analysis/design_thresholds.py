@@ -1,7 +1,9 @@
-"""Which visibility each function design of the search should expect: the thresholds of metacontrol, varied.
+"""Which visibility each function design of the search should expect: the thresholds of metacontrol,
+varied.
 
-In the exemplar the searches at 2 and 3 m expect 0.25 m more visibility than their altitude (2.25 and 3.25 m). Here this
-margin goes from -1 to +0.75 m. Runs are paired with those of the shipped margin.
+In the exemplar the searches at 2 and 3 m expect 0.25 m more visibility than their altitude (2.25
+and 3.25 m). Here this margin goes from -1 to +0.75 m. Runs are paired with those of the shipped
+margin.
 
     python analysis/design_thresholds.py [--out DIR] [--runs N] [--workers N]
 """
@@ -23,7 +25,9 @@ ALTITUDES_M = {"qa_water_visibility_medium": 2.0, "qa_water_visibility_high": 3.
 
 def with_margin(folder: Path, margin_m: float) -> Path:
     """Write a scenario whose designs expect that much more visibility than their altitude."""
-    values = ", ".join(f"{name}: {altitude_m + margin_m}" for name, altitude_m in ALTITUDES_M.items())
+    values = ", ".join(
+        f"{name}: {altitude_m + margin_m}" for name, altitude_m in ALTITUDES_M.items()
+    )
     path = folder / f"margin_{margin_m:+g}.yaml"
     path.write_text(f"base: {SCENARIO}\nknowledge: {{values: {{{values}}}}}\n", encoding="utf-8")
     return path
@@ -33,15 +37,24 @@ def study(runs: int, workers: int, chosen: list[float] | None = None) -> pandas.
     """Vary the margin; a row for each and metric: the margin less the shipped one."""
     with tempfile.TemporaryDirectory() as folder:
         frames = {
-            margin_m: studies.missions(with_margin(Path(folder), margin_m), ["metacontrol"], runs, workers)
+            margin_m: studies.missions(
+                with_margin(Path(folder), margin_m), ["metacontrol"], runs, workers
+            )
             for margin_m in sorted({SHIPPED_M, *(MARGINS_M if chosen is None else chosen)})
         }
     rows = []
     for margin_m, frame in frames.items():
         for metric in studies.METRICS:
             ours, shipped = studies.by_run(frame, metric), studies.by_run(frames[SHIPPED_M], metric)
-            row = {"margin_m": margin_m, "metric": metric, "mean": ours.mean(), "found": frame["pipeline_found"].mean()}
-            rows.append({**row, "adaptations": frame["adaptations"].mean(), **studies.paired(ours, shipped)})
+            row = {
+                "margin_m": margin_m,
+                "metric": metric,
+                "mean": ours.mean(),
+                "found": frame["pipeline_found"].mean(),
+            }
+            rows.append(
+                {**row, "adaptations": frame["adaptations"].mean(), **studies.paired(ours, shipped)}
+            )
     return pandas.DataFrame(rows)
 
 
@@ -59,7 +72,9 @@ def draw(figure: Figure, rows: pandas.DataFrame) -> None:
 
 def conclude(rows: pandas.DataFrame) -> str:
     """Say which margin does best, and by how much."""
-    times, distances = (rows[rows["metric"] == metric].set_index("margin_m") for metric in studies.METRICS)
+    times, distances = (
+        rows[rows["metric"] == metric].set_index("margin_m") for metric in studies.METRICS
+    )
     best = times["mean_difference"].idxmin()
     if best == SHIPPED_M:
         return "- No margin that was tried finds the pipeline sooner than the shipped 0.25 m."

@@ -1,8 +1,10 @@
-"""Fit on half of the conditions of experiment 1 of 2025, and judge on the other half, and the other way round.
+"""Fit on half of the conditions of experiment 1 of 2025, and judge on the other half, and the other
+way round.
 
-The search starts in the middle of the bounds, as the shipped values have seen all conditions; those are judged alike,
-to compare. Random is left out: what it does differs from run to run by far more than with any parameter. Writes
-half_blocks.csv: the loss of each half (see calibration/loss.py), and the median over managers and conditions of
+The search starts in the middle of the bounds, as the shipped values have seen all conditions; those
+are judged alike, to compare. Random is left out: what it does differs from run to run by far more
+than with any parameter. Writes half_blocks.csv: the loss of each half (see calibration/loss.py),
+and the median over managers and conditions of
 |real - simulated median search time|.
 
     python analysis/half_blocks.py [--out DIR] [--runs N] [--evaluations N] [--workers N]
@@ -28,11 +30,13 @@ def study(case: Case, runs: int, evaluations: int, workers: int) -> pandas.DataF
     """Fit on each half of a case's conditions, and judge on both.
 
     Returns:
-        A row for each fit and judged half: values ("shipped" or "fitted"), fitted_on, judged_on, held_out, loss,
-        median_difference_s.
+        A row for each fit and judged half: values ("shipped" or "fitted"), fitted_on, judged_on,
+        held_out, loss, median_difference_s.
     """
     whole = read_problem("planta_exp1", [case], runs, 1)
-    middle = tuple(replace(each, start=(each.lower + each.upper) / 2.0) for each in whole.parameters)
+    middle = tuple(
+        replace(each, start=(each.lower + each.upper) / 2.0) for each in whole.parameters
+    )
     (case,) = whole.cases
     fits = [("shipped", HALVES[0] + HALVES[1], [each.start for each in whole.parameters])]
     for half in HALVES:
@@ -58,9 +62,13 @@ def study(case: Case, runs: int, evaluations: int, workers: int) -> pandas.DataF
 
 def main() -> None:
     """Run both fits."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     options.add_argument("--out", type=Path, default=Path(__file__).parent / "split")
-    options.add_argument("--runs", type=int, default=12, help="missions for each manager, among a half's conditions")
+    options.add_argument(
+        "--runs", type=int, default=12, help="missions for each manager, among a half's conditions"
+    )
     options.add_argument("--evaluations", type=int, default=100)
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
@@ -68,7 +76,9 @@ def main() -> None:
 
     (case,) = read_cases(["planta_exp1_campaign"], (), MANAGERS)
     result = study(case, chosen.runs, chosen.evaluations, chosen.workers)
-    result.to_csv(chosen.out / "half_blocks.csv", index=False, float_format="%.4g", lineterminator="\n")
+    result.to_csv(
+        chosen.out / "half_blocks.csv", index=False, float_format="%.4g", lineterminator="\n"
+    )
     print(result.to_string(index=False))
 
 

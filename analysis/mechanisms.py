@@ -1,7 +1,9 @@
-"""What each mechanism of the vehicle and its software is worth: each taken out, or set to another value, one at a time.
+"""What each mechanism of the vehicle and its software is worth: each taken out, or set to another
+value, one at a time.
 
-Simulated missions are held against the real ones of 2023 (`seams2023`, the same condition in each run) and of 2025
-(`planta_exp1_campaign`, six conditions). Writes a CSV file and the table that mechanisms.md shows.
+Simulated missions are held against the real ones of 2023 (`seams2023`, the same condition in each
+run) and of 2025 (`planta_exp1_campaign`, six conditions). Writes a CSV file and the table that
+mechanisms.md shows.
 
     python analysis/mechanisms.py [--out DIR] [--runs N] [--workers N]
 """
@@ -113,9 +115,16 @@ CHANGES = (
     Change(
         "the same (always slower, in each run by as much: mean 4%)",
         "",
-        of_2025={"calibration.reasoning_slowdown": 0.0, "calibration.real_time_factor_loss": EXPONENTIAL_4_PERCENT},
+        of_2025={
+            "calibration.reasoning_slowdown": 0.0,
+            "calibration.real_time_factor_loss": EXPONENTIAL_4_PERCENT,
+        },
     ),
-    Change("search begins 5 s after it is first activated (at once)", "search times, both years", {START: 0.0}),
+    Change(
+        "search begins 5 s after it is first activated (at once)",
+        "search times, both years",
+        {START: 0.0},
+    ),
     Change(
         "timers in step, 2025 (phases of their own)",
         "metacontrol's reaction times",
@@ -125,11 +134,14 @@ CHANGES = (
 
 
 def agreement_2023(runs: int, change: Change) -> dict[str, float]:
-    """Count the means, standard deviations and distributions that agree with the 60 runs, and measure the distance."""
+    """Count the means, standard deviations and distributions that agree with the 60 runs, and
+    measure the distance.
+    """
     (case,) = read_cases(["seams2023"])
     simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2023}, runs)
     found = validate(case.real, simulated, case.managers, seed=studies.SEED)
-    agreeing = int((found.targets.set_index("kind")["met"].loc[["mean", "std", "ks"]] == True).sum())  # noqa: E712
+    met = found.targets.set_index("kind")["met"].loc[["mean", "std", "ks"]]
+    agreeing = int((met == True).sum())  # noqa: E712  (pandas: not met and not applicable differ)
     return {"agreeing_2023": agreeing, "distance_2023": distance}
 
 
@@ -141,16 +153,21 @@ def agreement_2025(runs: int, change: Change) -> dict[str, float]:
         change: what is taken out.
 
     Returns:
-        Energy distance, mean over managers and conditions; difference of the median search times, median over both;
-        standard deviation of none's distances, median over the conditions, beside the real one; and by how much
-        metacontrol's median reaction time differs between the first four conditions.
+        Energy distance, mean over managers and conditions; difference of the median search times,
+        median over both; standard deviation of none's distances, median over the conditions, beside
+        the real one; and by how much metacontrol's median reaction time differs between the first
+        four conditions.
     """
     (case,) = read_cases(["planta_exp1_campaign"], managers=ADAPTED_ALIKE)
-    simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2025}, runs * len(case.conditions))
+    simulated, distance = simulated_and_distance(
+        case, {**change.both, **change.of_2025}, runs * len(case.conditions)
+    )
     compared = compare_conditions(case.real, simulated, case.managers, COMPARED)
     summaries = over_conditions(compared).set_index(["manager", "metric"])
     spread = summaries.loc["none", "distance_inspected_m"]
-    reactions = compared.query("manager == 'metacontrol' and metric == 'mean_reaction_time_s'")["simulated_median"]
+    reactions = compared.query("manager == 'metacontrol' and metric == 'mean_reaction_time_s'")[
+        "simulated_median"
+    ]
     return {
         "distance_2025": distance,
         "median_apart_2025_s": float(summaries.loc[("all", "search_time_s"), "difference"]),
@@ -160,10 +177,16 @@ def agreement_2025(runs: int, change: Change) -> dict[str, float]:
     }
 
 
-def simulated_and_distance(case: Case, values: Mapping[str, Any], runs: int) -> tuple[pandas.DataFrame, float]:
-    """Simulate missions of a case with changed values; return them, and their mean energy distance to the real ones."""
+def simulated_and_distance(
+    case: Case, values: Mapping[str, Any], runs: int
+) -> tuple[pandas.DataFrame, float]:
+    """Simulate missions of a case with changed values; return them, and their mean energy distance
+    to the real ones.
+    """
     simulated = simulate_case(
-        Problem((case,), (), runs, studies.SEED), replace(case, loaded=with_values(case.loaded, values)), ()
+        Problem((case,), (), runs, studies.SEED),
+        replace(case, loaded=with_values(case.loaded, values)),
+        (),
     )
     return simulated, float(np.mean(list(compare(case, simulated).distances.values())))
 

@@ -1,22 +1,26 @@
-"""Predictions for real runs of the exemplar, made before anybody compares; and, with such runs, their score.
+"""Predictions for real runs of the exemplar, made before anybody compares; and, with such runs,
+their score.
 
-Predicted are the experiments of the study of July 2025 and of its extended mission, from the configurations of the
-exemplar's runner: six conditions as its seed 100 draws them, five runs of each manager in each. predictions/ has what
-an earlier `import-config --base planta_exp1 --runner-seed 100` made of each configuration; today's makes the same
-campaigns, but its scenarios are based on release15. Each simulated run has a member of the ensemble of parameter sets
-that fit the known runs (those of experiment 1 and of 2023) about equally well.
+Predicted are the experiments of the study of July 2025 and of its extended mission, from the
+configurations of the exemplar's runner: six conditions as its seed 100 draws them, five runs of
+each manager in each. predictions/ has what an earlier `import-config --base planta_exp1
+--runner-seed 100` made of each configuration; today's makes the same campaigns, but its scenarios
+are based on release15. Each simulated run has a member of the ensemble of parameter sets that fit
+the known runs (those of experiment 1 and of 2023) about equally well.
 
     python analysis/predict.py [--out DIR] [--runs N] [--workers N]
     python analysis/predict.py --score EXPERIMENT FILE...
 
-`--runs` are the missions of a manager under each condition, some for each member. The table has a row for each
-experiment, manager or pair ("bt - none" is the first less the second), condition and metric: `mean`; `median`; `std` of
-single runs within a condition; and `low90` to `high90`, in which the mean of the real runs should be in nine of ten
-cases. That interval has two parts: what is not known of vehicle and software (members differ), and the chance of the
-real runs. `inputs` is the beginning of the SHA-256 of scenario, campaign, revision and ensemble; not of the code.
+`--runs` are the missions of a manager under each condition, some for each member. The table has a
+row for each experiment, manager or pair ("bt - none" is the first less the second), condition and
+metric: `mean`; `median`; `std` of single runs within a condition; and `low90` to `high90`, in which
+the mean of the real runs should be in nine of ten cases. That interval has two parts: what is not
+known of vehicle and software (members differ), and the chance of the real runs. `inputs` is the
+beginning of the SHA-256 of scenario, campaign, revision and ensemble; not of the code.
 
-`--score` reads real runs of one experiment in any layout that `suave-des compare` reads, in the order in which they
-were made, and says how near the predictions are. A run without a reaction has no reaction time, on both sides.
+`--score` reads real runs of one experiment in any layout that `suave-des compare` reads, in the
+order in which they were made, and says how near the predictions are. A run without a reaction has
+no reaction time, on both sides.
 """
 
 from __future__ import annotations
@@ -52,22 +56,32 @@ KEYS = ["experiment", "manager", "condition", "metric"]
 
 
 def inputs(experiment: str) -> str:
-    """Return the beginning of the SHA-256 of the files that decide the predictions of an experiment."""
+    """Return the beginning of the SHA-256 of the files that decide the predictions of an
+    experiment.
+    """
     own = [FOLDER / f"{experiment}.yaml", FOLDER / f"{experiment}_campaign.yaml"]
-    content = b"".join(path.read_bytes() for path in (*own, *(SCENARIOS / name for name in DECIDING)))
+    content = b"".join(
+        path.read_bytes() for path in (*own, *(SCENARIOS / name for name in DECIDING))
+    )
     return f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
 
 
 def simulate(experiment: str, runs: int, workers: int) -> pandas.DataFrame:
     """Run an experiment's missions; their rows, with the number of the condition."""
     campaign = FOLDER / f"{experiment}_campaign.yaml"
-    frame = run_campaign(campaign, runs=runs, seed=studies.SEED, ensemble=ENSEMBLE, workers=workers, progress=False)
+    frame = run_campaign(
+        campaign, runs=runs, seed=studies.SEED, ensemble=ENSEMBLE, workers=workers, progress=False
+    )
     starts = list(dict.fromkeys(frame["start.y_m"]))
-    return frame.assign(condition=frame["start.y_m"].map({start: number for number, start in enumerate(starts, 1)}))
+    return frame.assign(
+        condition=frame["start.y_m"].map({start: number for number, start in enumerate(starts, 1)})
+    )
 
 
 def predict(missions: pandas.DataFrame) -> Iterator[dict[str, Any]]:
-    """Predict the means of each manager and pair; a row for each condition and metric, and for all conditions."""
+    """Predict the means of each manager and pair; a row for each condition and metric, and for all
+    conditions.
+    """
     managers = list(dict.fromkeys(missions["manager"]))
     for metric in METRICS:
         values = missions.astype({metric: float}).dropna(subset=metric)
@@ -83,11 +97,22 @@ def predict(missions: pandas.DataFrame) -> Iterator[dict[str, Any]]:
                 chosen = own if condition == "all" else own[own["condition"] == int(condition)]
                 at = first if condition == "all" else first[first["condition"] == int(condition)]
                 further = {"median": chosen[metric].median(), "first_mean": at[metric].mean()}
-                yield {"manager": manager, "condition": condition, "metric": metric, **row, **further}
+                yield {
+                    "manager": manager,
+                    "condition": condition,
+                    "metric": metric,
+                    **row,
+                    **further,
+                }
         for one, other in combinations(have, 2):
             difference = means.loc[one] - means.loc[other]
             for condition, row in _predicted(difference, chance[one] + chance[other], n):
-                yield {"manager": f"{one} - {other}", "condition": condition, "metric": metric, **row}
+                yield {
+                    "manager": f"{one} - {other}",
+                    "condition": condition,
+                    "metric": metric,
+                    **row,
+                }
 
 
 def _predicted(
@@ -116,26 +141,35 @@ def study(runs: int, workers: int, experiments: tuple[str, ...] = EXPERIMENTS) -
     rows = []
     for experiment in experiments:
         missions = simulate(experiment, runs, workers)
-        rows += [{"experiment": experiment, **row, "inputs": inputs(experiment)} for row in predict(missions)]
+        rows += [
+            {"experiment": experiment, **row, "inputs": inputs(experiment)}
+            for row in predict(missions)
+        ]
     columns = [*KEYS, "mean", "median", "std", "low90", "high90", "first_mean", "inputs"]
     return pandas.DataFrame(rows, columns=columns)
 
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
-    """Draw predicted means of the managers with their intervals: a panel for each metric and experiment."""
+    """Draw predicted means of the managers with their intervals: a panel for each metric and
+    experiment.
+    """
     metrics = METRICS[:2]
     panels = figure.subplots(len(metrics), len(TITLES), sharey="row", sharex=True)
     for line, metric in enumerate(metrics):
         for column, experiment in enumerate(TITLES):
             panel = panels[line, column]
             chosen = rows[
-                (rows["experiment"] == experiment) & (rows["condition"] == "all") & (rows["metric"] == metric)
+                (rows["experiment"] == experiment)
+                & (rows["condition"] == "all")
+                & (rows["metric"] == metric)
             ]
             own = chosen.set_index("manager")
             for place, (manager, colour) in enumerate(studies.COLOURS.items()):
                 row = own.loc[manager]
                 errors = [[row["mean"] - row["low90"]], [row["high90"] - row["mean"]]]
-                panel.errorbar(place, row["mean"], yerr=errors, fmt="o", ms=3.0, capsize=2.0, color=colour)
+                panel.errorbar(
+                    place, row["mean"], yerr=errors, fmt="o", ms=3.0, capsize=2.0, color=colour
+                )
             panel.set_xticks(range(len(studies.COLOURS)), studies.COLOURS, rotation=45)
             if line == 0:
                 panel.set_title(TITLES[experiment])
@@ -166,7 +200,8 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
 
     Args:
         rows: predictions of one experiment.
-        real: its runs, with the columns of `suave_des.records.runs.COLUMNS`; five under each condition, in their order.
+        real: its runs, with the columns of `suave_des.records.runs.COLUMNS`; five under each
+            condition, in their order.
     """
     if "condition" not in real:
         real = real.assign(condition=real.groupby("manager").cumcount() // REAL_RUNS + 1)
@@ -174,14 +209,19 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
     lines, medians, agreeing = [], [], []
     inside = covered = n = 0
     for manager, metric in dict.fromkeys(zip(rows["manager"], rows["metric"], strict=True)):
-        predicted, first, _, second = (table.loc[(manager, "all", metric)], *manager.partition(" - "))
+        predicted, first, _, second = (
+            table.loc[(manager, "all", metric)],
+            *manager.partition(" - "),
+        )
         own, ends = real[real["manager"] == first], (predicted["low90"], predicted["high90"])
         if second:
             low, high = _difference(own, real[real["manager"] == second], metric)
             if low == low:
                 agreeing.append(_better(low, high) == _better(*ends))
                 verdict = "agree" if agreeing[-1] else "DIFFER"
-                lines.append(f"{manager}, {metric}: real {_range(low, high)}, predicted {_range(*ends)}: {verdict}")
+                lines.append(
+                    f"{manager}, {metric}: real {_range(low, high)}, predicted {_range(*ends)}: {verdict}"
+                )
             continue
         values = own[metric].dropna()
         if len(values) < 2:
@@ -195,7 +235,9 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
         )
         for number, part in own.groupby("condition")[metric]:
             if metric == METRICS[0] and (manager, str(number), metric) in table.index:
-                medians.append(abs(part.median() - table.loc[(manager, str(number), metric), "median"]))
+                medians.append(
+                    abs(part.median() - table.loc[(manager, str(number), metric), "median"])
+                )
     lines += [
         f"{inside} of {n} predicted means lie in the real 95% intervals.",
         f"{covered} of {n} real means lie in the predicted 90% intervals.",
@@ -216,29 +258,40 @@ def _range(low: float, high: float) -> str:
     return f"{low:.2f} to {high:.2f}"
 
 
-def _difference(ours: pandas.DataFrame, theirs: pandas.DataFrame, metric: str) -> tuple[float, float]:
-    """Return the 95% interval of the mean difference of real runs, of the same conditions; nan if there are too few.
+def _difference(
+    ours: pandas.DataFrame, theirs: pandas.DataFrame, metric: str
+) -> tuple[float, float]:
+    """Return the 95% interval of the mean difference of real runs, of the same conditions; nan if
+    there are too few.
 
-    The mean over conditions of the differences of their means; chance is what runs of one condition differ by.
+    The mean over conditions of the differences of their means; chance is what runs of one condition
+    differ by.
     """
     cells = [
-        of.dropna(subset=metric).groupby("condition")[metric].agg(["mean", "var", "count"]) for of in (ours, theirs)
+        of.dropna(subset=metric).groupby("condition")[metric].agg(["mean", "var", "count"])
+        for of in (ours, theirs)
     ]
     both = cells[0].add_suffix("_ours").join(cells[1].add_suffix("_theirs"), how="inner").dropna()
     freedom = (both["count_ours"] + both["count_theirs"] - 2).sum()
     if freedom < 1:
         return float("nan"), float("nan")
-    variance = (both["var_ours"] / both["count_ours"] + both["var_theirs"] / both["count_theirs"]).sum() / len(
-        both
-    ) ** 2
-    mean, half = (both["mean_ours"] - both["mean_theirs"]).mean(), stdtrit(freedom, 0.975) * variance**0.5
+    variance = (
+        both["var_ours"] / both["count_ours"] + both["var_theirs"] / both["count_theirs"]
+    ).sum() / len(both) ** 2
+    mean, half = (
+        (both["mean_ours"] - both["mean_theirs"]).mean(),
+        stdtrit(freedom, 0.975) * variance**0.5,
+    )
     return mean - half, mean + half
 
 
 def scored(experiment: str, files: list[Path]) -> str:
     """Read real runs of an experiment, and score the committed predictions of it."""
     rows = pandas.read_csv(FOLDER / "predictions.csv", dtype={"condition": str})
-    return score(rows[rows["experiment"] == experiment], pandas.concat([read_runs(path).frame for path in files]))
+    return score(
+        rows[rows["experiment"] == experiment],
+        pandas.concat([read_runs(path).frame for path in files]),
+    )
 
 
 def main() -> None:
@@ -249,7 +302,9 @@ def main() -> None:
     if found.score:
         experiment, *files = found.score
         if experiment not in EXPERIMENTS or not files:
-            chooser.error(f"--score: an experiment ({', '.join(EXPERIMENTS)}) and files of its runs")
+            chooser.error(
+                f"--score: an experiment ({', '.join(EXPERIMENTS)}) and files of its runs"
+            )
         try:
             print(scored(experiment, [Path(name) for name in files]))
         except InputError as error:
@@ -257,7 +312,9 @@ def main() -> None:
         return
     members = len(read_ensemble(ENSEMBLE)[0].members)
     chosen = studies.options(str(FOLDER), __doc__ or "", runs=10 * members)
-    studies.write(chosen, "predictions", study(chosen.runs, chosen.workers), draw, conclude, height=4.0)
+    studies.write(
+        chosen, "predictions", study(chosen.runs, chosen.workers), draw, conclude, height=4.0
+    )
 
 
 if __name__ == "__main__":

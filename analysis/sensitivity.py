@@ -1,8 +1,10 @@
-"""Which calibrated parameters matter: Morris screening of the two metrics, for each of the paper's managers.
+"""Which calibrated parameters matter: Morris screening of the two metrics, for each of the paper's
+managers.
 
-Elementary effects (Morris 1991; mu* after Campolongo et al. 2007; package SALib) of the mean search time and the mean
-distance inspected over the bounds of the calibration. All evaluations use common random numbers, so that
-differences come from the parameters. Writes sensitivity.csv and sensitivity.png.
+Elementary effects (Morris 1991; mu* after Campolongo et al. 2007; package SALib) of the mean search
+time and the mean distance inspected over the bounds of the calibration. All evaluations use common
+random numbers, so that differences come from the parameters. Writes sensitivity.csv and
+sensitivity.png.
 
     python analysis/sensitivity.py [--out DIR] [--trajectories N] [--runs N] [--workers N]
 """
@@ -27,7 +29,10 @@ from suave_des import Simulator, with_values
 from suave_des.results import style
 
 MANAGERS = ("none", "random", "metacontrol")
-METRICS = {"search_time_s": "mean search time (s)", "distance_inspected_m": "mean distance inspected (m)"}
+METRICS = {
+    "search_time_s": "mean search time (s)",
+    "distance_inspected_m": "mean distance inspected (m)",
+}
 
 
 def means(loaded: Any, paths: tuple[str, ...], runs: int, values: tuple[float, ...]) -> list[float]:
@@ -41,13 +46,17 @@ def means(loaded: Any, paths: tuple[str, ...], runs: int, values: tuple[float, .
 
 
 def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray]) -> None:
-    """One panel a metric: mu* of each parameter and manager, the most important parameters on top."""
+    """One panel a metric: mu* of each parameter and manager, the most important parameters on
+    top.
+    """
     with style.publication():
         figure = Figure(figsize=(style.WIDTH_IN, 4.2), layout="constrained")
         panels = figure.subplots(1, len(METRICS))
         for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
             order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
-            for offset, manager, hatch in zip((0.26, 0.0, -0.26), MANAGERS, ("", "////", "...."), strict=True):
+            for offset, manager, hatch in zip(
+                (0.26, 0.0, -0.26), MANAGERS, ("", "////", "...."), strict=True
+            ):
                 panel.barh(
                     np.arange(len(names)) + offset,
                     effects[manager, metric][order],
@@ -68,7 +77,9 @@ def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray
 
 def main() -> None:
     """Sample, simulate, analyze, draw."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     options.add_argument("--out", type=Path, default=Path(__file__).parent / "sensitivity")
     options.add_argument("--trajectories", type=int, default=6)
     options.add_argument("--runs", type=int, default=50)
@@ -80,11 +91,19 @@ def main() -> None:
     free, loaded = fitted.parameters, fitted.cases[0].loaded
     paths = tuple(each.path for each in free)
     names = [path.split(".", 1)[1].removesuffix("_m_per_s") for path in paths]
-    problem = {"num_vars": len(free), "names": names, "bounds": [[each.lower, each.upper] for each in free]}
+    problem = {
+        "num_vars": len(free),
+        "names": names,
+        "bounds": [[each.lower, each.upper] for each in free],
+    }
     samples = sample_morris.sample(problem, chosen.trajectories, num_levels=4, seed=1)
     with multiprocessing.get_context("spawn").Pool(chosen.workers) as pool:
         found = np.array(
-            pool.map(partial(means, loaded, paths, chosen.runs), map(tuple, samples.tolist()), chunksize=2)
+            pool.map(
+                partial(means, loaded, paths, chosen.runs),
+                map(tuple, samples.tolist()),
+                chunksize=2,
+            )
         )
 
     effects, rows = {}, []
@@ -101,10 +120,14 @@ def main() -> None:
             rows.append([manager, metric, path, *(f"{float(number):.4g}" for number in numbers)])
     with (chosen.out / "sensitivity.csv").open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["manager", "metric", "parameter", "mu", "mu_star", "mu_star_conf95", "sigma"])
+        writer.writerow(
+            ["manager", "metric", "parameter", "mu", "mu_star", "mu_star_conf95", "sigma"]
+        )
         writer.writerows(rows)
     draw(chosen.out / "sensitivity.png", names, effects)
-    print(f"{len(samples)} sets of values, {len(samples) * len(MANAGERS) * chosen.runs} missions; see {chosen.out}")
+    print(
+        f"{len(samples)} sets of values, {len(samples) * len(MANAGERS) * chosen.runs} missions; see {chosen.out}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """Leave one manager out: fit on two managers, predict the third, for each choice of the third.
 
-Writes split_check.csv beside the fits. A prediction counts as good within half a published standard deviation.
+Writes split_check.csv beside the fits. A prediction counts as good within half a published standard
+deviation.
 
-    python analysis/split_check.py [--out DIR] [--runs N] [--evaluations N] [--missions N] [--workers N]
+    python analysis/split_check.py [--out DIR] [--runs N] [--evaluations N] [--missions N]
+    [--workers N]
 """
 
 from __future__ import annotations
@@ -22,34 +24,50 @@ from suave_des.results.validation import sample
 
 METRICS = ("search_time_s", "distance_inspected_m")
 WITHIN_STD = 0.5
-"""Greatest difference of a predicted mean, in published standard deviations, that counts as predicted."""
+"""Greatest difference of a predicted mean, in published standard deviations, that counts as
+predicted.
+"""
 
 
-def split_check(fitted: Mapping[str, pandas.DataFrame], published: pandas.DataFrame) -> pandas.DataFrame:
+def split_check(
+    fitted: Mapping[str, pandas.DataFrame], published: pandas.DataFrame
+) -> pandas.DataFrame:
     """Compare predicted with published figures of each manager that was left out of a fit.
 
     Args:
-        fitted: by left-out manager, missions simulated with what was fitted without it; of each frame only the rows of
-            that manager count. Columns as of records.runs.COLUMNS, the place of detection apart.
+        fitted: by left-out manager, missions simulated with what was fitted without it; of each
+            frame only the rows of that manager count. Columns as of records.runs.COLUMNS, the place
+            of detection apart.
         published: the published missions, likewise.
 
     Returns:
-        A row for each manager and metric: left_out, metric, published_n, published_mean, published_std, predicted_n,
-        predicted_mean, predicted_std, difference (predicted - published mean), difference_in_std (/ the published
-        standard deviation; nan if that is zero), within (whether that is at most WITHIN_STD either way).
+        A row for each manager and metric: left_out, metric, published_n, published_mean,
+        published_std, predicted_n, predicted_mean, predicted_std, difference (predicted - published
+        mean), difference_in_std (/ the published standard deviation; nan if that is zero), within
+        (whether that is at most WITHIN_STD either way).
 
     Raises:
         ValueError: a manager has no row in its frame, or fewer than two published ones.
     """
-    rows = [_row(manager, metric, published, frame) for manager, frame in fitted.items() for metric in METRICS]
+    rows = [
+        _row(manager, metric, published, frame)
+        for manager, frame in fitted.items()
+        for metric in METRICS
+    ]
     return pandas.DataFrame(rows)
 
 
-def _row(manager: str, metric: str, published: pandas.DataFrame, frame: pandas.DataFrame) -> dict[str, object]:
+def _row(
+    manager: str, metric: str, published: pandas.DataFrame, frame: pandas.DataFrame
+) -> dict[str, object]:
     theirs, ours = (sample(side, manager, metric).tolist() for side in (published, frame))
     if len(theirs) < 2 or not ours:
-        raise ValueError(f"manager {manager}: {len(theirs)} published and {len(ours)} simulated missions are too few")
-    means, stds = ([estimate(each).value for each in (theirs, ours)] for estimate in (mean_of, std_of))
+        raise ValueError(
+            f"manager {manager}: {len(theirs)} published and {len(ours)} simulated missions are too few"
+        )
+    means, stds = (
+        [estimate(each).value for each in (theirs, ours)] for estimate in (mean_of, std_of)
+    )
     difference = means[1] - means[0]
     in_std = difference / stds[0] if stds[0] else float("nan")
     return {
@@ -69,7 +87,9 @@ def _row(manager: str, metric: str, published: pandas.DataFrame, frame: pandas.D
 
 def main() -> None:
     """Run the three fits and their predictions."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     options.add_argument("--out", type=Path, default=Path(__file__).parent / "split")
     options.add_argument("--runs", type=int, default=60)
     options.add_argument("--evaluations", type=int, default=77)
@@ -82,21 +102,30 @@ def main() -> None:
     managers = tuple(published.managers)
     predicted = {}
     for left_out in managers:
-        (case,) = read_cases(["seams2023"], (), ",".join(name for name in managers if name != left_out))
+        (case,) = read_cases(
+            ["seams2023"], (), ",".join(name for name in managers if name != left_out)
+        )
         case = replace(case, shares=())  # they were chosen by what all three managers do
         problem = read_problem("seams2023", [case], chosen.runs, 1)
-        # The search starts in the middle of the bounds: the shipped values have seen all three managers.
-        free = tuple(replace(each, start=(each.lower + each.upper) / 2.0) for each in problem.parameters)
+        # The search starts in the middle of the bounds: the shipped values have seen all three
+        # managers.
+        free = tuple(
+            replace(each, start=(each.lower + each.upper) / 2.0) for each in problem.parameters
+        )
         problem = replace(problem, parameters=free)
         tried = fit(problem, chosen.evaluations, workers=chosen.workers, seed=1)
         best = min(tried, key=lambda each: each.loss)
         scenario = chosen.out / f"without_{left_out}.yaml"
         values = [round(value, 3) for value in best.values]
         scenario.write_text(fitted_scenario(problem, problem.cases[0], values, chosen.out))
-        predicted[left_out] = run_campaign(scenario, [left_out], chosen.missions, 2, chosen.workers, progress=False)
+        predicted[left_out] = run_campaign(
+            scenario, [left_out], chosen.missions, 2, chosen.workers, progress=False
+        )
         print(f"without {left_out}: distance of the two others {best.loss:.4f}")
     result = split_check(predicted, published.frame)
-    result.to_csv(chosen.out / "split_check.csv", index=False, float_format="%.4g", lineterminator="\n")
+    result.to_csv(
+        chosen.out / "split_check.csv", index=False, float_format="%.4g", lineterminator="\n"
+    )
     print(result.to_string(index=False))
 
 

@@ -1,7 +1,9 @@
-"""What the studies share: their options, differences paired by run, their files, and the look of their figures.
+"""What the studies share: their options, differences paired by run, their files, and the look of
+their figures.
 
-A study's table has for each of its figures the one over the first few runs, too, in columns that begin with `first_`:
-runs of one number draw the same random numbers however many there are, so that a small repetition gives these again.
+A study's table has for each of its figures the one over the first few runs, too, in columns that
+begin with `first_`: runs of one number draw the same random numbers however many there are, so that
+a small repetition gives these again.
 """
 
 from __future__ import annotations
@@ -28,7 +30,10 @@ FEW = 500
 """Missions that are done in this process before others have started."""
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
 _MANAGERS = ("none", "random", "metacontrol", "bt")
-COLOURS = {name: style.line(look)["color"] for name, look in zip(_MANAGERS, style.looks(_MANAGERS), strict=True)}
+COLOURS = {
+    name: style.line(look)["color"]
+    for name, look in zip(_MANAGERS, style.looks(_MANAGERS), strict=True)
+}
 
 
 @dataclass(frozen=True)
@@ -54,9 +59,18 @@ def options(script: str, text: str, runs: int) -> Options:
         text: its docstring.
         runs: missions for each manager and case, by default.
     """
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path(script).with_suffix(""), help="folder for the results")
-    parser.add_argument("--runs", type=int, default=runs, help=f"missions for each manager and case (default: {runs})")
+    parser = argparse.ArgumentParser(
+        description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path(script).with_suffix(""), help="folder for the results"
+    )
+    parser.add_argument(
+        "--runs",
+        type=int,
+        default=runs,
+        help=f"missions for each manager and case (default: {runs})",
+    )
     parser.add_argument("--workers", type=int, default=2, help="processes (default: 2)")
     chosen = parser.parse_args()
     if chosen.runs < FIRST_RUNS:
@@ -64,10 +78,22 @@ def options(script: str, text: str, runs: int) -> Options:
     return Options(chosen.out, chosen.runs, chosen.workers)
 
 
-def missions(scenario: str | Path, managers: Sequence[str], runs: int, workers: int, **more: Any) -> pandas.DataFrame:
-    """Run missions; a row for each, with the columns of runs.csv. Further arguments as of run_campaign."""
+def missions(
+    scenario: str | Path, managers: Sequence[str], runs: int, workers: int, **more: Any
+) -> pandas.DataFrame:
+    """Run missions; a row for each, with the columns of runs.csv. Further arguments as of
+    run_campaign.
+    """
     few = "sweep" not in more and runs * len(managers) < FEW
-    return run_campaign(scenario, managers, runs=runs, seed=SEED, workers=1 if few else workers, progress=False, **more)
+    return run_campaign(
+        scenario,
+        managers,
+        runs=runs,
+        seed=SEED,
+        workers=1 if few else workers,
+        progress=False,
+        **more,
+    )
 
 
 def by_run(frame: pandas.DataFrame, metric: str) -> pandas.Series[float]:
@@ -79,7 +105,8 @@ def paired(ours: pandas.Series[float], theirs: pandas.Series[float]) -> dict[str
     """Estimate the mean of ours - theirs over the runs that both have.
 
     Returns:
-        n, mean_difference, low95 and high95 (Student's t), and first_difference, over the first runs.
+        n, mean_difference, low95 and high95 (Student's t), and first_difference, over the first
+        runs.
     """
     difference = (ours - theirs).dropna()
     found = mean_interval(difference.to_numpy(float))
@@ -116,7 +143,8 @@ def write(
     *,
     height: float,
 ) -> None:
-    """Write a study's table, and figure and conclusion as they follow from the table; print the conclusion.
+    """Write a study's table, and figure and conclusion as they follow from the table; print the
+    conclusion.
 
     Args:
         chosen: where to.
@@ -151,7 +179,9 @@ def figure_of(draw: Draw, rows: pandas.DataFrame, height: float) -> Figure:
     return figure
 
 
-def draw_intervals(panel: Axes, rows: pandas.DataFrame, places: Iterable[float], *, across: bool = False) -> None:
+def draw_intervals(
+    panel: Axes, rows: pandas.DataFrame, places: Iterable[float], *, across: bool = False
+) -> None:
     """Draw mean differences with their intervals; those that could be chance are grey.
 
     Args:

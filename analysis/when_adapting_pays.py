@@ -1,10 +1,12 @@
-"""When it pays to adapt the altitude of the search: metacontrol against searching always at 1, 2 or 3 m.
+"""When it pays to adapt the altitude of the search: metacontrol against searching always at 1, 2 or
+3 m.
 
-Metacontrol searches as high as the visibility allows. Which fixed altitude it beats, and by how much, depends on where
-the vehicle is when the water is clear. For each visibility, start and pipeline below, the same runs are made under
-metacontrol and with each fixed altitude, without a thruster failure, so that nothing but the search differs;
-differences are paired by run. A vehicle that is at every set-point within its second, and sees and decides without
-delay, shows what of it is the exemplar's logic and not the vehicle's: `ideal_*` are its search times.
+Metacontrol searches as high as the visibility allows. Which fixed altitude it beats, and by how
+much, depends on where the vehicle is when the water is clear. For each visibility, start and
+pipeline below, the same runs are made under metacontrol and with each fixed altitude, without a
+thruster failure, so that nothing but the search differs; differences are paired by run. A vehicle
+that is at every set-point within its second, and sees and decides without delay, shows what of it
+is the exemplar's logic and not the vehicle's: `ideal_*` are its search times.
 
     python analysis/when_adapting_pays.py [--out DIR] [--runs N] [--workers N]
 """
@@ -36,8 +38,16 @@ Case = tuple[str, str, float, str]
 NAMES = ["scenario", "visibility", "start_y_m", "pipeline"]
 
 
-def _sinusoid(period_s: float, minimum: float = 1.25, maximum: float = 3.75, shift_s: float = 0.0) -> Values:
-    signal = {"kind": "sinusoid", "period_s": period_s, "minimum": minimum, "maximum": maximum, "shift_s": shift_s}
+def _sinusoid(
+    period_s: float, minimum: float = 1.25, maximum: float = 3.75, shift_s: float = 0.0
+) -> Values:
+    signal = {
+        "kind": "sinusoid",
+        "period_s": period_s,
+        "minimum": minimum,
+        "maximum": maximum,
+        "shift_s": shift_s,
+    }
     return {"signals.water_visibility": signal}
 
 
@@ -81,10 +91,14 @@ def values_of(_: str, visibility: str, y_m: float, pipeline: str) -> Values:
 
 
 def study(runs: int, workers: int, chosen: list[Case] | None = None) -> pandas.DataFrame:
-    """Run the cases; a row for each and fixed altitude: metacontrol's search time less that of the fixed altitude."""
+    """Run the cases; a row for each and fixed altitude: metacontrol's search time less that of the
+    fixed altitude.
+    """
     wanted = list(cases()) if chosen is None else chosen
     scenarios = dict.fromkeys(case[0] for case in wanted)
-    return pandas.concat([_study([case for case in wanted if case[0] == each], runs, workers) for each in scenarios])
+    return pandas.concat(
+        [_study([case for case in wanted if case[0] == each], runs, workers) for each in scenarios]
+    )
 
 
 def _study(wanted: list[Case], runs: int, workers: int) -> pandas.DataFrame:
@@ -92,16 +106,26 @@ def _study(wanted: list[Case], runs: int, workers: int) -> pandas.DataFrame:
     scenario = wanted[0][0]
     columns = {path: [values_of(*case).get(path) for case in wanted] for path in _paths(wanted)}
     modes = "default_modes.f_generate_search_path"
-    adapted = _by_case(wanted, studies.missions(scenario, ["metacontrol"], runs, workers, sweep={"zip": columns}))
+    adapted = _by_case(
+        wanted, studies.missions(scenario, ["metacontrol"], runs, workers, sweep={"zip": columns})
+    )
     rows = []
     for mode, altitude_m in ALTITUDES_M.items():
         sweep = {"zip": {**columns, modes: [mode] * len(wanted)}}
         fixed = _by_case(wanted, studies.missions(scenario, ["none"], runs, workers, sweep=sweep))
         for case in wanted:
-            ours, theirs = (studies.by_run(side[case], "search_time_s") for side in (adapted, fixed))
+            ours, theirs = (
+                studies.by_run(side[case], "search_time_s") for side in (adapted, fixed)
+            )
             row = {**dict(zip(NAMES, case, strict=True)), "against_m": altitude_m}
-            row |= {"adapted_s": ours.mean(), "fixed_s": theirs.mean(), **studies.paired(ours, theirs)}
-            rows.append({**row, "ideal_adapted_s": ideal(case, None), "ideal_fixed_s": ideal(case, mode)})
+            row |= {
+                "adapted_s": ours.mean(),
+                "fixed_s": theirs.mean(),
+                **studies.paired(ours, theirs),
+            }
+            rows.append(
+                {**row, "ideal_adapted_s": ideal(case, None), "ideal_fixed_s": ideal(case, mode)}
+            )
     return pandas.DataFrame(rows)
 
 
@@ -112,19 +136,23 @@ def _paths(wanted: list[Case]) -> list[str]:
 def _by_case(wanted: list[Case], frame: pandas.DataFrame) -> dict[Case, pandas.DataFrame]:
     """Split missions, which come point by point, into the cases."""
     each = len(frame) // len(wanted)
-    return {case: frame.iloc[place * each : (place + 1) * each] for place, case in enumerate(wanted)}
+    return {
+        case: frame.iloc[place * each : (place + 1) * each] for place, case in enumerate(wanted)
+    }
 
 
 # The exemplar's logic alone: the spiral's arithmetic, the view, the thresholds.
 
 
 def ideal(case: Case, mode: str | None, start_s: int = 10) -> float:
-    """Return when a vehicle finds the pipeline that is at each set-point at once; the time limit if it does not.
+    """Return when a vehicle finds the pipeline that is at each set-point at once; the time limit if
+    it does not.
 
     Args:
         case: scenario, visibility, y of the start, pipeline.
         start_s: when it begins its spiral: in guided mode, and at the altitude of the search.
-        mode: of the search; none: the highest whose expected visibility the water has at the moment.
+        mode: of the search; none: the highest whose expected visibility the water has at the
+            moment.
     """
     scenario, visibility, y_m, pipeline = case
     signal = VISIBILITIES[visibility]["signals.water_visibility"]
@@ -132,12 +160,17 @@ def ideal(case: Case, mode: str | None, start_s: int = 10) -> float:
     radius, step, before = 0.0, 0, None
     for t_s in range(start_s, LIMIT_S):
         clear_m = _visibility(signal, t_s)
-        now = mode or next((each for each, needed_m in EXPECTED_M.items() if clear_m >= needed_m), "fd_spiral_low")
+        now = mode or next(
+            (each for each, needed_m in EXPECTED_M.items() if clear_m >= needed_m), "fd_spiral_low"
+        )
         altitude_m = ALTITUDES_M[now]
         step += 1 + (before not in (None, now) or before is None)
         before = now
         radius += 2.0 * altitude_m * math.tan(math.radians(30.0)) * 0.1 / math.tau
-        x, y = -17.0 + radius * math.cos(0.1 * (step - 1)), y_m + radius * math.sin(0.1 * (step - 1))
+        x, y = (
+            -17.0 + radius * math.cos(0.1 * (step - 1)),
+            y_m + radius * math.sin(0.1 * (step - 1)),
+        )
         height_m = altitude_m - POINT_HEIGHTS_M[scenario]
         half_m = height_m * math.tan(math.radians(30.0))
         in_view = (np.abs(points[:, 0] - x) <= half_m) & (np.abs(points[:, 1] - y) <= half_m)
@@ -155,7 +188,9 @@ def _visibility(signal: Values, t_s: float) -> float:
 
 
 def _points(vertices_m: tuple[tuple[float, float], ...]) -> np.ndarray[Any, Any]:
-    """Return the 20 points of each straight piece, shape (n, 2), as the exemplar's detection has them."""
+    """Return the 20 points of each straight piece, shape (n, 2), as the exemplar's detection has
+    them.
+    """
     pieces = zip(np.array(vertices_m)[:-1], np.array(vertices_m)[1:], strict=True)
     return np.concatenate([np.linspace(first, last, 21)[1:] for first, last in pieces])
 
@@ -164,12 +199,17 @@ def _points(vertices_m: tuple[tuple[float, float], ...]) -> np.ndarray[Any, Any]
 
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
-    """Draw a panel for each fixed altitude: differences by visibility and by where the pipeline is."""
+    """Draw a panel for each fixed altitude: differences by visibility and by where the pipeline
+    is.
+    """
     panels = figure.subplots(1, len(ALTITUDES_M), sharey=True)
     norm = TwoSlopeNorm(0.0, -200.0, 200.0)
     for panel, altitude_m in zip(panels, ALTITUDES_M.values(), strict=True):
         own = rows[rows["against_m"] == altitude_m].set_index(NAMES)
-        cells = [[own.loc[(SCENARIO, visibility, *place)] for place in PLACES] for visibility in VISIBILITIES]
+        cells = [
+            [own.loc[(SCENARIO, visibility, *place)] for place in PLACES]
+            for visibility in VISIBILITIES
+        ]
         means = [[cell["mean_difference"] for cell in line] for line in cells]
         image = panel.imshow(means, cmap="RdBu_r", norm=norm, aspect="auto")
         panel.grid(False)
@@ -193,7 +233,10 @@ def _write(panel: Axes, row: pandas.Series[Any], line: int, column: int) -> None
 
 def conclude(rows: pandas.DataFrame) -> str:
     """Say in sentences where adapting pays."""
-    every, later = rows[rows["scenario"] == SCENARIO], rows[rows["scenario"] == LATER].set_index("against_m")
+    every, later = (
+        rows[rows["scenario"] == SCENARIO],
+        rows[rows["scenario"] == LATER].set_index("against_m"),
+    )
     sentences = []
     for altitude_m, own in every.groupby("against_m"):
         pays, costs = int((own["high95"] < 0.0).sum()), int((own["low95"] > 0.0).sum())
@@ -204,8 +247,13 @@ def conclude(rows: pandas.DataFrame) -> str:
             f" ({studies.shown(later.loc[altitude_m])} on {LATER}), and at best {studies.shown(best)}, with"
             f" {_named(best)}."
         )
-    mean, worst = every.groupby("against_m")["mean_difference"].mean(), every.groupby("against_m")["fixed_s"].max()
-    listed = ", ".join(f"{value:+.0f} s against {altitude_m:g} m" for altitude_m, value in mean.items())
+    mean, worst = (
+        every.groupby("against_m")["mean_difference"].mean(),
+        every.groupby("against_m")["fixed_s"].max(),
+    )
+    listed = ", ".join(
+        f"{value:+.0f} s against {altitude_m:g} m" for altitude_m, value in mean.items()
+    )
     limits = ", ".join(f"{value:.0f} s at {altitude_m:g} m" for altitude_m, value in worst.items())
     sentences.append(
         f"- The mean over all cases: {listed}. The worst case: {limits}, {every['adapted_s'].max():.0f} s with"

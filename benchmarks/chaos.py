@@ -1,8 +1,10 @@
-"""Kills a campaign at random moments, many times, and compares its bytes with those of an undisturbed one.
+"""Kills a campaign at random moments, many times, and compares its bytes with those of an
+undisturbed one.
 
     python benchmarks/chaos.py [--kills N] [--seed N] [--runs N]
 
-Half of the kills strike a worker first and the whole campaign a little later; after each, it is resumed.
+Half of the kills strike a worker first and the whole campaign a little later; after each, it is
+resumed.
 """
 
 from __future__ import annotations
@@ -29,8 +31,12 @@ SHORT = "base: seams2023.yaml\nmission: {time_limit_s: 60}\n"
 
 
 def start(arguments: Sequence[str], cwd: Path) -> subprocess.Popen[str]:
-    """Start `suave-des campaign ARGUMENTS`; on a slow machine too, it says nothing of its progress."""
-    path = os.pathsep.join([str(Path(suave_des.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    """Start `suave-des campaign ARGUMENTS`; on a slow machine too, it says nothing of its
+    progress.
+    """
+    path = os.pathsep.join(
+        [str(Path(suave_des.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+    )
     return subprocess.Popen(
         [sys.executable, "-m", "suave_des", "campaign", "--quiet", *arguments],
         cwd=cwd,
@@ -52,20 +58,30 @@ def workers_of(process: subprocess.Popen[str]) -> list[int]:
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     try:
         numbers = [int(number) for number in children.read_text().split()]
-        return [number for number in numbers if b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes()]
+        return [
+            number
+            for number in numbers
+            if b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes()
+        ]
     except OSError:
         return []
 
 
 def survive_forked(
-    kills: int, chance: random.Random, run: Callable[[bool, Callable[[object], None]], object], out: Path
+    kills: int,
+    chance: random.Random,
+    run: Callable[[bool, Callable[[object], None]], object],
+    out: Path,
 ) -> list[int]:
-    """The same for a campaign that runs without workers, in forks of this process: quick, as nothing is imported.
+    """The same for a campaign that runs without workers, in forks of this process: quick, as
+    nothing is imported.
 
     Args:
-        kills: how many; most of them when missions are being run, however long it takes to get there.
+        kills: how many; most of them when missions are being run, however long it takes to get
+            there.
         chance: decides the moments.
-        run: runs the campaign, or resumes it if the first argument is true; the second is to be told of progress.
+        run: runs the campaign, or resumes it if the first argument is true; the second is to be
+            told of progress.
         out: its folder.
     """
     done: list[int] = []
@@ -102,8 +118,11 @@ def _done(out: Path) -> int:
         store.close()
 
 
-def survive(kills: int, chance: random.Random, folder: Path, asked: Sequence[str], longest_s: float) -> list[int]:
-    """Run a campaign, killing it `kills` times at random moments, often a worker first; then let it finish.
+def survive(
+    kills: int, chance: random.Random, folder: Path, asked: Sequence[str], longest_s: float
+) -> list[int]:
+    """Run a campaign, killing it `kills` times at random moments, often a worker first; then let it
+    finish.
 
     Returns:
         Missions that were done at each kill.
@@ -114,7 +133,9 @@ def survive(kills: int, chance: random.Random, folder: Path, asked: Sequence[str
     while len(done) < kills:
         process = start(arguments, folder)
         if chance.random() < 0.8:
-            while process.poll() is None and not (journal.exists() and journal.stat().st_size > 200_000):
+            while process.poll() is None and not (
+                journal.exists() and journal.stat().st_size > 200_000
+            ):
                 time.sleep(0.01)
         time.sleep(chance.uniform(0.0, longest_s))
         own = workers_of(process)
@@ -135,7 +156,9 @@ def survive(kills: int, chance: random.Random, folder: Path, asked: Sequence[str
 
 def main() -> None:
     """Kill, resume, compare; exit status 1 if a byte differs."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--runs", type=int, default=20_000, help="missions for each manager")
@@ -143,12 +166,22 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "short.yaml").write_text(SHORT)
-        asked = ["short.yaml", "--managers", ",".join(MANAGERS), "--runs", str(arguments.runs), "--workers", "2"]
+        asked = [
+            "short.yaml",
+            "--managers",
+            ",".join(MANAGERS),
+            "--runs",
+            str(arguments.runs),
+            "--workers",
+            "2",
+        ]
         status, err = ended(start([*asked, "--out", "whole"], folder))
         assert status == 0, err
         began_s = time.monotonic()
         done = survive(arguments.kills, random.Random(arguments.seed), folder, asked, longest_s=0.5)
-        same = (folder / "out" / "runs.csv").read_bytes() == (folder / "whole" / "runs.csv").read_bytes()
+        same = (folder / "out" / "runs.csv").read_bytes() == (
+            folder / "whole" / "runs.csv"
+        ).read_bytes()
         moments = len({count for count in done if 0 < count < len(MANAGERS) * arguments.runs})
         print(
             f"{len(done)} kills in {time.monotonic() - began_s:.0f} s, at {moments} different counts of missions done"

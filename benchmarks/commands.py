@@ -2,10 +2,11 @@
 
     python benchmarks/commands.py [--write] [--only TEXT] [--rounds N]
 
-Each command runs once with an empty cache folder ("first"), as on a new machine, and then several times with a filled
-one, of which the quickest counts ("later"). The table has the CPU time of all processes of a command, which hardly
-depends on what else the machine does; the time from start to end is printed, too. Memory is what all processes have at
-once at most, shared pages counted once. Your own caches are not used.
+Each command runs once with an empty cache folder ("first"), as on a new machine, and then several
+times with a filled one, of which the quickest counts ("later"). The table has the CPU time of all
+processes of a command, which hardly depends on what else the machine does; the time from start to
+end is printed, too. Memory is what all processes have at once at most, shared pages counted once.
+Your own caches are not used.
 """
 
 from __future__ import annotations
@@ -101,7 +102,12 @@ def measure(words: str, folder: Path, cache: Path) -> Measured:
     line = f"exec {sys.executable} -m suave_des {words}"
     before, began_s = os.times(), time.perf_counter()
     process = subprocess.Popen(
-        ["bash", "-c", line], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        ["bash", "-c", line],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     peak = [0.0]
     done = threading.Event()
@@ -113,8 +119,12 @@ def measure(words: str, folder: Path, cache: Path) -> Measured:
     watching.join()
     after = os.times()
     if process.returncode not in (0, 1):
-        raise SystemExit(f"commands.py: suave-des {words}: status {process.returncode}: {said[-500:]}")
-    cpu_s = after.children_user + after.children_system - before.children_user - before.children_system
+        raise SystemExit(
+            f"commands.py: suave-des {words}: status {process.returncode}: {said[-500:]}"
+        )
+    cpu_s = (
+        after.children_user + after.children_system - before.children_user - before.children_system
+    )
     return Measured(wall_s, cpu_s, peak[0])
 
 
@@ -144,7 +154,10 @@ def prepare(folder: Path, cache: Path) -> None:
 
 def rows(only: str, rounds: int) -> list[str]:
     """Measure the commands that contain a text; lines of a Markdown table."""
-    lines = ["| `suave-des ...` | first, s | later, s | memory, MB |", "| --- | ---: | ---: | ---: |"]
+    lines = [
+        "| `suave-des ...` | first, s | later, s | memory, MB |",
+        "| --- | ---: | ---: | ---: |",
+    ]
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder, filled = Path(name) / "work", Path(name) / "cache"
         folder.mkdir()
@@ -152,14 +165,19 @@ def rows(only: str, rounds: int) -> list[str]:
         for number, words in enumerate(each for each in COMMANDS if only in each):
             found = []
             for turn in range(rounds + 1):
-                (folder / "mine.owl").write_text((folder / "suave.owl").read_text("utf-8"), encoding="utf-8")
+                (folder / "mine.owl").write_text(
+                    (folder / "suave.owl").read_text("utf-8"), encoding="utf-8"
+                )
                 cache = filled if turn else Path(name) / f"empty{number}"
                 found.append(measure(words, folder, cache))
             first, later = found[0], min(found[1:], key=lambda each: each.cpu_s)
             shown = re.sub(r" --(overwrite|quiet)", "", words)
             memory_mb = max(each.memory_mb for each in found)
             lines.append(f"| `{shown}` | {_s(first.cpu_s)} | {_s(later.cpu_s)} | {memory_mb:.0f} |")
-            print(f"{lines[-1]}  from start to end {_s(first.wall_s)} and {_s(later.wall_s)} s", flush=True)
+            print(
+                f"{lines[-1]}  from start to end {_s(first.wall_s)} and {_s(later.wall_s)} s",
+                flush=True,
+            )
     return lines
 
 
@@ -170,7 +188,11 @@ def _s(seconds: float) -> str:
 def machine() -> str:
     """Describe in a sentence what the table was measured on."""
     info = Path("/proc/cpuinfo")
-    models = re.findall(r"model name\s*: (.+)", info.read_text(errors="replace")) if info.exists() else []
+    models = (
+        re.findall(r"model name\s*: (.+)", info.read_text(errors="replace"))
+        if info.exists()
+        else []
+    )
     processor = models[0] if models else platform.processor() or platform.machine()
     version = importlib.metadata.version
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numba", "owlready2", "simpy"))
@@ -179,10 +201,21 @@ def machine() -> str:
 
 def main() -> None:
     """Measure, print, and write the table if asked to."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="put the table into docs/reference/limits.md")
-    parser.add_argument("--only", default="", metavar="TEXT", help="commands that contain this text")
-    parser.add_argument("--rounds", type=int, default=3, help="times that each runs with a filled cache (default: 3)")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--write", action="store_true", help="put the table into docs/reference/limits.md"
+    )
+    parser.add_argument(
+        "--only", default="", metavar="TEXT", help="commands that contain this text"
+    )
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        default=3,
+        help="times that each runs with a filled cache (default: 3)",
+    )
     chosen = parser.parse_args()
     table = "\n".join(rows(chosen.only, chosen.rounds))
     if chosen.write:

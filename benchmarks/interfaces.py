@@ -2,8 +2,8 @@
 
     python benchmarks/interfaces.py [--windows N]
 
-Each figure is the best of several short windows, so that what else the machine does counts as little as possible; in
-CPU time of this process (and of the program), and in real time.
+Each figure is the best of several short windows, so that what else the machine does counts as
+little as possible; in CPU time of this process (and of the program), and in real time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ def best(windows: int, window: Callable[[], None]) -> tuple[float, float]:
 
 
 def measure_steps(windows: int) -> None:
-    """Measure steps of one environment, one step a period of adaptation (2 s), and resets with them."""
+    """Measure steps of one environment, one step a period of adaptation (2 s), and resets with
+    them.
+    """
     simulator = Simulator(load_scenario("seams2023"))
     environment = PipelineInspection(simulator)
     chance = np.random.default_rng(1)
@@ -65,7 +67,9 @@ def measure_steps(windows: int) -> None:
     environment.close()
 
 
-def _actions(environment: gymnasium.Env, chance: np.random.Generator, each_steps: int) -> list[NDArray[np.int64]]:
+def _actions(
+    environment: gymnasium.Env, chance: np.random.Generator, each_steps: int
+) -> list[NDArray[np.int64]]:
     assert isinstance(environment.action_space, gymnasium.spaces.MultiDiscrete)
     drawn = chance.integers(environment.action_space.nvec, size=(-(-STEPS // each_steps), 2))
     return [np.array(row) for row in np.repeat(drawn, each_steps, axis=0)[:STEPS]]
@@ -76,7 +80,10 @@ def commands(folder: Path) -> Iterator[tuple[str, str]]:
     if shutil.which("gcc"):
         subprocess.run(["gcc", "-O2", "-o", folder / "manager", EXAMPLES / "manager.c"], check=True)
         yield "C", f"exec:{folder / 'manager'}"
-    for language, program, file in (("Perl", "perl", "manager.pl"), ("JavaScript", "node", "manager.js")):
+    for language, program, file in (
+        ("Perl", "perl", "manager.pl"),
+        ("JavaScript", "node", "manager.js"),
+    ):
         if shutil.which(program):
             yield language, f"exec:{program} {EXAMPLES / file}"
 
@@ -95,7 +102,9 @@ def measure_missions(windows: int) -> None:
             before_s = _children_s()
             cpu_s, real_s = best(windows, window)
             programs.end_programs()
-            program_s = (_children_s() - before_s) / windows  # a mean: it is known only when the program has ended
+            program_s = (
+                _children_s() - before_s
+            ) / windows  # a mean: it is known only when the program has ended
             own_ms, program_ms = cpu_s / MISSIONS * 1e3, program_s / MISSIONS * 1e3
             both = 2e3 / (own_ms + program_ms)
             print(
@@ -111,7 +120,9 @@ def _children_s() -> float:
 
 def main() -> None:
     """Measure both."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--windows", type=int, default=8)
     windows: int = parser.parse_args().windows
     measure_steps(windows)

@@ -1,10 +1,12 @@
-"""Measure what a mission costs as a multiple of its vehicle kernel's CPU time: a figure that holds on any machine.
+"""Measure what a mission costs as a multiple of its vehicle kernel's CPU time: a figure that holds
+on any machine.
 
-The vehicle's equations of motion are computed by compiled functions; all else in a mission (events, functions,
-monitors, reasoning) is overhead. The calls that missions make of these functions are recorded with their arguments.
-Then each mission and its recorded calls alone are timed in turn, so that a slower machine slows both down. The replay
-of the calls must give the mission's own track: a call that was not recorded is an error, not a better ratio. Of each
-mission the quickest of several rounds counts: other work on the machine slows a mission down more than the kernel.
+The vehicle's equations of motion are computed by compiled functions; all else in a mission (events,
+functions, monitors, reasoning) is overhead. The calls that missions make of these functions are
+recorded with their arguments. Then each mission and its recorded calls alone are timed in turn, so
+that a slower machine slows both down. The replay of the calls must give the mission's own track: a
+call that was not recorded is an error, not a better ratio. Of each mission the quickest of several
+rounds counts: other work on the machine slows a mission down more than the kernel.
 
     python benchmarks/kernel.py [MISSIONS [ROUNDS]]
 
@@ -34,8 +36,8 @@ SCENARIO, MANAGER, SEED = "seams2023", "metacontrol", 1
 MISSIONS, ROUNDS = 100, 8
 _SUBSTEP_RUNS = 50
 _STEPPING = ("advance", "fly_waypoints")
-"""The kernel's functions that step the track. Arguments 0 and 1 of each are the track and the row to start from;
-argument 2 of the first is the last row to fill.
+"""The kernel's functions that step the track. Arguments 0 and 1 of each are the track and the row
+to start from; argument 2 of the first is the last row to fill.
 """
 
 
@@ -72,11 +74,15 @@ class Replay:
         scratch[0] = calls[0].start if calls else np.nan
         for call in calls:
             if not np.array_equal(scratch[call.first], call.start):
-                raise RuntimeError("a call of the vehicle's kernel was not recorded: the others give another track")
+                raise RuntimeError(
+                    "a call of the vehicle's kernel was not recorded: the others give another track"
+                )
             call.function(scratch, call.first, *_copied(call.arguments))
         filled = ~np.isnan(scratch[:, 0])
         if not filled.any() or not np.array_equal(scratch[filled], track[filled]):
-            raise RuntimeError("the recorded calls of the vehicle's kernel do not give the mission's track")
+            raise RuntimeError(
+                "the recorded calls of the vehicle's kernel do not give the mission's track"
+            )
 
     def cpu_ns(self, track: Array) -> int:
         """Make the calls again on a track that may be overwritten, and return their CPU time."""
@@ -88,7 +94,9 @@ class Replay:
         return time.process_time_ns() - begun_ns
 
     def ns_per_substep(self, track: Array) -> float:
-        """Advance over a whole track with the control of the first recorded advance; return the CPU time of a row."""
+        """Advance over a whole track with the control of the first recorded advance; return the CPU
+        time of a row.
+        """
         call = next(call for call in self.calls if call.function is getattr(kernel, _STEPPING[0]))
         _, *control = _copied(call.arguments)
         track[0], last = call.start, len(track) - 1
@@ -127,7 +135,9 @@ def _recording(calls: list[KernelCall], tracks: list[Array]) -> Iterator[None]:
 
 
 def _copied(arguments: tuple[object, ...]) -> tuple[object, ...]:
-    """Copy the arrays among some arguments and in their tuples, as the kernel writes into some of them."""
+    """Copy the arrays among some arguments and in their tuples, as the kernel writes into some of
+    them.
+    """
 
     def copy(argument: object) -> object:
         if isinstance(argument, tuple):
@@ -141,8 +151,9 @@ def figures(missions: int = MISSIONS, rounds: int = ROUNDS) -> Mapping[str, floa
     """Time missions and their kernel calls in turn.
 
     Returns:
-        CPU and wall time of a mission and CPU time of its kernel calls in us, means over the missions; the ratio of
-        the CPU times; how many kernel calls a mission makes, and the CPU time of one 6-DOF substep in ns.
+        CPU and wall time of a mission and CPU time of its kernel calls in us, means over the
+        missions; the ratio of the CPU times; how many kernel calls a mission makes, and the CPU
+        time of one 6-DOF substep in ns.
     """
     simulator = Simulator(load_scenario(SCENARIO))
 
@@ -175,7 +186,9 @@ def figures(missions: int = MISSIONS, rounds: int = ROUNDS) -> Mapping[str, floa
         "kernel_cpu_us": kernel_us,
         "mission_over_kernel": mission_us / kernel_us,
         "kernel_calls_a_mission": statistics.fmean(len(replay.calls) for replay in replays),
-        "kernel_ns_a_substep": statistics.median(replays[0].ns_per_substep(track) for _ in range(_SUBSTEP_RUNS)),
+        "kernel_ns_a_substep": statistics.median(
+            replays[0].ns_per_substep(track) for _ in range(_SUBSTEP_RUNS)
+        ),
     }
 
 

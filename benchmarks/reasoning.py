@@ -1,10 +1,12 @@
-"""Times the reasoners over the same random states, in one run, and what else reasoning costs, against what is wanted.
+"""Times the reasoners over the same random states, in one run, and what else reasoning costs,
+against what is wanted.
 
     python benchmarks/reasoning.py [--states 200] [--seed 1] [--json]
 
-Each state is new to its backend (nothing is answered from memory, unless that is what is measured), and Pellet is
-warmed up on other states first. Every pair of inferences is compared: a faster answer that differs would be worth
-nothing. Stock owlready2 takes about a second for each state, so 200 states take some minutes.
+Each state is new to its backend (nothing is answered from memory, unless that is what is measured),
+and Pellet is warmed up on other states first. Every pair of inferences is compared: a faster answer
+that differs would be worth nothing. Stock owlready2 takes about a second for each state, so 200
+states take some minutes.
 """
 
 from __future__ import annotations
@@ -59,7 +61,9 @@ _MORE_DESIGNS = """
 
 
 def random_state(draw: random.Random) -> KnowledgeState:
-    """A state of a search under way: grounded search and motion, one thruster reported now and then."""
+    """A state of a search under way: grounded search and motion, one thruster reported now and
+    then.
+    """
     thruster = f"c_thruster_{draw.randint(1, 6)}"
     status = draw.choice([None, "FALSE", "RECOVERED"])
     return KnowledgeState.of(
@@ -112,7 +116,8 @@ def empty_memory() -> Iterator[Path]:
 
 
 def measure_backends(kb: Ontology, count: int, draw: random.Random) -> dict[str, Any]:
-    """Time all backends over the same states; the cached one when it has inferred their like before.
+    """Time all backends over the same states; the cached one when it has inferred their like
+    before.
 
     Raises:
         SystemExit: the backends do not infer the same.
@@ -126,7 +131,10 @@ def measure_backends(kb: Ontology, count: int, draw: random.Random) -> dict[str,
     timed(cached, states)
     summaries, found = {}, []
     # The same states as new objects: nothing about them is known but what they say.
-    again = [KnowledgeState(one.objectives, one.groundings, one.components, one.measurements) for one in states]
+    again = [
+        KnowledgeState(one.objectives, one.groundings, one.components, one.measurements)
+        for one in states
+    ]
     for reasoner, asked in ((pellet, states), (stock, states), (cached, again)):
         times_s, inferences = timed(reasoner, asked)
         found.append(inferences)
@@ -136,14 +144,21 @@ def measure_backends(kb: Ontology, count: int, draw: random.Random) -> dict[str,
             "mean_ms": 1e3 * statistics.fmean(times_s),
         }
     if not found[0] == found[1] == found[2]:
-        raise SystemExit("the backends do not infer the same: see tests/knowledge/test_backends_agree.py")
+        raise SystemExit(
+            "the backends do not infer the same: see tests/knowledge/test_backends_agree.py"
+        )
     return summaries
 
 
 def first_inference_s(name: str) -> float:
-    """From the start of a process to its first inference; the best of three, since others use the machine too."""
+    """From the start of a process to its first inference; the best of three, since others use the
+    machine too.
+    """
     program = _FIRST.format(search=SEARCH, name=name)
-    return min(seconds(lambda: subprocess.run([sys.executable, "-c", program], check=True)) for _ in range(3))
+    return min(
+        seconds(lambda: subprocess.run([sys.executable, "-c", program], check=True))
+        for _ in range(3)
+    )
 
 
 def policy_s() -> tuple[float, int]:
@@ -161,7 +176,10 @@ def growth(draw: random.Random) -> list[dict[str, float]]:
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     for designs in GROWTH:
         with empty_memory() as folder:
-            more = "".join(_MORE_DESIGNS.format(n=n, value=f"{4 * (n + 1) / designs:.4f}") for n in range(designs - 6))
+            more = "".join(
+                _MORE_DESIGNS.format(n=n, value=f"{4 * (n + 1) / designs:.4f}")
+                for n in range(designs - 6)
+            )
             path = folder / "suave.owl"
             path.write_text(text.replace("</rdf:RDF>", more + "</rdf:RDF>"), encoding="utf-8")
             kb = Ontology.load([path])
@@ -188,7 +206,9 @@ def resident_mb() -> float:
 
 
 def leak_mb(kb: Ontology, draw: random.Random) -> float | None:
-    """Growth of this process over many inferences of Pellet; None where the system does not tell."""
+    """Growth of this process over many inferences of Pellet; None where the system does not
+    tell.
+    """
     if not Path("/proc/self/statm").exists():
         return None
     pellet = Reasoner(kb, "pellet")
@@ -207,7 +227,9 @@ def measure(count: int, seed: int) -> dict[str, Any]:
         load_s = seconds(Ontology.load)
         summaries = measure_backends(kb, count, draw)
         first = {name: first_inference_s(name) for name in ("pellet", "cached")}
-        assert any((folder / "inferences").iterdir())  # or the last two of the three had no cached inference
+        assert any(
+            (folder / "inferences").iterdir()
+        )  # or the last two of the three had no cached inference
     filled_s, states = policy_s()
     results: dict[str, Any] = {
         "states": count,
@@ -215,7 +237,8 @@ def measure(count: int, seed: int) -> dict[str, Any]:
         "versions": {"python": platform.python_version(), "owlready2": version("owlready2")},
         "load_ontologies_ms": 1e3 * load_s,
         "inference": summaries,
-        "pellet_times_faster_than_owlready2": summaries["owlready2"]["median_ms"] / summaries["pellet"]["median_ms"],
+        "pellet_times_faster_than_owlready2": summaries["owlready2"]["median_ms"]
+        / summaries["pellet"]["median_ms"],
         "cached_hit_us": 1e3 * summaries["cached"]["median_ms"],
         "process_start_to_first_inference_s": first,
         "policy": {"states": states, "fill_s": filled_s},
@@ -239,7 +262,9 @@ def goals(results: dict[str, Any]) -> Iterator[dict[str, Any]]:
     growth = most["cached_hit_us"] / least["cached_hit_us"]
     yield _goal(f"a hit with {times:.0f} times the designs, times as long", "<=", times, growth)
     if results["memory_growth_mb"]["mb"] is not None:
-        yield _goal(f"{LEAK_STATES} inferences, MB more", "<=", 100.0, results["memory_growth_mb"]["mb"])
+        yield _goal(
+            f"{LEAK_STATES} inferences, MB more", "<=", 100.0, results["memory_growth_mb"]["mb"]
+        )
 
 
 def _goal(figure: str, sign: str, goal: float, measured: float) -> dict[str, Any]:
@@ -251,23 +276,36 @@ def print_table(results: dict[str, Any]) -> None:
     """Everything for people."""
     print(f"{'reasoner':<12}{'median ms':>12}{'p99 ms':>12}{'mean ms':>12}")
     for name, summary in results["inference"].items():
-        print(f"{name:<12}" + "".join(f"{summary[key]:>12.4f}" for key in ("median_ms", "p99_ms", "mean_ms")))
+        print(
+            f"{name:<12}"
+            + "".join(f"{summary[key]:>12.4f}" for key in ("median_ms", "p99_ms", "mean_ms"))
+        )
     ratio = results["pellet_times_faster_than_owlready2"]
-    print(f"{results['states']} states, the same inferences; pellet is {ratio:.0f} times faster than owlready2,")
+    print(
+        f"{results['states']} states, the same inferences; pellet is {ratio:.0f} times faster than owlready2,"
+    )
     print(f"a cache hit takes {results['cached_hit_us']:.1f} us")
     for name, first_s in results["process_start_to_first_inference_s"].items():
         print(f"from process start to the first inference, {name}: {first_s:.2f} s")
     policy = results["policy"]
-    print(f"memory filled for the whole policy, {policy['states']} states, in {policy['fill_s']:.1f} s")
+    print(
+        f"memory filled for the whole policy, {policy['states']} states, in {policy['fill_s']:.1f} s"
+    )
     print(f"\n{'designs':>8}{'thresholds':>12}{'pellet ms':>12}{'hit us':>10}")
     for row in results["growth"]:
-        print(f"{row['designs']:>8}{row['thresholds']:>12}{row['pellet_ms']:>12.2f}{row['cached_hit_us']:>10.1f}")
+        print(
+            f"{row['designs']:>8}{row['thresholds']:>12}{row['pellet_ms']:>12.2f}{row['cached_hit_us']:>10.1f}"
+        )
     grown = results["memory_growth_mb"]
     if grown["mb"] is not None:
-        print(f"\n{grown['inferences']} inferences of pellet made the process {grown['mb']:.0f} MB larger")
+        print(
+            f"\n{grown['inferences']} inferences of pellet made the process {grown['mb']:.0f} MB larger"
+        )
     print(f"\n{'figure':<52}{'goal':>10}{'measured':>12}  met")
     for row in results["goals"]:
-        print(f"{row['figure']:<52}{row['goal']:>10}{row['measured']:>12.2f}  {'yes' if row['met'] else 'NO'}")
+        print(
+            f"{row['figure']:<52}{row['goal']:>10}{row['measured']:>12.2f}  {'yes' if row['met'] else 'NO'}"
+        )
 
 
 def main() -> None:

@@ -1,8 +1,10 @@
-"""Measure inferences as one would write them with stock libraries: owlready2's sync_reasoner_pellet at each period.
+"""Measure inferences as one would write them with stock libraries: owlready2's sync_reasoner_pellet
+at each period.
 
-Written as a user of owlready2 would who knows it: a fresh world for each inference, because what Pellet inferred before
-is never retracted. It starts a Java machine for each inference, which is what sync_reasoner_pellet does. A mission
-would spend all its time so: the rest of it takes milliseconds.
+Written as a user of owlready2 would who knows it: a fresh world for each inference, because what
+Pellet inferred before is never retracted. It starts a Java machine for each inference, which is
+what sync_reasoner_pellet does. A mission would spend all its time so: the rest of it takes
+milliseconds.
 
     python benchmarks/stock_reasoner.py [INFERENCES]
 
@@ -21,7 +23,12 @@ from typing import Any
 
 import owlready2
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, WATER_VISIBILITY
+from suave_des.domain import (
+    FOLLOW_PIPELINE,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    WATER_VISIBILITY,
+)
 from suave_des.knowledge.pellet.in_process import java_executable
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.resources import shipped_folder
@@ -76,7 +83,9 @@ class StockReasoner:
         suave = world.get_ontology((self._folder / "suave.owl").as_uri()).load()
         terms = world.get_namespace(_TOMASYS)
         self._assert(state, suave, terms)
-        owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+        owlready2.sync_reasoner_pellet(
+            world, infer_property_values=True, infer_data_property_values=True, debug=0
+        )
         chosen = dict(self._choose(state, suave, terms))
         world.close()
         return chosen
@@ -105,14 +114,22 @@ class StockReasoner:
     def _choose(state: MissionState, suave: Any, terms: Any) -> Iterator[tuple[str, str]]:
         for function in state.functions:
             objective = suave[f"o_{function}"]
-            improvable = "search" in function  # revision 2023: adapted when the water gets clearer, too
+            improvable = (
+                "search" in function
+            )  # revision 2023: adapted when the water gets clearer, too
             if objective.o_status is None and True not in objective.o_updatable and not improvable:
                 continue
             candidates = {}
             for design in terms.FunctionDesign.instances():
-                expected = {value.isQAtype.name: float(value.hasValue) for value in design.hasQAestimation}
+                expected = {
+                    value.isQAtype.name: float(value.hasValue) for value in design.hasQAestimation
+                }
                 visible = state.visibility_m >= expected.get(WATER_VISIBILITY, 0.0)
-                if design.solvesF is suave[function] and design.fd_realisability is not False and visible:
+                if (
+                    design.solvesF is suave[function]
+                    and design.fd_realisability is not False
+                    and visible
+                ):
                     candidates[design.name] = expected.get(_PERFORMANCE, 0.001)
             if candidates:
                 yield function, max(candidates, key=lambda name: candidates[name])

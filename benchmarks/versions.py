@@ -2,10 +2,11 @@
 
     python benchmarks/versions.py BEFORE AFTER [--missions N] [--rounds N] [--processes N]
 
-An installation is a virtual environment or a checkout, which runs with this Python. Each gets some processes that stay,
-and caches of its own. In each round all run the same missions of each scenario and manager, one directly after the
-other, so that other work on the machine slows all down. CPU time counts, of each process the quickest round, and their
-mean: two processes of the same code may differ by a tenth, throughout.
+An installation is a virtual environment or a checkout, which runs with this Python. Each gets some
+processes that stay, and caches of its own. In each round all run the same missions of each scenario
+and manager, one directly after the other, so that other work on the machine slows all down. CPU
+time counts, of each process the quickest round, and their mean: two processes of the same code may
+differ by a tenth, throughout.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ SEED = 1
 
 
 def serve(missions: int) -> None:
-    """For each line "scenario manager" of standard input, run missions and print their CPU time in s."""
+    """For each line "scenario manager" of standard input, run missions and print their CPU time in
+    s.
+    """
     from suave_des import load_scenario
     from suave_des.simulation.simulator import Simulator
 
@@ -64,7 +67,12 @@ class Installation:
         environment["SUAVE_DES_CACHE_DIR"] = str(caches)
         words = [str(python.absolute()), str(Path(__file__).resolve()), "--serve", str(missions)]
         self._process = subprocess.Popen(
-            words, env=environment, cwd=caches, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            words,
+            env=environment,
+            cwd=caches,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
         )
 
     def cpu_s(self, scenario: str, manager: str) -> float:
@@ -87,9 +95,14 @@ class Installation:
 
 
 def compare(
-    installations: Sequence[Installation], rounds: int, scenarios: Sequence[str], managers: Sequence[str]
+    installations: Sequence[Installation],
+    rounds: int,
+    scenarios: Sequence[str],
+    managers: Sequence[str],
 ) -> dict[tuple[str, str], list[float]]:
-    """Return the least CPU time of each process, by scenario and manager; the first round is not counted."""
+    """Return the least CPU time of each process, by scenario and manager; the first round is not
+    counted.
+    """
     cells = [(scenario, manager) for scenario in scenarios for manager in managers]
     least_s = {cell: [float("inf")] * len(installations) for cell in cells}
     for turn in range(rounds + 1):
@@ -104,11 +117,17 @@ def compare(
 
 def main() -> None:
     """Compare, and print a table of times and ratios."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("installations", nargs=2, type=Path, metavar="PATH")
-    parser.add_argument("--missions", type=int, default=100, help="missions of each kind in a round (default: 100)")
+    parser.add_argument(
+        "--missions", type=int, default=100, help="missions of each kind in a round (default: 100)"
+    )
     parser.add_argument("--rounds", type=int, default=5, help="rounds that count (default: 5)")
-    parser.add_argument("--processes", type=int, default=3, help="processes of each installation (default: 3)")
+    parser.add_argument(
+        "--processes", type=int, default=3, help="processes of each installation (default: 3)"
+    )
     parser.add_argument("--scenarios", default=",".join(SCENARIOS))
     parser.add_argument("--managers", default=",".join(MANAGERS))
     chosen = parser.parse_args()
@@ -118,8 +137,12 @@ def main() -> None:
             for number, path in enumerate(chosen.installations):
                 caches = Path(name) / str(number)
                 caches.mkdir()
-                running.extend(Installation(path, chosen.missions, caches) for _ in range(chosen.processes))
-            found = compare(running, chosen.rounds, chosen.scenarios.split(","), chosen.managers.split(","))
+                running.extend(
+                    Installation(path, chosen.missions, caches) for _ in range(chosen.processes)
+                )
+            found = compare(
+                running, chosen.rounds, chosen.scenarios.split(","), chosen.managers.split(",")
+            )
         finally:
             for each in running:
                 each.end()

@@ -1,18 +1,22 @@
-"""Find the code blocks of README and docs, run them page by page, and give what each shows when run.
+"""Find the code blocks of README and docs, run them page by page, and give what each shows when
+run.
 
 What a block is follows from its language and the words after it, which readers do not see:
 
-- `console`: commands after `$ `, each followed by what it prints. `head=N` and `tail=N` keep the first and last lines
-  of each output; `status=2` says how the last command ends; `test="--runs 4"` gives an option another value in quick
-  tests; `picture=NAME` says that the block draws docs/images/NAME. `console setup` is not run. Commands of `console
-  background` go on while the rest of the page runs, at a free port in place of 8786; they show nothing.
+- `console`: commands after `$ `, each followed by what it prints. `head=N` and `tail=N` keep the
+  first and last lines of each output; `status=2` says how the last command ends; `test="--runs 4"`
+  gives an option another value in quick tests; `picture=NAME` says that the block draws
+  docs/images/NAME. `console setup` is not run. Commands of `console background` go on while the
+  rest of the page runs, at a free port in place of 8786; they show nothing.
 - `python`: a script; the `text` block after it is what it prints.
-- A block that is `long` is left out by quick tests and run by refresh_outputs.py; what it shows has a test elsewhere.
-- Any language with `title=FILE` is a file, and with `insert=FILE` and `before=LINE` or `after=LINE` an addition to one.
+- A block that is `long` is left out by quick tests and run by refresh_outputs.py; what it shows has
+  a test elsewhere.
+- Any language with `title=FILE` is a file, and with `insert=FILE` and `before=LINE` or `after=LINE`
+  an addition to one.
 - `bibtex` is neither run nor checked.
 
-The blocks of a page run in its order in one folder, which has ontologies, scenarios and analysis scripts in it, as a
-checkout.
+The blocks of a page run in its order in one folder, which has ontologies, scenarios and analysis
+scripts in it, as a checkout.
 """
 
 from __future__ import annotations
@@ -96,7 +100,8 @@ def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, 
     """Run the blocks of a page in an empty folder, and give each with what it shows.
 
     Raises:
-        RuntimeError: a command ended with another status than the page says, or a block cannot be used.
+        RuntimeError: a command ended with another status than the page says, or a block cannot be
+            used.
     """
     for name in ("ontology", "scenarios", "analysis"):
         shutil.copytree(ROOT / name, folder / name)
@@ -124,15 +129,18 @@ def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, 
             elif block.language == "text":
                 shown = _cut(printed, block.marks)
             elif block.language not in (*_UNRUN, "console"):
-                raise RuntimeError(f"{block.place}: nothing says what to do with this {block.language} block")
+                raise RuntimeError(
+                    f"{block.place}: nothing says what to do with this {block.language} block"
+                )
             yield block, shown
 
 
 def differs(block: Block, real: str, *, quick: bool) -> bool:
     """Whether what a block shows is not what really came.
 
-    Decimals may differ by a hundredth, as the last digits of a mission may differ between machines; words and whole
-    numbers may not. Where the quick test ran something shorter, the names of a table's rows are compared.
+    Decimals may differ by a hundredth, as the last digits of a mission may differ between machines;
+    words and whole numbers may not. Where the quick test ran something shorter, the names of a
+    table's rows are compared.
     """
     if quick and "test" in block.marks:
         return _row_names(block.text) != _row_names(real)
@@ -148,14 +156,18 @@ def _same(shown: str, real: str) -> bool:
         return False
     pairs = zip(_NUMBER.findall(shown), _NUMBER.findall(real), strict=True)
     return all(
-        abs(float(one) - float(other)) <= 0.02 + 0.01 * float(one) if "." in one + other else one == other
+        abs(float(one) - float(other)) <= 0.02 + 0.01 * float(one)
+        if "." in one + other
+        else one == other
         for one, other in pairs
     )
 
 
 def _row_names(text: str) -> list[str]:
     lines = text.splitlines()
-    return [line.split()[0] for line in lines if line[:1].isalpha() and len(_NUMBER.findall(line)) > 2]
+    return [
+        line.split()[0] for line in lines if line[:1].isalpha() and len(_NUMBER.findall(line)) > 2
+    ]
 
 
 @contextlib.contextmanager
@@ -177,7 +189,9 @@ def _inside(folder: Path) -> Iterator[None]:
 def _insert(block: Block) -> None:
     path = Path(block.marks["insert"])
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    anchor, offset = (block.marks["before"], 0) if "before" in block.marks else (block.marks["after"], 1)
+    anchor, offset = (
+        (block.marks["before"], 0) if "before" in block.marks else (block.marks["after"], 1)
+    )
     places = [number for number, line in enumerate(lines) if line.strip() == anchor]
     if len(places) != 1:
         raise RuntimeError(f"{block.place}: {path} has {len(places)} lines {anchor!r}, not one")
@@ -240,7 +254,9 @@ def _run_console(block: Block, port: str, *, quick: bool) -> str:
     shown, status = "", 0
     for command in _commands(block, port):
         if quick:
-            output, status = _run(_shortened(command, block.marks.get("test", "")), status, workers="1")
+            output, status = _run(
+                _shortened(command, block.marks.get("test", "")), status, workers="1"
+            )
         else:
             output, status = _run(command, status, workers="2")
         line = f"$ {command}".replace(port, _PORT)
@@ -251,7 +267,9 @@ def _run_console(block: Block, port: str, *, quick: bool) -> str:
 
 
 def _shortened(command: str, options: str) -> str:
-    """The command with other values of these options, which are added where it does not have them."""
+    """The command with other values of these options, which are added where it does not have
+    them.
+    """
     words = shlex.split(options)
     for option, value in zip(words[::2], words[1::2], strict=True):
         command, replaced = re.subn(rf"{option} \S+", f"{option} {value}", command)
@@ -261,7 +279,9 @@ def _shortened(command: str, options: str) -> str:
 
 
 def _run(command: str, status_before: int, workers: str) -> tuple[str, int]:
-    """Output and exit status; suave-des runs in this process, which saves starting Java each time."""
+    """Output and exit status; suave-des runs in this process, which saves starting Java each
+    time.
+    """
     if not command.startswith("suave-des "):
         return _shell(f"(exit {status_before}); {command}", "")
     own, _, rest = command.partition(" | ")

@@ -39,14 +39,19 @@ SHARED_BY = 2
 def page() -> str:
     """The whole page."""
     commands = {
-        name: [Parameter(each) for each in inspect.signature(command, eval_str=True).parameters.values()]
+        name: [
+            Parameter(each)
+            for each in inspect.signature(command, eval_str=True).parameters.values()
+        ]
         for name, command in commands_of(app)
     }
     rows = Counter(each.row for parameters in commands.values() for each in parameters)
     names = {each.row: each.name for parameters in commands.values() for each in parameters}
     common = {names[row]: row for row, times in reversed(rows.most_common()) if times >= SHARED_BY}
     shared = [row for row in rows if row in common.values()]
-    sections = (section(name, command, commands[name], shared) for name, command in commands_of(app))
+    sections = (
+        section(name, command, commands[name], shared) for name, command in commands_of(app)
+    )
     return HEAD + "\n".join(shared) + "\n" + "".join(sections)
 
 
@@ -76,14 +81,18 @@ class Parameter:
         self.needed = parameter.default is inspect.Parameter.empty
         kind, declared = typing.get_args(parameter.annotation)
         is_number = not {int, float}.isdisjoint((kind, *typing.get_args(kind)))
-        value = declared.metavar or next(words_of(kind), "NUMBER" if is_number else parameter.name.upper())
+        value = declared.metavar or next(
+            words_of(kind), "NUMBER" if is_number else parameter.name.upper()
+        )
         if isinstance(declared, ArgumentInfo):
             self.name = self.written = value
         else:
             given = [
                 str(each) for each in (declared.default, *(declared.param_decls or ()))
             ]  # the first is Annotated's
-            names = [each for each in given if each.startswith("-")] or [f"--{parameter.name.replace('_', '-')}"]
+            names = [each for each in given if each.startswith("-")] or [
+                f"--{parameter.name.replace('_', '-')}"
+            ]
             option = next((each for each in names if each.startswith("--")), names[0])
             self.name = option
             self.written = option if kind is bool else f"{option} {value}"

@@ -1,4 +1,6 @@
-"""Write docs/reference/scenario.md and exemplar-files.md from models and keys: docs/make_scenario_reference.py."""
+"""Write docs/reference/scenario.md and exemplar-files.md from models and keys:
+docs/make_scenario_reference.py.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ PAGE = Path(__file__).parent / "reference" / "scenario.md"
 EXEMPLAR_PAGE = PAGE.with_name("exemplar-files.md")
 SIGNALS = (SinusoidSignal, ConstantSignal, StepSignal, TableSignal)
 DISTRIBUTIONS = (Normal, Uniform, Exponential, Choice)
-SHARED = [name for name in SIGNALS[0].model_fields if all(name in each.model_fields for each in SIGNALS)]
+SHARED = [
+    name for name in SIGNALS[0].model_fields if all(name in each.model_fields for each in SIGNALS)
+]
 """Keys of every kind of signal."""
 APART = (Revision, VehicleDescription, ManagerSettings, *SIGNALS, *DISTRIBUTIONS)
 """Models with a section of their own."""
@@ -54,7 +58,9 @@ def page() -> str:
     tables = {
         "scenario": entries(keys(Scenario)),
         "parts": parts(Scenario),
-        "all signals": entries(keys(SIGNALS[0], own(SIGNALS[0], [*Monitor.model_fields, *own(SIGNALS[0], SHARED)]))),
+        "all signals": entries(
+            keys(SIGNALS[0], own(SIGNALS[0], [*Monitor.model_fields, *own(SIGNALS[0], SHARED)]))
+        ),
         "managers": entries(keys(ManagerSettings)),
     }
     for name, content in tables.items():
@@ -68,7 +74,9 @@ def exemplar_page() -> str:
     for key in KEYS:
         if key.meaning.endswith("no meaning here"):
             continue
-        span = "all" if (key.since, key.until) == (OLDEST, NEWEST) else f"{key.since} to {key.until}"
+        span = (
+            "all" if (key.since, key.until) == (OLDEST, NEWEST) else f"{key.since} to {key.until}"
+        )
         span = key.since if key.since == key.until else span
         default = "" if key.default is None else f"; `{json.dumps(key.default)}`"
         here = ", ".join(filter(None, (f"`{key.path}`" if key.path else "", key.meaning)))
@@ -98,7 +106,9 @@ def parts(model: type[BaseModel]) -> str:
     for name, field in model.model_fields.items():
         for each in models_in(field.annotation):
             if each not in APART:
-                meaning = meanings(model)[name] + (" Default: none." if field.default is None else "")
+                meaning = meanings(model)[name] + (
+                    " Default: none." if field.default is None else ""
+                )
                 sections.append(
                     f"### {name}{entry(field)}\n\n{meaning}\n\n{entries(keys(each, own(each, faults(each))))}"
                 )
@@ -138,7 +148,9 @@ def entries(lines: Iterable[str]) -> str:
 
 
 def keys(model: type[BaseModel], names: Iterable[str] = (), prefix: str = "") -> Iterator[str]:
-    """An entry for each key, and below a mapping's one for each of its own; a scenario's mappings stand elsewhere."""
+    """An entry for each key, and below a mapping's one for each of its own; a scenario's mappings
+    stand elsewhere.
+    """
     texts = meanings(model)
     for name in names or model.model_fields:
         field = model.model_fields[name]
@@ -155,13 +167,20 @@ def keys(model: type[BaseModel], names: Iterable[str] = (), prefix: str = "") ->
 def value_text(field: FieldInfo) -> str:
     """What a key takes, in words; that it is a number is seen by its default."""
     text = type_text(field.annotation) + bounds_text(field.metadata)
-    return text if field.is_required() or field.default is None else text.removeprefix("number").strip()
+    return (
+        text
+        if field.is_required() or field.default is None
+        else text.removeprefix("number").strip()
+    )
 
 
 def bounds_text(marks: Iterable[Any]) -> str:
     """A number's bounds, such as " in (0, 6]" or " > 0", without generous ones."""
     given = {
-        key: getattr(mark, key, None) for mark in marks for key, _ in BOUNDS if getattr(mark, key, None) is not None
+        key: getattr(mark, key, None)
+        for mark in marks
+        for key, _ in BOUNDS
+        if getattr(mark, key, None) is not None
     }
     found = {key: bound for key, bound in given.items() if abs(bound) < GENEROUS}
     if len(found) == 2:
@@ -173,7 +192,10 @@ def bounds_text(marks: Iterable[Any]) -> str:
 def type_text(annotation: Any) -> str:
     """A type in the words of the page."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    if set(models_in(annotation)) >= set(DISTRIBUTIONS) and origin in (typing.Union, types.UnionType):
+    if set(models_in(annotation)) >= set(DISTRIBUTIONS) and origin in (
+        typing.Union,
+        types.UnionType,
+    ):
         return "distribution"
     if origin is not dict and set(models_in(annotation)) == set(SIGNALS):
         return "signal"

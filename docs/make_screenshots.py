@@ -2,7 +2,8 @@
 
     python docs/make_screenshots.py
 
-It needs Chromium. The pictures change with fonts, so no test compares them; one checks that they are there and small.
+It needs Chromium. The pictures change with fonts, so no test compares them; one checks that they
+are there and small.
 """
 
 from __future__ import annotations
@@ -39,12 +40,16 @@ def main() -> None:
         run_campaign("seams2023", ["none", "random", "metacontrol"], runs=100, out=campaign)
         pages = {
             "replay": replay_page(missions_run(loaded, ("metacontrol",), run=2, seed=1)),
-            "replay-two": replay_page(missions_run(loaded, ("metacontrol", "none"), run=12, seed=1)),
+            "replay-two": replay_page(
+                missions_run(loaded, ("metacontrol", "none"), run=12, seed=1)
+            ),
             "report": report_page([campaign]),
         }
         for page, text in pages.items():
             (folder / f"{page}.html").write_text(text, encoding="utf-8")
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
+        )
         _take(browser, folder / "replay.html", "#t=37&theme=dark", (1180, 760))
         _take(browser, folder / "replay-two.html", "#t=76&theme=light", (1180, 860))
         _take(browser, folder / "report.html", "#theme=light", (1180, 1000))

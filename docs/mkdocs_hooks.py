@@ -1,4 +1,6 @@
-"""Turn the repository's Markdown into the site's: pages of the root, links to other files, marks of code blocks."""
+"""Turn the repository's Markdown into the site's: pages of the root, links to other files, marks of
+code blocks.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,11 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
-_PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+_PAGES = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+}
 """Pages of the repository's root, and their names on the site."""
 _LINK = re.compile(r"\]\(([^)#\s]+)((?:#[^)\s]*)?)\)")
 _FENCE = re.compile(r"^```(\w+) (.+)$", re.MULTILINE)
@@ -29,20 +35,32 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """
     root = _root(config)
     for source, page in _PAGES.items():
-        files.append(File.generated(config, page, content=(root / source).read_text(encoding="utf-8")))
+        files.append(
+            File.generated(config, page, content=(root / source).read_text(encoding="utf-8"))
+        )
     for path in sorted((root / "docs" / "notebooks").glob("*.ipynb")):
         page = f"notebooks/{path.stem}.md"
-        files.append(File.generated(config, page, content=notebook_markdown(json.loads(path.read_text("utf-8")))))
+        files.append(
+            File.generated(
+                config, page, content=notebook_markdown(json.loads(path.read_text("utf-8")))
+            )
+        )
     for file in files.documentation_pages():
         for target, _ in _LINK.findall(file.content_string):
             path = _in_repository(target, file.src_uri)
-            if path and not path.startswith("docs/") and path not in _PAGES and files.get_file_from_path(path) is None:
+            if (
+                path
+                and not path.startswith("docs/")
+                and path not in _PAGES
+                and files.get_file_from_path(path) is None
+            ):
                 files.append(File.generated(config, path, abs_src_path=str(root / path)))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Point links at the site's files, and reduce what follows the language of a code block to a title.
+    """Point links at the site's files, and reduce what follows the language of a code block to a
+    title.
 
     Args:
         markdown: the page as it stands in the repository.
@@ -65,7 +83,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def notebook_markdown(notebook: dict[str, Any]) -> str:
-    """Turn a notebook with its outputs into Markdown: pictures are in the page, data frames are tables."""
+    """Turn a notebook with its outputs into Markdown: pictures are in the page, data frames are
+    tables.
+    """
     parts = []
     for cell in notebook["cells"]:
         source = "".join(cell["source"])
@@ -108,4 +128,8 @@ def _title(fence: re.Match[str]) -> str:
     if found is None:
         return f"```{fence[1]}"
     name = found[2].strip('"')
-    return f'```{fence[1]} title="{name}"' if found[1] == "title" else f'```{fence[1]} title="{name}, addition"'
+    return (
+        f'```{fence[1]} title="{name}"'
+        if found[1] == "title"
+        else f'```{fence[1]} title="{name}, addition"'
+    )

@@ -40,7 +40,9 @@ def executed(path: Path, folder: Path, kernel: KernelManager | None = None) -> A
     if kernel is not None:
         notebook.cells.insert(0, nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {folder}"))
     resources = {"metadata": {"path": str(folder)}}
-    client = NotebookClient(notebook, kernel, timeout=_TIME_OUT_S, record_timing=False, resources=resources)
+    client = NotebookClient(
+        notebook, kernel, timeout=_TIME_OUT_S, record_timing=False, resources=resources
+    )
     client.execute()
     if kernel is not None:
         client.kc.stop_channels()

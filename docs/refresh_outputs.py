@@ -2,8 +2,9 @@
 
     python docs/refresh_outputs.py [--check] [PAGE ...]
 
-With `--check` nothing is written: differences are printed, down to the last digit, and any makes the exit status 1.
-Long forms are run where tests run short ones (`test="--runs 3"`), which takes some minutes.
+With `--check` nothing is written: differences are printed, down to the last digit, and any makes
+the exit status 1. Long forms are run where tests run short ones (`test="--runs 3"`), which takes
+some minutes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from PIL import Image, ImageChops, ImageStat
 _COLOURS = 128
 """A picture of lines needs no more, and takes a third of the space."""
 _MEAN_DIFFERENCE = 0.5
-"""Of 255 levels, between a picture and the same drawn again: fonts are rendered differently on other machines."""
+"""Of 255 levels, between a picture and the same drawn again: fonts are rendered differently on
+other machines.
+"""
 
 
 def refresh(page: Path, *, check: bool) -> list[str]:
@@ -45,19 +48,25 @@ def refresh(page: Path, *, check: bool) -> list[str]:
             if "picture" in block.marks and _redraw(folder / block.marks["picture"], check=check):
                 pictures.append(f"{block.place}: {block.marks['picture']} is drawn differently\n")
     for block, shown in reversed(done):
-        lines[block.line : block.line + len(block.text.splitlines())] = shown.splitlines(keepends=True)
+        lines[block.line : block.line + len(block.text.splitlines())] = shown.splitlines(
+            keepends=True
+        )
     after = "".join(lines)
     if not check and after != before:
         page.write_text(after, encoding="utf-8")
     shown_as = str(page.relative_to(ROOT))
     return [
-        *unified_diff(before.splitlines(True), after.splitlines(True), shown_as, f"{shown_as}, now", n=0),
+        *unified_diff(
+            before.splitlines(True), after.splitlines(True), shown_as, f"{shown_as}, now", n=0
+        ),
         *pictures,
     ]
 
 
 def _redraw(drawn: Path, *, check: bool) -> bool:
-    """Whether a picture differs from the one in docs/images, which is replaced then unless it is to be checked only."""
+    """Whether a picture differs from the one in docs/images, which is replaced then unless it is to
+    be checked only.
+    """
     kept = IMAGES / drawn.name
     with Image.open(drawn) as opened:
         picture = opened.convert("RGB")
@@ -76,9 +85,15 @@ def _redraw(drawn: Path, *, check: bool) -> bool:
 
 def main() -> None:
     """Refresh or check the pages named, or all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="write nothing, and fail where something differs")
-    parser.add_argument("pages", nargs="*", metavar="PAGE", type=Path, help="default: all whose blocks are run")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing, and fail where something differs"
+    )
+    parser.add_argument(
+        "pages", nargs="*", metavar="PAGE", type=Path, help="default: all whose blocks are run"
+    )
     arguments = parser.parse_args()
     different = 0
     for page in [path.resolve() for path in arguments.pages] or PAGES:

@@ -1,7 +1,8 @@
 """SUAVE, the self-adaptive underwater vehicle exemplar, as a discrete-event simulation.
 
-What users need is here by name, see docs/reference/python-api.md; modules below may change without notice. Importing
-the package starts nothing: no Java, no pandas, no matplotlib until they are needed.
+What users need is here by name, see docs/reference/python-api.md; modules below may change without
+notice. Importing the package starts nothing: no Java, no pandas, no matplotlib until they are
+needed.
 """
 
 from importlib import import_module as _import_module
@@ -35,9 +36,24 @@ __version__ = "1.0.0"
 
 __all__ = ["Mission", "RecordedMission", "Simulator", "load_scenario", "run_mission", "with_values"]
 __all__ += ["CampaignFrame", "read_ensemble", "resume_campaign", "run_campaign"]
-__all__ += ["CustomFunction", "ManagingSubsystem", "Metacontrol", "NoManager", "PyTreesManager", "Threshold"]
+__all__ += [
+    "CustomFunction",
+    "ManagingSubsystem",
+    "Metacontrol",
+    "NoManager",
+    "PyTreesManager",
+    "Threshold",
+]
 __all__ += ["FAILED", "Kind", "PipelineInspection", "train"]
-__all__ += ["compare_folders", "compare_with_paper", "draw_folder", "mean_of", "read_real", "read_runs", "validate"]
+__all__ += [
+    "compare_folders",
+    "compare_with_paper",
+    "draw_folder",
+    "mean_of",
+    "read_real",
+    "read_runs",
+    "validate",
+]
 __all__ += ["InputError", "KnowledgeBase", "MissionError", "SuaveDesError", "find"]
 
 _HOMES = {

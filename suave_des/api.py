@@ -68,7 +68,8 @@ def run_mission(
     command: Sequence[str] = (),
     **replacements: Unpack[Replacements],
 ) -> RecordedMission:
-    """Run one mission and keep its events and trajectory; it equals this run of a campaign with this seed.
+    """Run one mission and keep its events and trajectory; it equals this run of a campaign with
+    this seed.
 
     Example:
         mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
@@ -79,8 +80,8 @@ def run_mission(
         manager: name of the managing subsystem, module:Class, or its class.
         run: number of the run, from 1.
         seed: of everything that is random.
-        out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons, knowledge.jsonl; it is
-            made if its parent exists. None: no files.
+        out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
+            knowledge.jsonl; it is made if its parent exists. None: no files.
         overwrite: whether results of the same kind in the folder are replaced.
         command: the command line, for mission.json.
         replacements: as of load_scenario.
@@ -89,7 +90,9 @@ def run_mission(
         InputError: something given cannot be used; nothing is written then.
         MissionError: the manager raised; nothing is written then.
     """
-    from suave_des.simulation.simulator import Simulator  # with the compiler, which campaigns load in their workers
+    from suave_des.simulation.simulator import (
+        Simulator,
+    )  # with the compiler, which campaigns load in their workers
 
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -104,7 +107,9 @@ def run_mission(
         make_output_folder(folder)
         files = mission_files(result, loaded, inputs, command)
         write_files(folder, files, stale=(KNOWLEDGE_FILE,))
-    return RecordedMission(**{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded)
+    return RecordedMission(
+        **{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded
+    )
 
 
 @plain_arguments
@@ -119,35 +124,40 @@ def run_campaign(
     progress: bool | None = None,
     **options: Any,
 ) -> CampaignFrame:
-    """Run missions of a scenario under each manager; a row for each mission, with the columns of runs.csv.
+    """Run missions of a scenario under each manager; a row for each mission, with the columns of
+    runs.csv.
 
-    The rows are the same for any number of workers. Columns scenario and manager are categories, the managers in the
-    order given; run, seed and adaptations int64, pipeline_found bool, other metrics float64, nan if not measured.
+    The rows are the same for any number of workers. Columns scenario and manager are categories,
+    the managers in the order given; run, seed and adaptations int64, pipeline_found bool, other
+    metrics float64, nan if not measured.
 
-    `frame.attrs` has, as plain values, `missions` and `failures` as in manifest.json, `summary` (a mapping
-    for each row of summary.csv), `runs_sharing_draw` (the number of consecutive runs that share a draw), `interrupted`,
-    and `folder`, which may be None. When missions fail, a warning says so.
+    `frame.attrs` has, as plain values, `missions` and `failures` as in manifest.json, `summary` (a
+    mapping for each row of summary.csv), `runs_sharing_draw` (the number of consecutive runs that
+    share a draw), `interrupted`, and `folder`, which may be None. When missions fail, a warning
+    says so.
 
-    Ctrl-C in a notebook or at a prompt gives the missions that are done, with a warning; elsewhere it is raised as
-    CampaignInterrupted, a KeyboardInterrupt, whose `result.frame()` has them.
+    Ctrl-C in a notebook or at a prompt gives the missions that are done, with a warning; elsewhere
+    it is raised as CampaignInterrupted, a KeyboardInterrupt, whose `result.frame()` has them.
 
     Example:
         frame = run_campaign("seams2023", ["none", "metacontrol"], runs=100, workers=2)
         frame.groupby("manager")["search_time_s"].mean()
 
     Args:
-        scenario: path of a scenario file or of a campaign file, name of a shipped scenario, or a loaded one.
-        managers: names, module:Class, or classes, one or several; left out, as is the rest: as in the campaign file,
-            or none, random and metacontrol.
+        scenario: path of a scenario file or of a campaign file, name of a shipped scenario, or a
+            loaded one.
+        managers: names, module:Class, or classes, one or several; left out, as is the rest: as in
+            the campaign file, or none, random and metacontrol.
         runs: missions for each manager, at each point of a sweep: 20.
         seed: of everything that is random: 1.
-        workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
-            itself need `if __name__ == "__main__":` around the call, as workers import the script; those of a notebook
-            need nothing.
-        out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
+        workers: processes; with 1 the missions run in this one. With more, managers that the
+            calling script defines itself need `if __name__ == "__main__":` around the call, as
+            workers import the script; those of a notebook need nothing.
+        out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be
+            resumed. None: no files.
         progress: whether to show progress; by default in a notebook and on a terminal.
-        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations and rules. The values
-            of a sweep may be a list, an array or a range.
+        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations and rules.
+            The values of a sweep may be a list, an array or a range.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -158,7 +168,9 @@ def run_campaign(
     known = [*CampaignSpec.model_fields.keys() - internal, *Replacements.__annotations__]
     check_names("run_campaign", options, sorted(known))
     given = scenario, managers, runs, seed, workers, out
-    return _frame_of(scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options))
+    return _frame_of(
+        scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options)
+    )
 
 
 @plain_arguments
@@ -177,25 +189,39 @@ def resume_campaign(
     Args:
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.
-        scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
-        managers: those of the campaign's that are not installed; their code is run only if they are named here.
+        scheduler: address of a Dask scheduler whose workers run the missions, instead of processes
+            here.
+        managers: those of the campaign's that are not installed; their code is run only if they are
+            named here.
         confirmed: whether to run the code of all managers that the folder names.
         progress: whether to show progress; by default in a notebook and on a terminal.
 
     Raises:
-        InputError: there is no campaign, or something that determines results has changed; the error names it.
+        InputError: there is no campaign, or something that determines results has changed; the
+            error names it.
         WorkerError, StoreError: as run_campaign.
     """
-    changed: dict[str, Any] = {"runs": runs, "scheduler": scheduler, "managers": managers, "confirmed": confirmed}
+    changed: dict[str, Any] = {
+        "runs": runs,
+        "scheduler": scheduler,
+        "managers": managers,
+        "confirmed": confirmed,
+    }
     return _frame_of(
-        folder, progress, lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed)
+        folder,
+        progress,
+        lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed),
     )
 
 
 def _frame_of(
-    named: str | Path | LoadedScenario, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
+    named: str | Path | LoadedScenario,
+    progress: bool | None,
+    run: Callable[[OnProgress | None], CampaignResult],
 ) -> CampaignFrame:
-    """Run a campaign and show its progress; return its rows, with what else there is to know in attrs."""
+    """Run a campaign and show its progress; return its rows, with what else there is to know in
+    attrs.
+    """
     from suave_des.results.compare import CampaignFrame
 
     label = named.scenario.name if isinstance(named, LoadedScenario) else str(named)

@@ -1,4 +1,6 @@
-"""Calls of public functions with arguments that they do not have, or of another type: errors in plain words."""
+"""Calls of public functions with arguments that they do not have, or of another type: errors in
+plain words.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +27,20 @@ _KINDS: Final[Mapping[str, tuple[Any, str]]] = {
     "Mapping": (Mapping, "a mapping"),
     "Sequence": (Iterable, "a list"),
     "Iterable": (Iterable, "a list"),
-    "LoadedScenario": ("LoadedScenario", "a loaded scenario"),  # by its name: its module imports this one
+    "LoadedScenario": (
+        "LoadedScenario",
+        "a loaded scenario",
+    ),  # by its name: its module imports this one
 }
-"""What annotations stand for, and how it is called. Anything that has values will do for a list, but a single name."""
+"""What annotations stand for, and how it is called. Anything that has values will do for a list,
+but a single name.
+"""
 
 
 def plain_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Check each call of a function against its signature; an annotation that has further classes is not looked at."""
+    """Check each call of a function against its signature; an annotation that has further classes
+    is not looked at.
+    """
     signature = inspect.signature(function)
     name_shown = function.__qualname__.removesuffix(".__init__")
     parameters = signature.parameters.values()
@@ -41,13 +50,18 @@ def plain_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
     @functools.wraps(function)
     def call(*args: _P.args, **given: _P.kwargs) -> _R:
         typed = function.__globals__.get(options.removeprefix("Unpack[").removesuffix("]"))
-        known = own | {name: each.__forward_arg__ for name, each in getattr(typed, "__annotations__", {}).items()}
+        known = own | {
+            name: each.__forward_arg__
+            for name, each in getattr(typed, "__annotations__", {}).items()
+        }
         if options != "Any":
             check_names(name_shown, given, known)
         try:
             bound = signature.bind(*args, **given)
         except TypeError as error:
-            raise InputError(f"{name_shown}: {error}", remedy=f"its arguments: {', '.join(known)}") from None
+            raise InputError(
+                f"{name_shown}: {error}", remedy=f"its arguments: {', '.join(known)}"
+            ) from None
         for name, value in {**bound.arguments, **given}.items():
             _check(name, value, known.get(name, "Any"))
         return function(*args, **given)
@@ -75,5 +89,9 @@ def _is_a(part: str, value: object) -> bool:
     kind = _KINDS[part][0]
     if isinstance(kind, str):
         return any(base.__name__ == kind for base in type(value).__mro__)
-    is_other = isinstance(value, bool) if part in ("int", "float") else isinstance(value, str | bytes) and part != "str"
+    is_other = (
+        isinstance(value, bool)
+        if part in ("int", "float")
+        else isinstance(value, str | bytes) and part != "str"
+    )
     return isinstance(value, kind) and not is_other

@@ -1,7 +1,8 @@
 """The user's cache folder, for what can be made again, and files in it that are checked before use.
 
-`inferences/` has what Pellet inferred, `numba/` machine code, `findings/` what `kb check` found, `campaigns/` which
-campaigns with code of their own this user has begun. Each may be deleted at any time.
+`inferences/` has what Pellet inferred, `numba/` machine code, `findings/` what `kb check` found,
+`campaigns/` which campaigns with code of their own this user has begun. Each may be deleted at any
+time.
 """
 
 from __future__ import annotations
@@ -27,16 +28,19 @@ MAX_FILES: Final = 64
 
 
 def private_cache(kind: str) -> Path | None:
-    """Make the part of the cache folder for one kind of content, if need be: a folder that only this user may enter.
+    """Make the part of the cache folder for one kind of content, if need be: a folder that only
+    this user may enter.
 
-    Machine code and classes are kept there, which are run without a further look. The cache folder is that of
-    SUAVE_DES_CACHE_DIR, or where the system keeps such things; where it cannot be used, as without a home folder, a
-    temporary one takes its place, for this process and those that it starts; this is said once. None if there is
-    neither.
+    Machine code and classes are kept there, which are run without a further look. The cache folder
+    is that of SUAVE_DES_CACHE_DIR, or where the system keeps such things; where it cannot be used,
+    as without a home folder, a temporary one takes its place, for this process and those that it
+    starts; this is said once. None if there is neither.
     """
     try:
         chosen = os.environ.get(_CACHE_VARIABLE)
-        return _private((Path(chosen) if chosen else user_cache_path("suave-des", appauthor=False)) / kind)
+        return _private(
+            (Path(chosen) if chosen else user_cache_path("suave-des", appauthor=False)) / kind
+        )
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder
         reason = getattr(error, "strerror", None) or str(error)
     folder = Path(tempfile.gettempdir()) / f"suave-des-{os.getuid()}"
@@ -45,12 +49,17 @@ def private_cache(kind: str) -> Path | None:
     except OSError:
         return None
     os.environ[_CACHE_VARIABLE] = str(folder)
-    print(f"suave-des: the cache folder cannot be used ({reason}); {folder} is used instead", file=sys.stderr)
+    print(
+        f"suave-des: the cache folder cannot be used ({reason}); {folder} is used instead",
+        file=sys.stderr,
+    )
     return private
 
 
 def _private(folder: Path) -> Path:
-    """Make a folder that only this user may enter, if need be; an OSError if it is a link, or somebody else's."""
+    """Make a folder that only this user may enter, if need be; an OSError if it is a link, or
+    somebody else's.
+    """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
@@ -65,12 +74,15 @@ def _private(folder: Path) -> Path:
 class SharedEntries:
     """Values by key, in a file that several processes extend without locks.
 
-    Each entry is a line of JSON with a checksum, appended with a single write: a line that two processes mangled, or
-    that was cut short, is left out when it is read. Nothing in a file is ever executed.
+    Each entry is a line of JSON with a checksum, appended with a single write: a line that two
+    processes mangled, or that was cut short, is left out when it is read. Nothing in a file is ever
+    executed.
 
     Args:
-        folder: that has the file; None: nothing is kept. So it is where the folder cannot be written to.
-        digest: identifies all that the entries depend on; it names the file, and is part of the checksums.
+        folder: that has the file; None: nothing is kept. So it is where the folder cannot be
+            written to.
+        digest: identifies all that the entries depend on; it names the file, and is part of the
+            checksums.
     """
 
     def __init__(self, folder: Path | None, digest: str) -> None:
@@ -107,7 +119,9 @@ class SharedEntries:
             finally:
                 os.close(handle)
             if size == 0:
-                files = sorted(self._path.parent.glob("*.jsonl"), key=lambda path: path.stat().st_mtime)
+                files = sorted(
+                    self._path.parent.glob("*.jsonl"), key=lambda path: path.stat().st_mtime
+                )
                 for path in files[:-MAX_FILES]:
                     path.unlink(missing_ok=True)
 

@@ -1,7 +1,8 @@
-"""Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, calls at one, alarms.
+"""Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, calls at one,
+alarms.
 
-Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and resets
-it. This module alone uses callbacks and SimPy's private fields.
+Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an
+alarm, and resets it. This module alone uses callbacks and SimPy's private fields.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ Process = Generator[simpy.Event, Any, None]
 
 
 def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
-    """First tick of a timer (phase, phase + period, ...) that is not before t; a rounding error counts as on time."""
+    """First tick of a timer (phase, phase + period, ...) that is not before t; a rounding error
+    counts as on time.
+    """
     return phase_s + max(0, math.ceil((t_s - phase_s) / period_s - 1e-9)) * period_s
 
 
@@ -30,7 +33,9 @@ def summed_tick(t_s: float, due_s: float, period_s: float) -> float:
 
 
 def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
-    """An event at mission time t itself; a delay added to the current time may miss it by rounding."""
+    """An event at mission time t itself; a delay added to the current time may miss it by
+    rounding.
+    """
     event = simpy.Event(env)
     event._ok, event._value = True, None
     heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
@@ -50,7 +55,9 @@ def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], Any]) -> 
 
 
 def call_next(env: simpy.Environment, callback: Callable[[], None]) -> None:
-    """Call a function when the current event is over and before any other, as SimPy does with interrupts."""
+    """Call a function when the current event is over and before any other, as SimPy does with
+    interrupts.
+    """
     event = simpy.Event(env)
     event.callbacks.append(lambda _: callback())
     event._ok, event._value = True, None
@@ -58,9 +65,11 @@ def call_next(env: simpy.Environment, callback: Callable[[], None]) -> None:
 
 
 def advance(env: simpy.Environment, t_s: float) -> None:
-    """Process all events before mission time t, and go there; stop at the event of the mission's end.
+    """Process all events before mission time t, and go there; stop at the event of the mission's
+    end.
 
-    This is `env.run(until=t_s)`, which takes 8 us more for its own event: a third of a step of an environment.
+    This is `env.run(until=t_s)`, which takes 8 us more for its own event: a third of a step of an
+    environment.
     """
     queue, step = env._queue, env.step
     try:
@@ -90,7 +99,9 @@ class Alarm:
         self._pending: simpy.Event | None = None
 
     def set(self, t_s: float, *, exactly: bool = False) -> None:
-        """Call the function at mission time t (see `exactly_at`), or as the next thing now if t has passed."""
+        """Call the function at mission time t (see `exactly_at`), or as the next thing now if t has
+        passed.
+        """
         self._pending = event = (exactly_at if exactly else until)(self._env, t_s)
         event.callbacks.append(self._ring)
 

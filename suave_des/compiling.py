@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from suave_des.caches import private_cache
 from suave_des.imports import hidden
 
-# What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg, which takes 0.2 s and
-# is used by no inner loop. There is one, as scipy is installed; what uses it imports it then.
+# What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg,
+# which takes 0.2 s and is used by no inner loop. There is one, as scipy is installed; what uses it
+# imports it then.
 with hidden("scipy.linalg"):
     from numba.np import arraymath
 arraymath._HAVE_BLAS = True
@@ -32,19 +33,25 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled(function: _F) -> _F:
-    """Compile a function of arrays and numbers on its first call (division by zero gives inf or nan, as in numpy)."""
+    """Compile a function of arrays and numbers on its first call (division by zero gives inf or
+    nan, as in numpy).
+    """
     dispatcher: Any = numba.njit(error_model="numpy")(function)
-    with suppress(RuntimeError):  # no folder to keep machine code in: it is compiled in each process
+    with suppress(
+        RuntimeError
+    ):  # no folder to keep machine code in: it is compiled in each process
         dispatcher._cache = _CodeCache(function)
     return cast(_F, dispatcher)
 
 
-# The cache, by private interfaces of numba: its own stops a process at a damaged file or a full disk, runs damaged
-# machine code, and is beside the sources, which others may own.
+# The cache, by private interfaces of numba: its own stops a process at a damaged file or a full
+# disk, runs damaged machine code, and is beside the sources, which others may own.
 
 
 class _CodeCache(caching.FunctionCache):
-    """Keeps machine code in the user's cache folder; what is damaged there, or cannot be kept, is compiled again."""
+    """Keeps machine code in the user's cache folder; what is damaged there, or cannot be kept, is
+    compiled again.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         if not os.environ.get("NUMBA_CACHE_DIR"):
@@ -55,10 +62,14 @@ class _CodeCache(caching.FunctionCache):
             config.CACHE_DIR = str(folder)
         super().__init__(function)
         plain = self._cache_file
-        self._cache_file = _CheckedFile(self._cache_path, self._impl.filename_base, plain._source_stamp)
+        self._cache_file = _CheckedFile(
+            self._cache_path, self._impl.filename_base, plain._source_stamp
+        )
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Load the machine code for a signature; None if there is none, or none that can be used."""
+        """Load the machine code for a signature; None if there is none, or none that can be
+        used.
+        """
         try:
             return super().load_overload(signature, target_context)
         except Exception:  # whatever a file that another version of numba has written leads to

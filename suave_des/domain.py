@@ -1,4 +1,6 @@
-"""Facts of the exemplar that several packages share: the depth of the water, and the mission's functions and tasks."""
+"""Facts of the exemplar that several packages share: the depth of the water, and the mission's
+functions and tasks.
+"""
 
 from dataclasses import dataclass
 
@@ -19,7 +21,9 @@ MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 """Functions that the mission's two tasks need, so that a modes file must have them."""
 
 DEFAULT_MODE, UNGROUND_MODE = "__DEFAULT__", "fd_unground"
-"""The mode that a function's node starts with, and the one that a cancelled task sets; no function designs."""
+"""The mode that a function's node starts with, and the one that a cancelled task sets; no function
+designs.
+"""
 
 MANAGER_GROUP = "suave_des.managers"
 

@@ -1,4 +1,6 @@
-"""What is random in one mission: each random quantity has a stream of its own, so that adding one changes no other."""
+"""What is random in one mission: each random quantity has a stream of its own, so that adding one
+changes no other.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,9 @@ from suave_des.scenario.models import Distribution, Drawn, Scenario, draw
 class Streams:
     """The random streams of one run of a campaign.
 
-    A stream depends on the campaign's seed, the run's number and its own name only: not on the manager, so that runs
-    with the same number use common random numbers, and not on which other streams exist or in which order they are
-    created.
+    A stream depends on the campaign's seed, the run's number and its own name only: not on the
+    manager, so that runs with the same number use common random numbers, and not on which other
+    streams exist or in which order they are created.
 
         visibility = Streams(seed=1, run=7).stream("visibility")
     """
@@ -38,7 +40,8 @@ class Draws(Streams):
     Args:
         seed: the campaign's.
         run: number of the run, from 1.
-        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
+        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path
+            is not in it.
         numbers: keeps the plain numbers by key path, for other runs of the same scenario.
 
     Attributes:
@@ -46,30 +49,51 @@ class Draws(Streams):
     """
 
     def __init__(
-        self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int], numbers: dict[str, float]
+        self,
+        scenario: Scenario,
+        seed: int,
+        run: int,
+        runs_per_draw: Mapping[str, int],
+        numbers: dict[str, float],
     ) -> None:
         super().__init__(seed, run)
         self._numbers = numbers
-        self._scenario, self._seed, self._run, self._runs_per_draw = scenario, seed, run, runs_per_draw
+        self._scenario, self._seed, self._run, self._runs_per_draw = (
+            scenario,
+            seed,
+            run,
+            runs_per_draw,
+        )
         self.drawn: dict[str, float] = {}
 
-    def value(self, key: str, distribution: Distribution | None = None, least: float = -math.inf) -> float:
+    def value(
+        self, key: str, distribution: Distribution | None = None, least: float = -math.inf
+    ) -> float:
         """Draw the run's value for a key of the scenario.
 
         Args:
-            key: key path, which names the stream; after a slash, whose value it is, if several have one.
+            key: key path, which names the stream; after a slash, whose value it is, if several have
+                one.
             distribution: None: the scenario's entry at that path.
             least: values below count as this.
         """
         value = self._numbers.get(key)
         if value is None:
-            found = attrgetter(key.partition("/")[0])(self._scenario) if distribution is None else distribution
+            found = (
+                attrgetter(key.partition("/")[0])(self._scenario)
+                if distribution is None
+                else distribution
+            )
             if isinstance(found, float):
                 value = self._numbers[key] = max(least, found)
             else:
                 shared_by = self._runs_per_draw.get(key, 1)
-                first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
-                value = max(least, found.draw(Streams(self._seed, first).stream(_stream_name(key, found))))
+                first = (
+                    self._run - 1
+                ) // shared_by * shared_by + 1  # of the runs that share the value
+                value = max(
+                    least, found.draw(Streams(self._seed, first).stream(_stream_name(key, found)))
+                )
         self.drawn[key] = value
         return value
 
@@ -81,10 +105,14 @@ class Draws(Streams):
         return lambda: draw(distribution, stream)
 
     def phase(self, timer: str, period_s: float) -> float:
-        """Draw the phase of a periodic timer: nodes start at arbitrary times, others in each run."""
+        """Draw the phase of a periodic timer: nodes start at arbitrary times, others in each
+        run.
+        """
         return self.stream(f"phase/{timer}").random() * period_s
 
 
 def _stream_name(key: str, distribution: Drawn) -> str:
-    """Name the stream that a key's values are drawn from: its own, or that of a draw that several keys share."""
+    """Name the stream that a key's values are drawn from: its own, or that of a draw that several
+    keys share.
+    """
     return key if distribution.shared is None else f"shared/{distribution.shared}"

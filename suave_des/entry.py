@@ -1,6 +1,7 @@
 """The command's entry point: from its first line on, Ctrl-C and kill end it without a traceback.
 
-While the command's modules are imported nothing has begun, so it ends at once. Later `suave_des.cli.main` sees to it.
+While the command's modules are imported nothing has begun, so it ends at once. Later
+`suave_des.cli.main` sees to it.
 """
 
 import signal

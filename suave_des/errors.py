@@ -1,4 +1,6 @@
-"""Errors for the user: each names the place, the problem, and the remedy; and findings, which are told, not raised."""
+"""Errors for the user: each names the place, the problem, and the remedy; and findings, which are
+told, not raised.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +29,18 @@ class InputError(SuaveDesError):
     Args:
         problem: what is wrong, with the offending value.
         file: that contains it, if there is one.
-        place: where in the file: "line 12", a key path such as "signals.water_visibility.period_s", or both.
+        place: where in the file: "line 12", a key path such as "signals.water_visibility.period_s",
+            or both.
         remedy: how to correct it.
     """
 
     def __init__(
-        self, problem: str, *, file: Path | str | None = None, place: str | None = None, remedy: str | None = None
+        self,
+        problem: str,
+        *,
+        file: Path | str | None = None,
+        place: str | None = None,
+        remedy: str | None = None,
     ) -> None:
         self.problem = problem
         self.file = None if file is None else str(file)
@@ -60,8 +68,8 @@ class MissionError(SuaveDesError):
         self.run = run
         self.time_s = time_s
         self.cause = cause
-        # With all parts as arguments the error survives SimPy, which copies what a process raised by calling its class
-        # with them, and the trip from a worker process to its parent.
+        # With all parts as arguments the error survives SimPy, which copies what a process raised
+        # by calling its class with them, and the trip from a worker process to its parent.
         super().__init__(manager, run, time_s, cause)
 
     def __str__(self) -> str:
@@ -70,7 +78,8 @@ class MissionError(SuaveDesError):
 
 
 class MissionTimeOut(BaseException):
-    """A mission took too long; not an Exception, so that a manager that catches those does not catch this.
+    """A mission took too long; not an Exception, so that a manager that catches those does not
+    catch this.
 
     Attributes:
         time_s: mission time that was reached; None where that is not known.
@@ -88,15 +97,28 @@ def line_error(file: Path, line: int, problem: str, remedy: str | None = None) -
 
 
 @contextmanager
-def located(before: str = "", file: Path | str | None = None, place: str | None = None) -> Iterator[None]:
-    """Give errors of the block a file or a place, in place of their own, and begin their problems with a text."""
+def located(
+    before: str = "", file: Path | str | None = None, place: str | None = None
+) -> Iterator[None]:
+    """Give errors of the block a file or a place, in place of their own, and begin their problems
+    with a text.
+    """
     try:
         yield
     except InputError as error:
-        raise InputError(f"{before}{error.problem}", file=file, place=place, remedy=error.remedy) from None
+        raise InputError(
+            f"{before}{error.problem}", file=file, place=place, remedy=error.remedy
+        ) from None
 
 
-_WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}
+_WRITTEN = {
+    "None": "nothing",
+    "True": "true",
+    "False": "false",
+    "inf": ".inf",
+    "-inf": "-.inf",
+    "nan": ".nan",
+}
 
 
 def shown(value: object, limit: int = 60) -> str:
@@ -120,7 +142,9 @@ def with_article(noun: str) -> str:
 
 
 def similar(word: object, known: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """Find the known name that is most similar to a word, from `cutoff` on (1: the same); None if none is."""
+    """Find the known name that is most similar to a word, from `cutoff` on (1: the same); None if
+    none is.
+    """
     found = difflib.get_close_matches(str(word), sorted(known), n=1, cutoff=cutoff)
     return found[0] if found else None
 
@@ -139,7 +163,9 @@ def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str
     return f"did you mean {near!r}? {listing}" if near else listing
 
 
-def unknown(problem: str, word: object, known: Iterable[str], what: str = "known", place: str = "") -> InputError:
+def unknown(
+    problem: str, word: object, known: Iterable[str], what: str = "known", place: str = ""
+) -> InputError:
     """Make the error for a misspelt word; its remedy is that of did_you_mean."""
     return InputError(problem, place=place or None, remedy=did_you_mean(word, known, what))
 
@@ -148,7 +174,9 @@ def unknown(problem: str, word: object, known: Iterable[str], what: str = "known
 
 
 class Level(StrEnum):
-    """Severity: an ERROR does not work as written, a WARN probably does not, a NOTE is worth knowing."""
+    """Severity: an ERROR does not work as written, a WARN probably does not, a NOTE is worth
+    knowing.
+    """
 
     ERROR = "ERROR"
     WARN = "WARN"
@@ -183,7 +211,9 @@ class Finding:
         found = (re.search(pattern, error.place or "") for pattern in patterns)
         line, column, rule = (match[1] if match else None for match in found)
         line_number, column_number = (int(number) if number else None for number in (line, column))
-        return cls(Level.ERROR, error.problem, error.file, line_number, rule, column_number, error.remedy)
+        return cls(
+            Level.ERROR, error.problem, error.file, line_number, rule, column_number, error.remedy
+        )
 
     @property
     def where(self) -> str:
@@ -199,12 +229,23 @@ class Finding:
 
 
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Sort findings by severity, the worst first, then by place; drop duplicates, and shorten paths."""
+    """Sort findings by severity, the worst first, then by place; drop duplicates, and shorten
+    paths.
+    """
 
     def key(one: Finding) -> tuple[object, ...]:
-        return _SEVERITY[one.level], one.file or "", one.line or 0, one.rule or "", one.column or 0, str(one)
+        return (
+            _SEVERITY[one.level],
+            one.file or "",
+            one.line or 0,
+            one.rule or "",
+            one.column or 0,
+            str(one),
+        )
 
-    shortened = (replace(one, file=relative_path(one.file) if one.file else None) for one in findings)
+    shortened = (
+        replace(one, file=relative_path(one.file) if one.file else None) for one in findings
+    )
     return tuple(sorted(dict.fromkeys(shortened), key=key))
 
 
@@ -222,4 +263,8 @@ def summary(findings: Sequence[Finding]) -> str:
 def relative_path(path: Path | str) -> str:
     """A path, relative to the current folder if it is in it."""
     whole = Path(path)
-    return str(whole.relative_to(Path.cwd())) if whole.is_absolute() and whole.is_relative_to(Path.cwd()) else str(path)
+    return (
+        str(whole.relative_to(Path.cwd()))
+        if whole.is_absolute() and whole.is_relative_to(Path.cwd())
+        else str(path)
+    )

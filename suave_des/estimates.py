@@ -51,21 +51,35 @@ class Estimate:
         return replace(self, value=-self.value, low=-self.high, high=-self.low)
 
     def text(self, style: str, scale: float = 1.0) -> str:
-        """Write the interval, with its ends in a number format and multiplied by a scale; empty if there is none."""
-        return f"{scale * self.low:{style}} to {scale * self.high:{style}}" if self.has_interval else ""
+        """Write the interval, with its ends in a number format and multiplied by a scale; empty if
+        there is none.
+        """
+        return (
+            f"{scale * self.low:{style}} to {scale * self.high:{style}}"
+            if self.has_interval
+            else ""
+        )
 
     def cut(self, lowest: float, highest: float) -> Estimate:
         """Cut the interval off at the limits of what is estimated, such as those of a share."""
-        return replace(self, low=max(self.low, lowest), high=min(self.high, highest)) if self.has_interval else self
+        return (
+            replace(self, low=max(self.low, lowest), high=min(self.high, highest))
+            if self.has_interval
+            else self
+        )
 
     def columns(self, name: str) -> dict[str, float | None]:
-        """Return the three columns of a file that have the value and the ends of its interval, by their names."""
+        """Return the three columns of a file that have the value and the ends of its interval, by
+        their names.
+        """
         values = (self.value, self.low, self.high)
         return dict(zip((name, *interval_names(name)), map(known, values), strict=True))
 
 
 def interval_names(name: str) -> tuple[str, str]:
-    """Return the names of the columns that have the ends of the interval of a value in result files."""
+    """Return the names of the columns that have the ends of the interval of a value in result
+    files.
+    """
     return f"{name}_ci95_low", f"{name}_ci95_high"
 
 
@@ -91,7 +105,8 @@ def mean_of(values: Sequence[float], groups: Sequence[int] | None = None) -> Est
 
     Args:
         values: the sample; their order makes no difference, as they are summed exactly.
-        groups: the number of each value's group, if values of a group are alike; groups are then what is independent.
+        groups: the number of each value's group, if values of a group are alike; groups are then
+            what is independent.
     """
     n = len(values)
     if n == 0:
@@ -105,10 +120,12 @@ def mean_of(values: Sequence[float], groups: Sequence[int] | None = None) -> Est
 
 
 def _half_width_over(groups: Sequence[int], values: Sequence[float], mean: float) -> float:
-    """Return half the width of the 95% interval of a mean over groups of values; nan for fewer than two.
+    """Return half the width of the 95% interval of a mean over groups of values; nan for fewer than
+    two.
 
-    It is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t. A few groups
-    may have equal means by chance, so `mean_of` never takes it to be narrower than that of independent values.
+    It is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with
+    Student's t. A few groups may have equal means by chance, so `mean_of` never takes it to be
+    narrower than that of independent values.
     """
     totals = dict.fromkeys(groups, 0.0)
     for value, group in zip(values, groups, strict=True):
@@ -123,7 +140,8 @@ def _half_width_over(groups: Sequence[int], values: Sequence[float], mean: float
 def std_of(values: Sequence[float]) -> Estimate:
     """Estimate the standard deviation (n - 1) of a sample of two values or more.
 
-    Its interval by chi-square assumes values that are normally distributed, and is a rough guide where they are not.
+    Its interval by chi-square assumes values that are normally distributed, and is a rough guide
+    where they are not.
     """
     from scipy.special import chdtri  # scipy.stats would take a second to import
 
@@ -131,7 +149,9 @@ def std_of(values: Sequence[float]) -> Estimate:
     if n < 2:
         return Estimate(method=CHI_SQUARE)
     std, tail = _std(values, math.fsum(values) / n), (1.0 - CONFIDENCE) / 2.0
-    low, high = (std * math.sqrt((n - 1) / float(chdtri(n - 1, share))) for share in (tail, 1.0 - tail))
+    low, high = (
+        std * math.sqrt((n - 1) / float(chdtri(n - 1, share))) for share in (tail, 1.0 - tail)
+    )
     return Estimate(std, low, high, CHI_SQUARE)
 
 
@@ -150,7 +170,9 @@ def share_of(count: int, n: int, method: Literal["wilson", "exact"] = "wilson") 
 
 
 def t_quantile(freedom: int) -> float:
-    """Return half the width of the 95% interval of Student's t with that many degrees of freedom."""
+    """Return half the width of the 95% interval of Student's t with that many degrees of
+    freedom.
+    """
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, (1.0 + CONFIDENCE) / 2.0))

@@ -1,4 +1,6 @@
-"""Files that the user named: read within limits; checked before the work, and written whole or not at all."""
+"""Files that the user named: read within limits; checked before the work, and written whole or not
+at all.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
         "knowledge_states.jsonl",
     ),
 }
-"""Names of result files by kind; a folder has those of one family, so that nothing in it is misread."""
+"""Names of result files by kind; a folder has those of one family, so that nothing in it is
+misread.
+"""
 
 DECIMALS = 6
 """Digits after the point in result files."""
@@ -72,11 +76,15 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_bytes(path: Path, limit: int = LIMIT_BYTES) -> bytes:
-    """Read a file that the user named; raises as `opened`, and if it is longer than `limit` bytes."""
+    """Read a file that the user named; raises as `opened`, and if it is longer than `limit`
+    bytes.
+    """
     with opened(path) as stream:
         content = stream.read(limit + 1)
     if len(content) > limit:
-        raise InputError(f"is larger than {limit:,} bytes", file=path, remedy="split it or shorten it")
+        raise InputError(
+            f"is larger than {limit:,} bytes", file=path, remedy="split it or shorten it"
+        )
     return content
 
 
@@ -86,7 +94,8 @@ def sha256_of(path: Path, limit: int = LIMIT_BYTES) -> str:
 
 
 def check_own(paths: Iterable[Path]) -> None:
-    """Check that files that are to be changed in place are that: a link or a pipe may lead to anything.
+    """Check that files that are to be changed in place are that: a link or a pipe may lead to
+    anything.
 
     Raises:
         InputError: one of those that are there is a link, has a second name, or is no file.
@@ -100,7 +109,11 @@ def check_own(paths: Iterable[Path]) -> None:
             path,
             (stat.S_ISLNK(found.st_mode), "is a link, which is not followed", "remove it"),
             (not stat.S_ISREG(found.st_mode), "is not a regular file", "remove it"),
-            (found.st_nlink > 1, "is a hard link: another file would change with it", "remove it, or copy the folder"),
+            (
+                found.st_nlink > 1,
+                "is a hard link: another file would change with it",
+                "remove it, or copy the folder",
+            ),
         )
 
 
@@ -110,26 +123,37 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is not JSON: {error}", file=path, remedy="restore it, or make it anew") from None
+        raise InputError(
+            f"is not JSON: {error}", file=path, remedy="restore it, or make it anew"
+        ) from None
 
 
 def decode(path: Path, content: bytes) -> str:
-    """Decode the content of a file as text, without byte order mark; an InputError has the line that is not UTF-8."""
+    """Decode the content of a file as text, without byte order mark; an InputError has the line
+    that is not UTF-8.
+    """
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from None
+        raise InputError(
+            "is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8"
+        ) from None
 
 
-def read_csv(path: Path, limit: int, remedy: str) -> tuple[list[str], Iterator[tuple[int, list[str]]], str]:
-    """Read a CSV file of at most `limit` bytes that the user named; `remedy` is for a line that is not CSV.
+def read_csv(
+    path: Path, limit: int, remedy: str
+) -> tuple[list[str], Iterator[tuple[int, list[str]]], str]:
+    """Read a CSV file of at most `limit` bytes that the user named; `remedy` is for a line that is
+    not CSV.
 
     Returns:
-        Its header, its rows, each with its line, read as they are requested and without empty ones, and its SHA-256.
+        Its header, its rows, each with its line, read as they are requested and without empty ones,
+        and its SHA-256.
 
     Raises:
-        InputError: as of read_bytes and decode; or with the line, when its turn comes, that it is not CSV.
+        InputError: as of read_bytes and decode; or with the line, when its turn comes, that it is
+            not CSV.
     """
     content = read_bytes(path, limit)
     reader = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
@@ -157,11 +181,15 @@ def as_number(text: str) -> float:
 
 def rounded(value: _Cell) -> _Cell:
     """Round a number as in result files; what is no float stays."""
-    return round(value, DECIMALS) + 0.0 if isinstance(value, float) else value  # + 0.0: no minus before a zero
+    return (
+        round(value, DECIMALS) + 0.0 if isinstance(value, float) else value
+    )  # + 0.0: no minus before a zero
 
 
 def cell(value: object) -> object:
-    """Return a value as in a CSV file: numbers rounded and in their shortest form, True or False, empty for None."""
+    """Return a value as in a CSV file: numbers rounded and in their shortest form, True or False,
+    empty for None.
+    """
     return repr(rounded(value)) if isinstance(value, float) else value
 
 
@@ -171,12 +199,16 @@ def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def csv_pieces(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    """Yield a CSV file as csv_text returns it, piece by piece, so that few of its rows are in memory."""
+    """Yield a CSV file as csv_text returns it, piece by piece, so that few of its rows are in
+    memory.
+    """
     rest = iter(rows)
     part: list[Sequence[object]] = [columns]
     while part:
         buffer = io.StringIO()
-        csv.writer(buffer, lineterminator="\n").writerows([cell(value) for value in row] for row in part)
+        csv.writer(buffer, lineterminator="\n").writerows(
+            [cell(value) for value in row] for row in part
+        )
         yield buffer.getvalue()
         part = list(islice(rest, _PIECE_ROWS))
 
@@ -187,7 +219,11 @@ def json_text(content: Mapping[str, Any]) -> str:
 
 
 def check_output_folder(
-    folder: Path, family: str, *, overwrite: bool, left_over: Callable[[str], bool] = lambda name: False
+    folder: Path,
+    family: str,
+    *,
+    overwrite: bool,
+    left_over: Callable[[str], bool] = lambda name: False,
 ) -> None:
     """Check that results can go into a folder, without changing anything.
 
@@ -197,8 +233,8 @@ def check_output_folder(
         left_over: returns whether a file of that name does not count.
 
     Raises:
-        InputError: it is not empty and `overwrite` is false, has results of another family, is a file, or cannot be
-            written.
+        InputError: it is not empty and `overwrite` is false, has results of another family, is a
+            file, or cannot be written.
     """
     with _user_errors(folder):
         entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
@@ -208,14 +244,28 @@ def check_output_folder(
         known = min((name for name in names if name in entries), default=None)
         if other != family and known is not None:
             problem = f"the output folder has a {other}'s results in it ({known}), which this command does not replace"
-            raise InputError(problem, file=folder, remedy="give another folder, or remove them first")
+            raise InputError(
+                problem, file=folder, remedy="give another folder, or remove them first"
+            )
     may_be_written = os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK)
     not_empty = f"the output folder is not empty: it has {found}"
     _check(
         folder,
-        (found and not overwrite, not_empty, "give another folder, or --overwrite to replace the results in it"),
-        (is_there and not folder.is_dir(), "the output folder is not a folder", "give another path"),
-        (not (is_there or has_parent), f"there is no folder {folder.parent} to make it in", "make that folder first"),
+        (
+            found and not overwrite,
+            not_empty,
+            "give another folder, or --overwrite to replace the results in it",
+        ),
+        (
+            is_there and not folder.is_dir(),
+            "the output folder is not a folder",
+            "give another path",
+        ),
+        (
+            not (is_there or has_parent),
+            f"there is no folder {folder.parent} to make it in",
+            "make that folder first",
+        ),
         (not may_be_written, "the output folder cannot be written", "give a folder that is yours"),
     )
 
@@ -224,20 +274,34 @@ def check_output_file(file: Path, *, overwrite: bool) -> None:
     """Check that a file can be written, without changing anything.
 
     Raises:
-        InputError: it is a folder, its folder does not exist or cannot be written, or it exists and `overwrite` is
-            false.
+        InputError: it is a folder, its folder does not exist or cannot be written, or it exists and
+            `overwrite` is false.
     """
     _check(
         file,
         (not file.name or file.is_dir(), "is a folder", "name a file in it"),
-        (not file.parent.is_dir(), f"there is no folder {file.parent} to write it in", "make it first"),
-        (not os.access(file.parent, os.W_OK | os.X_OK), "its folder cannot be written", "give one that is yours"),
-        (file.exists() and not overwrite, "exists already", "give another name, or --overwrite to replace it"),
+        (
+            not file.parent.is_dir(),
+            f"there is no folder {file.parent} to write it in",
+            "make it first",
+        ),
+        (
+            not os.access(file.parent, os.W_OK | os.X_OK),
+            "its folder cannot be written",
+            "give one that is yours",
+        ),
+        (
+            file.exists() and not overwrite,
+            "exists already",
+            "give another name, or --overwrite to replace it",
+        ),
     )
 
 
 def _check(path: Path, *cases: tuple[object, str, str]) -> None:
-    """Raise an error for the first case, of condition, problem and remedy, whose condition holds."""
+    """Raise an error for the first case, of condition, problem and remedy, whose condition
+    holds.
+    """
     for is_wrong, problem, remedy in cases:
         if is_wrong:
             raise InputError(problem, file=path, remedy=remedy)
@@ -250,7 +314,8 @@ def make_output_folder(folder: Path) -> None:
 
 
 def remove_results(folder: Path, names: Collection[str], *, parts_only: bool = False) -> None:
-    """Remove the unfinished files of these names that a process left when it was killed; and all files of a campaign.
+    """Remove the unfinished files of these names that a process left when it was killed; and all
+    files of a campaign.
 
     These are the ones named, and those made from them; they stay if `parts_only`.
 
@@ -259,20 +324,28 @@ def remove_results(folder: Path, names: Collection[str], *, parts_only: bool = F
     """
     with _user_errors(folder):
         parts = (part for name in names for part in folder.glob(f".{name}.*{_PART}"))
-        for path in (*parts, *(() if parts_only else (folder / name for name in (*names, *DERIVED)))):
+        for path in (
+            *parts,
+            *(() if parts_only else (folder / name for name in (*names, *DERIVED))),
+        ):
             path.unlink(missing_ok=True)
 
 
 def _utf8(text: str) -> bytes:
-    """Encode text as UTF-8; a path's bytes that are no UTF-8 are written as escapes, which JSON reads back."""
+    """Encode text as UTF-8; a path's bytes that are no UTF-8 are written as escapes, which JSON
+    reads back.
+    """
     return text.encode(errors="backslashreplace")
 
 
-def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()) -> None:
+def write_files(
+    folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()
+) -> None:
     """Write files under temporary names, and rename them when all are complete.
 
     Args:
-        files: content by name, in an existing folder; text is written as UTF-8, pieces of it one after the other.
+        files: content by name, in an existing folder; text is written as UTF-8, pieces of it one
+            after the other.
         stale: names of files of an earlier use of the folder, removed unless they are written anew.
 
     Raises:

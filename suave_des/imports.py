@@ -13,7 +13,9 @@ _one_at_a_time: Final = threading.RLock()
 
 @contextmanager
 def hidden(module: str) -> Iterator[None]:
-    """Hide a module from imports in the block, as if it were not installed, unless it is loaded already."""
+    """Hide a module from imports in the block, as if it were not installed, unless it is loaded
+    already.
+    """
     with _one_at_a_time:
         if module in sys.modules:
             yield

@@ -1,4 +1,6 @@
-"""Ctrl-C and kill: raised as one exception that ends a command in good order, and deferred where it must not."""
+"""Ctrl-C and kill: raised as one exception that ends a command in good order, and deferred where it
+must not.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +23,16 @@ _Handler = Callable[[int, FrameType | None], object]
 class Stopped(KeyboardInterrupt):
     """A signal asked this process to stop.
 
-    A class of its own for Ctrl-C, too: Python ends as if Ctrl-C had never been caught when a plain KeyboardInterrupt
-    was raised during certain imports.
+    A class of its own for Ctrl-C, too: Python ends as if Ctrl-C had never been caught when a plain
+    KeyboardInterrupt was raised during certain imports.
     """
 
 
 @contextmanager
 def signals_raised() -> Iterator[None]:
-    """Raise Stopped in the block on signals that ask to stop, unless this process was started to ignore them."""
+    """Raise Stopped in the block on signals that ask to stop, unless this process was started to
+    ignore them.
+    """
     _received.clear()
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -42,7 +46,9 @@ def signals_raised() -> Iterator[None]:
 
 
 def not_ignored() -> list[int]:
-    """Return the signals that ask to stop, without those that this process was started to ignore."""
+    """Return the signals that ask to stop, without those that this process was started to
+    ignore.
+    """
     return [number for number in INTERRUPTS if signal.getsignal(number) is not signal.SIG_IGN]
 
 
@@ -61,8 +67,9 @@ def handled(numbers: Iterable[int], handler: _Handler) -> Iterator[None]:
 def _repeated_if_lost() -> Iterator[None]:
     """Send a signal again when the exception that it raised was lost.
 
-    Exceptions are ignored in a __del__, and in Python code that compiled code has called, as numba's does. Of a process
-    that was stopped nothing is reported: objects that the signal left half made fail in their __del__ while it ends.
+    Exceptions are ignored in a __del__, and in Python code that compiled code has called, as
+    numba's does. Of a process that was stopped nothing is reported: objects that the signal left
+    half made fail in their __del__ while it ends.
     """
     timers: list[threading.Timer] = []
     report = sys.unraisablehook
@@ -93,11 +100,12 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 @contextmanager
 def ends_at_once(limit_s: float, message: str) -> Iterator[None]:
-    """End the process at once when the block takes longer than a time, or when a signal asks to stop.
+    """End the process at once when the block takes longer than a time, or when a signal asks to
+    stop.
 
-    For a block that nothing is lost with, and that swallows exceptions or spends long in compiled code: evaluation of
-    regular expressions lets signals through, but not other threads. When the time is over, the message is printed, and
-    the exit status is 2.
+    For a block that nothing is lost with, and that swallows exceptions or spends long in compiled
+    code: evaluation of regular expressions lets signals through, but not other threads. When the
+    time is over, the message is printed, and the exit status is 2.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -107,13 +115,19 @@ def ends_at_once(limit_s: float, message: str) -> Iterator[None]:
         os.write(2, f"suave-des: {message}\n".encode())
         os._exit(2)
 
-    with handled([signal.SIGALRM], end_late), handled(not_ignored(), end_interrupted), alarm(limit_s):
+    with (
+        handled([signal.SIGALRM], end_late),
+        handled(not_ignored(), end_interrupted),
+        alarm(limit_s),
+    ):
         yield
 
 
 @contextmanager
 def alarm(seconds: float, repeat_s: float = 0.0) -> Iterator[None]:
-    """Send this process SIGALRM when the block takes longer than a time, and again at intervals, unless these are 0."""
+    """Send this process SIGALRM when the block takes longer than a time, and again at intervals,
+    unless these are 0.
+    """
     signal.setitimer(signal.ITIMER_REAL, seconds, repeat_s)
     try:
         yield
@@ -146,8 +160,9 @@ def exit_status() -> int:
 def signals_deferred() -> Iterator[None]:
     """Defer Ctrl-C and kill to the end of the block, if Python handles them at all.
 
-    Blocking them would not do: the system delivers them to any thread that does not block them, those of numpy among
-    them, and Python then interrupts the main thread all the same. Processes started meanwhile do not inherit this.
+    Blocking them would not do: the system delivers them to any thread that does not block them,
+    those of numpy among them, and Python then interrupts the main thread all the same. Processes
+    started meanwhile do not inherit this.
     """
     if threading.current_thread() is not threading.main_thread():  # others are not interrupted
         yield

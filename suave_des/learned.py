@@ -25,7 +25,8 @@ class Learned:
     Attributes:
         scenario: name of the scenario that the manager was trained on.
         missions: number of missions, runs 1 to that.
-        inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
+        inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's
+            code among them.
         learned: what the manager's hook `recall` was given, and has changed.
     """
 
@@ -44,20 +45,28 @@ class Learned:
             return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
         except (TypeError, ValueError, RecursionError) as error:
             remedy = "it may have text, finite numbers, True, False, None, lists, and dicts by text"
-            raise InputError(f"what {self.manager} has learned cannot be written: {error}", remedy=remedy) from None
+            raise InputError(
+                f"what {self.manager} has learned cannot be written: {error}", remedy=remedy
+            ) from None
 
 
 def read_file(path: Path) -> Learned:
-    """Read the file that training wrote; an InputError if it cannot be read, or is something else."""
+    """Read the file that training wrote; an InputError if it cannot be read, or is something
+    else.
+    """
     with suppress(AttributeError, TypeError, ValueError, RecursionError):
         content = json.loads(read_bytes(path, _LIMIT_BYTES))
         if content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
             return Learned(**content)
-    raise InputError("is not a file that suave-des train has written", file=path, remedy="give one that is")
+    raise InputError(
+        "is not a file that suave-des train has written", file=path, remedy="give one that is"
+    )
 
 
 def read_learned(path: Path) -> Mapping[str, Any]:
-    """Read a training result as read_file does, with immutable values, so that all missions find the same."""
+    """Read a training result as read_file does, with immutable values, so that all missions find
+    the same.
+    """
     return MappingProxyType({key: _frozen(value) for key, value in read_file(path).learned.items()})
 
 

@@ -1,4 +1,5 @@
-"""Managers and functions by name: built in, registered by a package, or a user's own module:Class, which is checked.
+"""Managers and functions by name: built in, registered by a package, or a user's own module:Class,
+which is checked.
 
 What users' code does wrong is told with its place in their code.
 """
@@ -50,12 +51,16 @@ _FAMILIES = {
     "fixed": ("suave_des.managing.simple", "fixed_mode", "MODE"),
     "exec": ("suave_des.interfaces.exec", "exec_manager", "COMMAND"),
 }
-"""Managers with an argument after a colon: module and function that make the class, and what the argument is."""
+"""Managers with an argument after a colon: module and function that make the class, and what the
+argument is.
+"""
 _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
 _MOST_SAID = 5_000  # characters of an exception's text
 _MAY_YIELD = ("adapt", "input_files")
-_checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
+_checked: WeakSet[type] = (
+    WeakSet()
+)  # a class that is kept would keep its module open at the end of a worker
 
 
 def is_built_in(name: str) -> bool:
@@ -69,12 +74,16 @@ def takes_argument(name: str) -> bool:
 
 
 def is_installed(name: str) -> bool:
-    """Whether a manager is built in or registered by a package: code that somebody has installed on purpose."""
+    """Whether a manager is built in or registered by a package: code that somebody has installed on
+    purpose.
+    """
     return is_built_in(name) or name in _registered()
 
 
 def manager_names() -> tuple[str, ...]:
-    """Names that need no module:Class: built in first, then registered ones in alphabetical order."""
+    """Names that need no module:Class: built in first, then registered ones in alphabetical
+    order.
+    """
     return (*_BUILT_IN, *(name for name in sorted(_registered()) if name not in _BUILT_IN))
 
 
@@ -88,34 +97,43 @@ def name_of(manager: ManagerLike) -> str:
         return manager
     if not (isinstance(manager, type) and issubclass(manager, ManagingSubsystem)):
         problem = f"expected a manager, got {shown(manager)}"
-        raise InputError(problem, remedy="give a name, or a subclass of suave_des.ManagingSubsystem")
+        raise InputError(
+            problem, remedy="give a name, or a subclass of suave_des.ManagingSubsystem"
+        )
     target = f"{manager.__module__}:{manager.__qualname__}"
     if getattr(sys.modules.get(manager.__module__), manager.__qualname__, None) is not manager:
         remedy = "define the class at the top level of a module, script or notebook cell"
         raise InputError(f"manager {target!r} cannot be found by its name", remedy=remedy)
-    return next((name for name, known in (_BUILT_IN | _registered()).items() if known == target), target)
+    return next(
+        (name for name, known in (_BUILT_IN | _registered()).items() if known == target), target
+    )
 
 
 def manager_class(name: str) -> type[ManagingSubsystem]:
     """The class of a manager.
 
     Raises:
-        InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem, or has a
-            hook that cannot be called.
+        InputError: there is no such manager, or what the name leads to is no subclass of
+            ManagingSubsystem, or has a hook that cannot be called.
     """
     family, _, argument = name.partition(":")
     if family in _FAMILIES:
         module, function, wanted = _FAMILIES[family]
         if not argument.strip():
             raise InputError(f"there is no manager {family!r}", remedy=f"write {family}:{wanted}")
-        make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
+        make: Callable[[str], type[ManagingSubsystem]] = getattr(
+            importlib.import_module(module), function
+        )
         return make(argument)
     if name in _BUILT_IN:
         return _built_in(name)
     target = name if ":" in name else _registered().get(name)
     if target is None:
         hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
-        raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
+        raise InputError(
+            f"there is no manager {name!r}",
+            remedy=f"{hint}; your own is given as package.module:Class",
+        )
     return _load(f"manager {name!r}", target, ManagingSubsystem)
 
 
@@ -127,21 +145,30 @@ def _built_in(name: str) -> type[ManagingSubsystem]:
 def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
     """Find the classes of a scenario's further functions, by the name of the function.
 
-    They are named under `functions:`; one that a package registers under the function's own name needs no entry.
+    They are named under `functions:`; one that a package registers under the function's own name
+    needs no entry.
 
     Raises:
         InputError: a function that the mission needs has no node, or a class cannot be used.
     """
     scenario, registered = loaded.scenario, _registered(FUNCTION_GROUP)
     recharge = () if scenario.battery is None else (domain.GENERATE_RECHARGE_PATH,)
-    built_in = (*domain.MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (domain.SURFACE,)))
-    types = {name: name for name in loaded.modes.functions if name in registered and name not in built_in}
+    built_in = (
+        *domain.MISSION_FUNCTIONS,
+        *recharge,
+        *(() if scenario.leak is None else (domain.SURFACE,)),
+    )
+    types = {
+        name: name for name in loaded.modes.functions if name in registered and name not in built_in
+    }
     types |= {name: settings.node for name, settings in scenario.functions.items()}
     for name in scenario.needed_functions():
         if name not in built_in and name not in types:
             remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
             remedy = "add battery: {}" if name == domain.GENERATE_RECHARGE_PATH else remedy
-            raise loaded.layer.error(f"function {name} has no node", ("mission", "functions"), remedy)
+            raise loaded.layer.error(
+                f"function {name} has no node", ("mission", "functions"), remedy
+            )
     if not types:
         return {}
     from suave_des.managed.node import CustomFunction  # loads the vehicle
@@ -159,7 +186,8 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
 def declared_files(
     scenarios: Iterable[LoadedScenario], managers: Mapping[str, type[ManagingSubsystem]]
 ) -> dict[tuple[str, str], Path]:
-    """Locate the files that managers declare by their hook `input_files`, by manager and their names as given.
+    """Locate the files that managers declare by their hook `input_files`, by manager and their
+    names as given.
 
     Raises:
         InputError: a file does not exist, or a class does not declare a list of names.
@@ -173,7 +201,9 @@ def declared_files(
             raise
         except Exception as error:
             problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
-            raise InputError(problem, remedy="give its settings by --manager-option NAME=VALUE") from error
+            raise InputError(
+                problem, remedy="give its settings by --manager-option NAME=VALUE"
+            ) from error
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             problem = f"manager {manager}: input_files gave {shown(names)}"
             raise InputError(problem, remedy="return a list of file names as text")
@@ -191,13 +221,22 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     module = _imported(what, module_name)
     found = getattr(module, attribute, None)
     if not (isinstance(found, type) and issubclass(found, base)):
-        classes = {name for name, each in vars(module).items() if isinstance(each, type) and issubclass(each, base)}
+        classes = {
+            name
+            for name, each in vars(module).items()
+            if isinstance(each, type) and issubclass(each, base)
+        }
         problem = f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}"
-        raise InputError(problem, remedy=nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}")
+        raise InputError(
+            problem,
+            remedy=nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}",
+        )
     if found not in _checked and not module_name.startswith("suave_des."):
         _check_hooks(what, found, base)
         subscribed: Any = getattr(found, "subscribes_to", ())
-        are_kinds = isinstance(subscribed, Collection) and all(each in list(Kind) for each in subscribed)
+        are_kinds = isinstance(subscribed, Collection) and all(
+            each in list(Kind) for each in subscribed
+        )
         if not (are_kinds or isinstance(subscribed, property)):
             remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
             raise InputError(f"{what}: subscribes_to is {shown(subscribed)}", remedy=remedy)
@@ -212,25 +251,46 @@ def _imported(what: str, module: str) -> ModuleType:
     """Import a module of a user's; `what` names what it is imported for."""
     try:
         if module not in sys.modules and (here := str(Path.cwd())) not in sys.path:
-            sys.path.append(here)  # where `python` would find it, but an installed command would not
+            sys.path.append(
+                here
+            )  # where `python` would find it, but an installed command would not
         return importlib.import_module(module)
     except SyntaxError as error:
-        raise InputError(f"{what}: {error.msg}", file=error.filename, place=f"line {error.lineno}") from error
+        raise InputError(
+            f"{what}: {error.msg}", file=error.filename, place=f"line {error.lineno}"
+        ) from error
     except (Exception, SystemExit) as error:  # whatever the module's own code raises
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 wraps it while a class is made
+        if isinstance(
+            error.__cause__, KeyboardInterrupt
+        ):  # Python 3.11 wraps it while a class is made
             raise error.__cause__ from None
         problem = f"{what}: {type(error).__name__}: {error}"
-        own = [each for each in extract_tb(error.__traceback__)[1:] if "importlib" not in each.filename]
+        own = [
+            each for each in extract_tb(error.__traceback__)[1:] if "importlib" not in each.filename
+        ]
         if own:
-            raise InputError(problem, file=own[-1].filename, place=f"line {own[-1].lineno}") from error
-        remedy = "module must be importable: installed, or in the current folder or one on PYTHONPATH"
+            raise InputError(
+                problem, file=own[-1].filename, place=f"line {own[-1].lineno}"
+            ) from error
+        remedy = (
+            "module must be importable: installed, or in the current folder or one on PYTHONPATH"
+        )
         raise InputError(problem, remedy=remedy) from error
 
 
 def _check_hooks(what: str, kind: type, root: type) -> None:
-    """Check that hooks can be called as hooks are called, and that no method is most likely a misspelt one."""
-    own = {name: each for base in root.__mro__[:-1] for name, each in vars(base).items() if inspect.isroutine(each)}
-    forms = {name: _form(root, name) for name in own if name == "__init__" or not name.startswith("_")}
+    """Check that hooks can be called as hooks are called, and that no method is most likely a
+    misspelt one.
+    """
+    own = {
+        name: each
+        for base in root.__mro__[:-1]
+        for name, each in vars(base).items()
+        if inspect.isroutine(each)
+    }
+    forms = {
+        name: _form(root, name) for name in own if name == "__init__" or not name.startswith("_")
+    }
     for hook, form in forms.items():
         function = getattr(kind, hook)
         never_runs = inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function)
@@ -241,15 +301,27 @@ def _check_hooks(what: str, kind: type, root: type) -> None:
         except ValueError:  # no signature: compiled
             continue
         if never_runs or (inspect.isgeneratorfunction(function) and hook not in _MAY_YIELD):
-            raise InputError(f"{what}: {hook} cannot be called as a hook", remedy=f"write {form}; only adapt may yield")
+            raise InputError(
+                f"{what}: {hook} cannot be called as a hook",
+                remedy=f"write {form}; only adapt may yield",
+            )
     classes = kind.__mro__[: kind.__mro__.index(root)]
     for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
-        for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
+        for each in sorted(
+            name for name, member in vars(base).items() if inspect.isfunction(member)
+        ):
             near = similar(each, forms, cutoff=0.8)
             inherits = any(hasattr(parent, each) for parent in base.__bases__)
-            if near is not None and near not in vars(base) and not inherits and each not in names_in(base):
+            if (
+                near is not None
+                and near not in vars(base)
+                and not inherits
+                and each not in names_in(base)
+            ):
                 remedy = f"did you mean {forms[near]}? give a method of your own a name that differs more"
-                raise InputError(f"{what}: {each} is not a hook, and nothing calls it", remedy=remedy)
+                raise InputError(
+                    f"{what}: {each} is not a hook, and nothing calls it", remedy=remedy
+                )
 
 
 def _form(root: type, hook: str) -> str:
@@ -261,7 +333,8 @@ def _form(root: type, hook: str) -> str:
 
 
 def times_of(manager: ManagingSubsystem) -> tuple[float, float, float] | None:
-    """Return a manager's period, first time and least latency; None if it is not called periodically.
+    """Return a manager's period, first time and least latency; None if it is not called
+    periodically.
 
     Raises:
         ValueError: they are no such times.
@@ -279,7 +352,8 @@ def times_of(manager: ManagingSubsystem) -> tuple[float, float, float] | None:
 
 
 def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
-    """Return what a manager's class itself declares to depend on: one derived from it may depend on more.
+    """Return what a manager's class itself declares to depend on: one derived from it may depend on
+    more.
 
     Raises:
         ValueError: it is no mapping from measured quality attributes to numbers.
@@ -293,21 +367,31 @@ def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
         if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
             return found
     form = f"{{'{domain.WATER_VISIBILITY}': (2.25, 3.25)}}"
-    raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None")
+    raise ValueError(
+        f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None"
+    )
 
 
 def measured_somewhere(system: System) -> list[str]:
-    """List what is measured, here or in some shipped scenario: a manager may be written for all of them."""
+    """List what is measured, here or in some shipped scenario: a manager may be written for all of
+    them.
+    """
     return sorted({*system.measurements, domain.WATER_VISIBILITY, domain.BATTERY_LEVEL})
 
 
 def names_in(kind: type) -> set[str]:
     """Return the attributes and functions that the methods of a class name."""
-    return {name for each in vars(kind).values() if inspect.isfunction(each) for name in each.__code__.co_names}
+    return {
+        name
+        for each in vars(kind).values()
+        if inspect.isfunction(each)
+        for name in each.__code__.co_names
+    }
 
 
 def cause_of(error: BaseException, function: str = "") -> str:
-    """Say what was raised, in which function, and where in the user's code: "ValueError: no plan (mine.py, line 7)".
+    """Say what was raised, in which function, and where in the user's code: "ValueError: no plan
+    (mine.py, line 7)".
 
     The text is the same in each run: it has no memory addresses.
     `function` is the user-defined one that raised it.
@@ -322,16 +406,24 @@ def cause_of(error: BaseException, function: str = "") -> str:
 
 
 def place_of(error: BaseException) -> str:
-    """Say which hook of a user's class an exception came from, and from which line: "adapt (mine.py, line 7)"."""
+    """Say which hook of a user's class an exception came from, and from which line: "adapt
+    (mine.py, line 7)".
+    """
     frames = _users_frames(error)
     return f"{frames[0].name} ({_line(frames[-1])})" if frames else ""
 
 
 def _users_frames(error: BaseException) -> list[FrameSummary]:
-    """Return what ran outside the project when an exception was raised, outermost first; libraries if nothing else."""
+    """Return what ran outside the project when an exception was raised, outermost first; libraries
+    if nothing else.
+    """
     while error.__cause__ is not None and repr(error.__cause__) == repr(error):
         error = error.__cause__  # SimPy raises a copy of what a process has raised
-    frames = [each for each in extract_tb(error.__traceback__) if not Path(each.filename).is_relative_to(_OWN)]
+    frames = [
+        each
+        for each in extract_tb(error.__traceback__)
+        if not Path(each.filename).is_relative_to(_OWN)
+    ]
     return [each for each in frames if not _LIBRARY.match(each.filename)] or frames
 
 

@@ -23,13 +23,17 @@ _KINDS = {
 
 
 def shipped_folder(kind: str) -> Path:
-    """Folder of shipped files of one kind, such as "ontology", "scenarios" or "scenarios/revisions"."""
+    """Folder of shipped files of one kind, such as "ontology", "scenarios" or
+    "scenarios/revisions".
+    """
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
 
 
 def shown_name(path: Path) -> str:
-    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as given."""
+    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as
+    given.
+    """
     for kind in ("ontology", "scenarios"):
         if path.is_relative_to(folder := shipped_folder(kind)):
             return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
@@ -47,8 +51,8 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
     Args:
         name: a path, or the name of a shipped file with or without its ending.
         kind: as of shipped_folder.
-        beside: folder of the file that names it, looked in instead of the current folder, so that a file means the
-            same wherever the command is given.
+        beside: folder of the file that names it, looked in instead of the current folder, so that a
+            file means the same wherever the command is given.
 
     Raises:
         InputError: there is no such file, neither on disk nor shipped.
@@ -62,7 +66,12 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
             return candidate
     if os.path.exists(candidates[0]):  # noqa: PTH110 - as above
         return candidates[0]  # whoever reads it says what it is
-    names = sorted(each.name if path.suffix else each.stem for each in shipped_folder(kind).glob(f"*{_KINDS[kind]}"))
-    known = [each for each in names if "modes" not in each or each == similar(path.name, names)]  # no scenarios
+    names = sorted(
+        each.name if path.suffix else each.stem
+        for each in shipped_folder(kind).glob(f"*{_KINDS[kind]}")
+    )
+    known = [
+        each for each in names if "modes" not in each or each == similar(path.name, names)
+    ]  # no scenarios
     remedy = did_you_mean(path.name, known, "give a path, or one of the shipped files")
     raise InputError("no such file", file=path, remedy=remedy)

@@ -1,4 +1,6 @@
-"""Opens the knowledge base of a scenario, and checks that it fits the mission and the modes file."""
+"""Opens the knowledge base of a scenario, and checks that it fits the mission and the modes
+file.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,8 @@ def open_base(loaded: LoadedScenario) -> Ontology:
         part, _, name = (error.place or "").partition(".")
         if error.file is not None or part not in ("values", "disabled_rules"):
             raise
-        # A name that the scenario or the command line gives, and that only the ontology could check.
+        # A name that the scenario or the command line gives, and that only the ontology could
+        # check.
         in_file = loaded.layer.data.get("knowledge", {}).get(part, ())
         if name not in in_file:
             raise InputError(error.problem, place="--disable-rule", remedy=error.remedy) from None
@@ -52,11 +55,19 @@ def open_base(loaded: LoadedScenario) -> Ontology:
 
 
 def read_base(
-    scenario: Scenario, ontologies: Sequence[Path] | None = None, rules: Sequence[Path] | None = None
+    scenario: Scenario,
+    ontologies: Sequence[Path] | None = None,
+    rules: Sequence[Path] | None = None,
 ) -> Ontology:
-    """Read ontologies and files of rules as open_base does, by default those that a scenario names."""
+    """Read ontologies and files of rules as open_base does, by default those that a scenario
+    names.
+    """
     knowledge, values = scenario.knowledge, _values(scenario)
-    named = [find(each, "ontology") for each in knowledge.ontologies] if ontologies is None else ontologies
+    named = (
+        [find(each, "ontology") for each in knowledge.ontologies]
+        if ontologies is None
+        else ontologies
+    )
     texts = [find(each, "ontology") for each in knowledge.rules] if rules is None else rules
     return Ontology.load(
         named,
@@ -69,11 +80,15 @@ def read_base(
 
 def measured_attributes(scenario: Scenario) -> tuple[str, ...]:
     """Return the quality attributes that a scenario's monitors measure, sorted."""
-    return tuple(sorted({*scenario.signals, *(() if scenario.battery is None else (BATTERY_LEVEL,))}))
+    return tuple(
+        sorted({*scenario.signals, *(() if scenario.battery is None else (BATTERY_LEVEL,))})
+    )
 
 
 def subject_of(loaded: LoadedScenario) -> Subject:
-    """Return what `kb check` checks of a scenario: its knowledge base, and what missions have to do with it."""
+    """Return what `kb check` checks of a scenario: its knowledge base, and what missions have to do
+    with it.
+    """
     from suave_des.knowledge.checks import Subject  # which missions do not need
 
     knowledge = loaded.scenario.knowledge
@@ -100,10 +115,13 @@ def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     """The scenario's knowledge base with the reasoner that the scenario names.
 
     Raises:
-        KnowledgeError: the ontologies cannot be read, or lack a design for a function of the mission.
-        InputError: a function design of the knowledge base has no mode of its name in the modes file.
+        KnowledgeError: the ontologies cannot be read, or lack a design for a function of the
+            mission.
+        InputError: a function design of the knowledge base has no mode of its name in the modes
+            file.
     """
-    # What was inferred stays true in scenarios that differ in other things, while the files' hashes are the same.
+    # What was inferred stays true in scenarios that differ in other things, while the files' hashes
+    # are the same.
     knowledge = loaded.scenario.knowledge.model_dump_json(), tuple(sorted(loaded.inputs.items()))
     operators = tuple(sorted(loaded.scenario.revision.comparison_operators.items()))
     same = *knowledge, loaded.ontologies, loaded.rules, operators
@@ -118,8 +136,12 @@ def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     functions = loaded.scenario.needed_functions()
     base.check(functions)
     for function in functions:
-        if missing := [each for each in base.designs(function) if each not in loaded.modes.modes(function)]:
-            problem = f"function {function} has no mode {missing[0]}, but the ontology has such a design"
+        if missing := [
+            each for each in base.designs(function) if each not in loaded.modes.modes(function)
+        ]:
+            problem = (
+                f"function {function} has no mode {missing[0]}, but the ontology has such a design"
+            )
             remedy = "add the mode, or remove the design from the ontology"
             raise InputError(problem, file=loaded.modes_path, place=function, remedy=remedy)
     return reasoner

@@ -1,4 +1,6 @@
-"""Tables of text, results that have tables, and how each form of output writes them: terminal, Markdown, LaTeX, CSV."""
+"""Tables of text, results that have tables, and how each form of output writes them: terminal,
+Markdown, LaTeX, CSV.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +18,18 @@ if TYPE_CHECKING:
     import pandas
 
 _LEAST_WIDTH = 12
-"""A column of text is not made narrower than this, so that a table may be wider than it should be."""
+"""A column of text is not made narrower than this, so that a table may be wider than it should
+be.
+"""
 EFFECT = "effect"
 """Heading of the widest column, the last one, which goes where the table would be too wide."""
 _BREAKS = re.compile(r"(?<=[:_./-])|(?<= )(?=[^\s=\d])|(?<=[^\W\d_A-ZÀ-Þ])(?=[A-ZÀ-Þ])")
-"""Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a capital within a word."""
-_MARKDOWN = str.maketrans({**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"})
+"""Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a
+capital within a word.
+"""
+_MARKDOWN = str.maketrans(
+    {**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"}
+)
 _LATEX = str.maketrans(
     {
         **{character: f"\\{character}" for character in "&%$#_{}"},
@@ -46,7 +54,8 @@ class Table:
         headings: of the columns.
         rows: cells; a row of a single cell is a heading of the rows below it.
         title: what the table has; empty: that is said elsewhere.
-        align: "l" or "r" for each column; columns beyond it have numbers, and are aligned to the right.
+        align: "l" or "r" for each column; columns beyond it have numbers, and are aligned to the
+            right.
     """
 
     headings: Sequence[str]
@@ -59,9 +68,14 @@ class Table:
         return self.align + "r" * (len(self.headings) - len(self.align))
 
     def _widths(self, width: int | None) -> list[int]:
-        """Return the width of each column; of a table that is too wide, columns of text are made narrower."""
+        """Return the width of each column; of a table that is too wide, columns of text are made
+        narrower.
+        """
         cells = [self.headings, *(row for row in self.rows if len(row) > 1)]
-        widths = [max(len(line) for cell in column for line in cell.split("\n")) for column in zip(*cells, strict=True)]
+        widths = [
+            max(len(line) for cell in column for line in cell.split("\n"))
+            for column in zip(*cells, strict=True)
+        ]
         narrow = [place for place, side in enumerate(self._alignment) if side == "l"]
         while width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
             widest = max(narrow, key=lambda place: widths[place], default=None)
@@ -69,12 +83,16 @@ class Table:
                 break
             widths[widest] -= 1
         for place in narrow:  # what was broken into lines may need even less
-            lines = (line for row in cells for line in broken_name(row[place], widths[place]).split("\n"))
+            lines = (
+                line for row in cells for line in broken_name(row[place], widths[place]).split("\n")
+            )
             widths[place] = max(map(len, lines))
         return widths
 
     def text(self, width: int | None = None) -> str:
-        """Write the table for a terminal, without its title; texts that make it wider are broken into lines."""
+        """Write the table for a terminal, without its title; texts that make it wider are broken
+        into lines.
+        """
         return "\n".join(self._lines(self._widths(width)))
 
     def _lines(self, widths: Sequence[int]) -> Iterator[str]:
@@ -82,11 +100,16 @@ class Table:
             if len(row) == 1 < len(widths):
                 yield row[0]
                 continue
-            broken = [broken_name(cell, width).split("\n") for cell, width in zip(row, widths, strict=True)]
+            broken = [
+                broken_name(cell, width).split("\n")
+                for cell, width in zip(row, widths, strict=True)
+            ]
             for number in range(max(map(len, broken))):
                 parts = (lines[number] if number < len(lines) else "" for lines in broken)
                 sides = zip(parts, self._alignment, widths, strict=True)
-                yield "  ".join(f"{part:{'<' if side == 'l' else '>'}{width}}" for part, side, width in sides).rstrip()
+                yield "  ".join(
+                    f"{part:{'<' if side == 'l' else '>'}{width}}" for part, side, width in sides
+                ).rstrip()
 
     def markdown(self) -> str:
         """Write the table as Markdown, without its title."""
@@ -98,7 +121,8 @@ class Table:
         return "\n".join(lines)
 
     def latex(self, over: Sequence[str] = (), *, label: str = "", note: str = "") -> str:
-        """Write the table for LaTeX with booktabs, its title as caption, with a label for references and a note below.
+        """Write the table for LaTeX with booktabs, its title as caption, with a label for
+        references and a note below.
 
         Headings `over` those of the table are over as many columns each, all but the first.
         """
@@ -110,17 +134,27 @@ class Table:
             each = (columns - 1) // len(over)
             begins = range(2, columns + 1, each)
             lines.append(
-                "    " + "".join(rf" & \multicolumn{{{each}}}{{c}}{{{latex_text(it)}}}" for it in over) + r" \\"
+                "    "
+                + "".join(rf" & \multicolumn{{{each}}}{{c}}{{{latex_text(it)}}}" for it in over)
+                + r" \\"
             )
-            lines.append("    " + " ".join(rf"\cmidrule(lr){{{begin}-{begin + each - 1}}}" for begin in begins))
+            lines.append(
+                "    "
+                + " ".join(rf"\cmidrule(lr){{{begin}-{begin + each - 1}}}" for begin in begins)
+            )
         lines.append(f"    {' & '.join(map(latex_text, self.headings))} \\\\")
         if not self.rows or len(self.rows[0]) > 1:
             lines.append(r"    \midrule")
         for row in self.rows:
             if len(row) == 1 < columns:
-                lines += [r"    \midrule", rf"    \multicolumn{{{columns}}}{{l}}{{{latex_text(row[0])}}} \\"]
+                lines += [
+                    r"    \midrule",
+                    rf"    \multicolumn{{{columns}}}{{l}}{{{latex_text(row[0])}}} \\",
+                ]
             else:
-                lines.append(f"    {' & '.join([latex_text(row[0]), *map(_latex_number, row[1:])])} \\\\")
+                lines.append(
+                    f"    {' & '.join([latex_text(row[0]), *map(_latex_number, row[1:])])} \\\\"
+                )
         below = [rf"  \par\smallskip\footnotesize {latex_text(note)}"] if note else []
         return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", *below, r"\end{table}"])
 
@@ -133,7 +167,9 @@ class Table:
 
 
 class Section(NamedTuple):
-    """A part of what is written: tables under a title, what is said below them, and what follows from them."""
+    """A part of what is written: tables under a title, what is said below them, and what follows
+    from them.
+    """
 
     title: str
     tables: Sequence[Table]
@@ -165,10 +201,17 @@ class Written(ABC):
         """Return the statistics by what JSON calls them."""
 
     def written(self, form: str, width: int = 95) -> str:
-        """Write the result as "table", which is text of that width, "csv", "json", "markdown" or "latex"."""
+        """Write the result as "table", which is text of that width, "csv", "json", "markdown" or
+        "latex".
+        """
         if form == "table":
             return self.text(width)
-        writers = {"csv": self.csv, "json": self.json, "markdown": self.markdown, "latex": self.latex}
+        writers = {
+            "csv": self.csv,
+            "json": self.json,
+            "markdown": self.markdown,
+            "latex": self.latex,
+        }
         return writers[form]()
 
     def text(self, width: int = 95) -> str:
@@ -176,9 +219,19 @@ class Written(ABC):
         parts = [folded(self.conclusion, width)]
         for title, tables, sentences, below in self.sections():
             for place, table in enumerate(tables):
-                heading = f"{title}\n" if place == 0 else f"{title}, {table.title}\n" if table.title else ""
-                fits = table.headings[-1] != EFFECT or max(map(len, table.text().split("\n"))) <= width
-                shown = table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
+                heading = (
+                    f"{title}\n"
+                    if place == 0
+                    else f"{title}, {table.title}\n"
+                    if table.title
+                    else ""
+                )
+                fits = (
+                    table.headings[-1] != EFFECT or max(map(len, table.text().split("\n"))) <= width
+                )
+                shown = (
+                    table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
+                )
                 parts.append(heading + shown.text(width) + (f"\n{below}" if below else ""))
             parts.append("\n".join(folded(f"- {each}", width) for each in sentences))
         parts.append("\n".join(folded(line, width) for line in self.remarks()))
@@ -194,7 +247,11 @@ class Written(ABC):
         for title, tables, sentences, below in self.sections():
             parts.append(f"### {capital(title)}" if title else "")
             for table in tables:
-                parts += [f"{capital(table.title)}:" if table.title else "", table.markdown(), markdown_text(below)]
+                parts += [
+                    f"{capital(table.title)}:" if table.title else "",
+                    table.markdown(),
+                    markdown_text(below),
+                ]
             parts.append("\n".join(f"- {markdown_text(each)}" for each in sentences))
         return "\n\n".join(filter(None, [*parts, *map(markdown_text, self.remarks())])) + "\n"
 
@@ -203,7 +260,11 @@ class Written(ABC):
 
     def latex(self) -> str:
         """Write the tables for LaTeX with booktabs."""
-        tables = [Table(each.headings, each.rows, title) for title, own, *_ in self.sections() for each in own]
+        tables = [
+            Table(each.headings, each.rows, title)
+            for title, own, *_ in self.sections()
+            for each in own
+        ]
         notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
         parts = [table.latex(note=note) for table, note in zip(tables, notes, strict=True)]
         return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
@@ -235,7 +296,9 @@ def rows_of(frame: pandas.DataFrame) -> list[dict[str, Any]]:
 
 def folded(text: str, width: int) -> str:
     """Break a paragraph into lines for a terminal of that width."""
-    return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
+    return fill(
+        text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False
+    )
 
 
 def capital(text: str) -> str:
@@ -244,7 +307,9 @@ def capital(text: str) -> str:
 
 
 def broken_name(name: str, width: int, indent: str = "  ") -> str:
-    """Break a long name into lines, the further ones indented, so that it leaves room for what is beside it."""
+    """Break a long name into lines, the further ones indented, so that it leaves room for what is
+    beside it.
+    """
     if max(map(len, name.split("\n"))) <= width:
         return name
     lines = [""]
@@ -271,5 +336,6 @@ def _latex_number(cell: str) -> str:
     if is_power:
         return rf"${mantissa} \cdot 10^{{-{int(exponent)}}}$"
     return " to ".join(
-        f"${latex_text(part)}$" if part.startswith("-") else latex_text(part) for part in cell.split(" to ")
+        f"${latex_text(part)}$" if part.startswith("-") else latex_text(part)
+        for part in cell.split(" to ")
     )

@@ -1,6 +1,8 @@
-"""Settings of all tests: property tests draw the same examples on every machine, and are not timed in any way.
+"""Settings of all tests: property tests draw the same examples on every machine, and are not timed
+in any way.
 
-Cached inferences are kept in a folder of the test run, away from the user's, which all its processes share.
+Cached inferences are kept in a folder of the test run, away from the user's, which all its
+processes share.
 """
 
 import functools
@@ -25,19 +27,24 @@ from tests.helpers.quick_workers import _warm_process, quick_campaigns, quick_wo
 
 __all__ = ["_warm_process", "command", "quick_campaigns", "quick_workers", "suave_copy"]
 
-settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("repeatable")
 
-# What is installed stays the same: each campaign asks for nine versions, whose files take ten milliseconds to read.
+# What is installed stays the same: each campaign asks for nine versions, whose files take ten
+# milliseconds to read.
 importlib.metadata.version = functools.cache(importlib.metadata.version)
 
-# Modules and tests are a million objects, which Python's search for cycles would go through again and again: it was a
-# fifth of the tests' time. What has been imported is left out of it; of the rest, half a million come before a search.
+# Modules and tests are a million objects, which Python's search for cycles would go through again
+# and again: it was a fifth of the tests' time. What has been imported is left out of it; of the
+# rest, half a million come before a search.
 gc.disable()
 _searched_without = 0
 
-# Machine code is the same for all: it is kept where it always is, so that each run of the tests need not make it
-# anew. So are compiled modules, whatever the environment says: hundreds of processes start.
+# Machine code is the same for all: it is kept where it always is, so that each run of the tests
+# need not make it anew. So are compiled modules, whatever the environment says: hundreds of
+# processes start.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(private_cache("numba")))
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -45,15 +52,19 @@ users_environment = dict(os.environ)
 if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
     os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 
-os.environ.pop("COLUMNS", None)  # which several test processes at once are given, as if there were a terminal
+os.environ.pop(
+    "COLUMNS", None
+)  # which several test processes at once are given, as if there were a terminal
 
-# A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
+# A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their
+# children, need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes(config: pytest.Config, specs: list[object]) -> None:
-    """In a new checkout or environment, make once what each process would make otherwise, or do without.
+    """In a new checkout or environment, make once what each process would make otherwise, or do
+    without.
 
     That is compiled modules, and machine code of inner loops.
     """
@@ -62,10 +73,14 @@ def pytest_xdist_setupnodes(config: pytest.Config, specs: list[object]) -> None:
     sources = [Path(find_spec(name).origin) for name in ("pandas", "suave_des.simulation.mission")]
     programs = []
     if not all(Path(cache_from_source(source)).exists() for source in sources):
-        programs += [("-m", "tests.helpers.warm_worker"), ("-m", "pytest", "--collect-only", "-n", "0", *config.args)]
+        programs += [
+            ("-m", "tests.helpers.warm_worker"),
+            ("-m", "pytest", "--collect-only", "-n", "0", *config.args),
+        ]
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": users_environment}
     for process in [
-        subprocess.Popen([sys.executable, *program], cwd=Path(__file__).parents[1], **silent) for program in programs
+        subprocess.Popen([sys.executable, *program], cwd=Path(__file__).parents[1], **silent)
+        for program in programs
     ]:
         process.wait()
 
@@ -79,9 +94,11 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
-    """Leave out of the search what a test has imported, and what a module of tests has left, if it is much.
+    """Leave out of the search what a test has imported, and what a module of tests has left, if it
+    is much.
 
-    Java has Python search for cycles in all that is not left out, whenever it collects its own garbage.
+    Java has Python search for cycles in all that is not left out, whenever it collects its own
+    garbage.
     """
     if nextitem is not None and nextitem.path != item.path and len(gc.get_objects()) > 40_000:
         gc.collect()

@@ -1,4 +1,6 @@
-"""Files of the cache folder: what is damaged there is left out, and several processes share them."""
+"""Files of the cache folder: what is damaged there is left out, and several processes share
+them.
+"""
 
 import os
 import random
@@ -10,7 +12,10 @@ import pytest
 
 from suave_des.caches import SharedEntries
 
-ENTRIES = {f"state {number}": [["fg_spiral_high", "fg_status", "str", f"IN_ERROR_{number}"]] for number in range(8)}
+ENTRIES = {
+    f"state {number}": [["fg_spiral_high", "fg_status", "str", f"IN_ERROR_{number}"]]
+    for number in range(8)
+}
 
 
 @pytest.fixture
@@ -28,11 +33,17 @@ def test_what_was_added_is_read(filled):
 
 
 def test_damaged_entries_are_left_out_and_what_follows_them_is_read(filled):
-    content = filled.read_bytes().replace(b"IN_ERROR_3", b"IN_ERROR_4") + b"\xff\x00 trash [\n" + b"cut sh"
+    content = (
+        filled.read_bytes().replace(b"IN_ERROR_3", b"IN_ERROR_4")
+        + b"\xff\x00 trash [\n"
+        + b"cut sh"
+    )
     filled.write_bytes(content)
     entries = SharedEntries(filled.parent, "d")
     entries.add("new", 1)
-    assert dict(entries.read()) == {key: value for key, value in ENTRIES.items() if key != "state 3"} | {"new": 1}
+    assert dict(entries.read()) == {
+        key: value for key, value in ENTRIES.items() if key != "state 3"
+    } | {"new": 1}
 
 
 @pytest.mark.parametrize("content", [b"", b"\x80\x04pickled", b"x" * 24 + b" [[],[]]\n"])

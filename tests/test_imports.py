@@ -55,7 +55,10 @@ HEAVY = "numpy numba pandas scipy matplotlib simpy pydantic_core yaml owlready2 
             "import suave_des\nassert not [name for name in sys.modules if name.startswith('suave_des.')]",
             HEAVY + " rich",
         ),
-        ("import suave_des.cli.main as cli\ntry:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass", HEAVY),
+        (
+            "import suave_des.cli.main as cli\ntry:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass",
+            HEAVY,
+        ),
         (
             "import suave_des; suave_des.Mission('seams2023').advance(5.0)",
             "matplotlib plotly gymnasium http.server distributed pandas owlready2 jpype",
@@ -64,7 +67,9 @@ HEAVY = "numpy numba pandas scipy matplotlib simpy pydantic_core yaml owlready2 
     ids=["package", "help", "mission"],
 )
 def test_what_is_not_used_is_not_loaded(program, unused):
-    done = python("-c", f"import sys\n{program}\nprint(sorted(set({unused.split()}) & set(sys.modules)))")
+    done = python(
+        "-c", f"import sys\n{program}\nprint(sorted(set({unused.split()}) & set(sys.modules)))"
+    )
     assert done.stdout.splitlines()[-1:] == ["[]"], done.stderr
 
 
@@ -123,5 +128,11 @@ def test_no_modules_import_each_other_in_a_circle():
             if between in reached[module]:
                 reached[module] |= reached[between]
     circles = {frozenset(other for other in reached[one] if one in reached[other]) for one in files}
-    shown = [sorted(module.removeprefix("suave_des.") for module in circle) for circle in circles if circle]
-    assert not [circle for circle in shown if not any(set(circle) <= known for known in KNOWN_CIRCLES)]
+    shown = [
+        sorted(module.removeprefix("suave_des.") for module in circle)
+        for circle in circles
+        if circle
+    ]
+    assert not [
+        circle for circle in shown if not any(set(circle) <= known for known in KNOWN_CIRCLES)
+    ]

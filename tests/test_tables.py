@@ -1,10 +1,15 @@
-"""One table in every form of output: aligned, broken where too wide, and with nothing that the form would obey."""
+"""One table in every form of output: aligned, broken where too wide, and with nothing that the form
+would obey.
+"""
 
 from suave_des.tables import Table, broken_name
 
 TABLE = Table(
     ("manager", "n", "mean", "95% interval"),
-    [("none", "20", "187.85", "168.0 to 207.7"), ("own:Metacontrol_of_mine", "5", "-1.50", "-3e-5 to 1.2")],
+    [
+        ("none", "20", "187.85", "168.0 to 207.7"),
+        ("own:Metacontrol_of_mine", "5", "-1.50", "-3e-5 to 1.2"),
+    ],
     "search time (s)",
 )
 
@@ -36,11 +41,18 @@ def test_a_row_of_one_cell_is_a_heading_of_those_below():
 
 def test_markdown_shows_names_as_they_are():
     table = Table(("a|b", "n"), [("<b>*_x_*</b>", "1")])
-    assert table.markdown() == "| a\\|b | n |\n| --- | ---: |\n| &lt;b&gt;\\*\\_x\\_\\*&lt;/b&gt; | 1 |"
+    assert (
+        table.markdown()
+        == "| a\\|b | n |\n| --- | ---: |\n| &lt;b&gt;\\*\\_x\\_\\*&lt;/b&gt; | 1 |"
+    )
 
 
 def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing():
-    table = Table(("Manager", "Mean", "Std", "Mean", "Std"), [("a_b & c", "1", "-2", "3e-05", "-1.0 to -0.5")], "50%")
+    table = Table(
+        ("Manager", "Mean", "Std", "Mean", "Std"),
+        [("a_b & c", "1", "-2", "3e-05", "-1.0 to -0.5")],
+        "50%",
+    )
     lines = [line.strip() for line in table.latex(("Time (s)", "Way (m)")).split("\n")]
     assert lines == [
         r"\begin{table}",

@@ -1,1 +1,3 @@
-"""Fit parameters of scenarios to real missions: the parts of calibrate.py, which other studies use, too."""
+"""Fit parameters of scenarios to real missions: the parts of calibrate.py, which other studies use,
+too.
+"""

@@ -1,4 +1,6 @@
-"""Read what a calibration fits: scenarios with their real missions, and the parameters that are free."""
+"""Read what a calibration fits: scenarios with their real missions, and the parameters that are
+free.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,15 @@ from suave_des import InputError, find, load_scenario, read_real, with_values
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Variation, vary
 from suave_des.resources import shipped_folder
-from suave_des.results.real import CONDITION, PAPERS_RUNS, Share, conditions_of, count, published_for, targets_of
+from suave_des.results.real import (
+    CONDITION,
+    PAPERS_RUNS,
+    Share,
+    conditions_of,
+    count,
+    published_for,
+    targets_of,
+)
 from suave_des.scenario.loader import LoadedScenario
 
 FOLDER = Path(__file__).parent
@@ -32,8 +42,10 @@ class Case:
     Attributes:
         name: that of its file, without `_campaign`.
         loaded: the scenario.
-        real: a row for each real mission, with the columns of records.runs.COLUMNS and the number of its condition.
-        conditions: by number, the values of each condition by key path; none of a scenario that is no campaign's.
+        real: a row for each real mission, with the columns of records.runs.COLUMNS and the number
+            of its condition.
+        conditions: by number, the values of each condition by key path; none of a scenario that is
+            no campaign's.
         shares: shares of missions in clusters, each with that of the real missions.
         base: the scenario's file as another scenario names it.
         digests: SHA-256 of each file of real missions, by its name.
@@ -43,7 +55,9 @@ class Case:
     name: str
     loaded: Any
     real: pandas.DataFrame
-    conditions: Mapping[int, Mapping[str, Any]] = field(default_factory=lambda: {ONLY_CONDITION: {}})
+    conditions: Mapping[int, Mapping[str, Any]] = field(
+        default_factory=lambda: {ONLY_CONDITION: {}}
+    )
     shares: tuple[tuple[Share, float], ...] = ()
     base: str = ""
     digests: Mapping[str, str] = field(default_factory=dict)
@@ -60,7 +74,8 @@ class Case:
         return any(self.conditions.values())
 
     def only(self, numbers: Collection[int]) -> Case:
-        """Return the same with some of its conditions, and the real missions that were made under them.
+        """Return the same with some of its conditions, and the real missions that were made under
+        them.
 
         Raises:
             InputError: there is no condition of a number.
@@ -68,21 +83,30 @@ class Case:
         unknown = sorted(set(numbers) - set(self.conditions))
         if unknown or not numbers:
             listed = ", ".join(map(str, unknown)) or "left"
-            raise InputError(f"{self.name}: there is no condition {listed}", remedy=f"it has {list(self.conditions)}")
+            raise InputError(
+                f"{self.name}: there is no condition {listed}",
+                remedy=f"it has {list(self.conditions)}",
+            )
         real = self.real[self.real[CONDITION].isin(numbers)].reset_index(drop=True)
         shares = _counted([share for share, _ in self.shares], real)
         return replace(
-            self, real=real, conditions={number: self.conditions[number] for number in numbers}, shares=shares
+            self,
+            real=real,
+            conditions={number: self.conditions[number] for number in numbers},
+            shares=shares,
         )
 
 
-def read_cases(scenarios: Sequence[str], data: Sequence[str] = (), managers: str | None = None) -> tuple[Case, ...]:
+def read_cases(
+    scenarios: Sequence[str], data: Sequence[str] = (), managers: str | None = None
+) -> tuple[Case, ...]:
     """Read scenarios or campaign files with the real missions of each.
 
     Args:
         scenarios: scenario or campaign files, or names of shipped ones.
-        data: files of real missions. Of one scenario: their names; of several: NAME=FILE with the scenario's name. Left
-            out for a scenario, those published for it; of one scenario alone, else those of the SUAVE paper.
+        data: files of real missions. Of one scenario: their names; of several: NAME=FILE with the
+            scenario's name. Left out for a scenario, those published for it; of one scenario alone,
+            else those of the SUAVE paper.
         managers: names, separated by commas, of those to compare; left out: all in the data.
 
     Raises:
@@ -100,11 +124,18 @@ def read_cases(scenarios: Sequence[str], data: Sequence[str] = (), managers: str
 def _files_of(given: str, data: Sequence[str], *, only: bool) -> list[Path]:
     """Return the files of real missions of one scenario."""
     name = Path(given).stem.removesuffix("_campaign")
-    words = [word if only else word.removeprefix(f"{name}=") for word in data if only or word.startswith(f"{name}=")]
+    words = [
+        word if only else word.removeprefix(f"{name}=")
+        for word in data
+        if only or word.startswith(f"{name}=")
+    ]
     files = [find(word.removeprefix(f"{name}="), "scenarios/published") for word in words]
     published = published_for(given) or (find(PAPERS_RUNS, "scenarios/published") if only else None)
     if not files and published is None:
-        raise InputError(f"{name}: there are no published runs of this scenario", remedy=f"give --data {name}=FILE")
+        raise InputError(
+            f"{name}: there are no published runs of this scenario",
+            remedy=f"give --data {name}=FILE",
+        )
     return files or [path for path in (published,) if path]
 
 
@@ -124,7 +155,9 @@ def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
     frame = real.frame[real.frame["manager"].isin(own)].reset_index(drop=True)
     if CONDITION not in frame:
         frame[CONDITION] = ONLY_CONDITION
-    made = {number: values for number, values in conditions.items() if number in set(frame[CONDITION])}
+    made = {
+        number: values for number, values in conditions.items() if number in set(frame[CONDITION])
+    }
     shares = _counted([share for share in targets_of(real)[0] if share.manager in own], frame)
     digests = {path.name: digest for path, digest in real.files.items()}
     name = Path(given).stem.removesuffix("_campaign")
@@ -132,12 +165,16 @@ def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
 
 
 def _read_varied(given: str) -> tuple[LoadedScenario, Variation, str]:
-    """Read a scenario, what its campaign file sweeps, and the scenario's own file as another can name it."""
+    """Read a scenario, what its campaign file sweeps, and the scenario's own file as another can
+    name it.
+    """
     file = read_campaign_file(given)
     if file is None:
         return load_scenario(given), Variation(), given
     settings = file.settings
-    varied = vary(load_scenario(file.scenario), settings.sweep, settings.perturbations, settings.runs_per_draw)
+    varied = vary(
+        load_scenario(file.scenario), settings.sweep, settings.perturbations, settings.runs_per_draw
+    )
     return *varied, str(file.scenario)
 
 
@@ -187,9 +224,10 @@ class Problem:
     Attributes:
         cases: the scenarios, each with its real missions.
         parameters: what is free.
-        runs: simulated missions for each manager of a case and evaluation, in equal parts under its conditions.
-        seed: seed of the simulated missions; all evaluations use the same streams, so that differences between them
-            come from the parameters.
+        runs: simulated missions for each manager of a case and evaluation, in equal parts under its
+            conditions.
+        seed: seed of the simulated missions; all evaluations use the same streams, so that
+            differences between them come from the parameters.
     """
 
     cases: tuple[Case, ...]
@@ -199,7 +237,10 @@ class Problem:
 
     def values_at(self, units: Sequence[float]) -> list[float]:
         """Return the values of the parameters at coordinates, see FreeParameter.value."""
-        return [parameter.value(float(unit)) for parameter, unit in zip(self.parameters, units, strict=True)]
+        return [
+            parameter.value(float(unit))
+            for parameter, unit in zip(self.parameters, units, strict=True)
+        ]
 
     def values_of(self, case: Case, values: Sequence[float]) -> dict[str, float]:
         """Return those of the parameters' values that a case has, by key path."""
@@ -227,7 +268,9 @@ def read_problem(path: str | Path, cases: Sequence[Case], runs: int, seed: int) 
         formed = [replace(case, loaded=with_values(case.loaded, form)) for case in cases]
         parameters = tuple(_parameter(formed, **entry) for entry in entries)
     except InputError as error:
-        raise InputError(f"{file}: {error.problem}", place=error.place, remedy=error.remedy) from None
+        raise InputError(
+            f"{file}: {error.problem}", place=error.place, remedy=error.remedy
+        ) from None
     except (AttributeError, KeyError, OSError, TypeError, ValueError, yaml.YAMLError) as error:
         problem = f"cannot be used: {error!r}"
         raise InputError(problem, file=file, remedy="analysis/README.md shows the form") from None
@@ -244,17 +287,26 @@ def _parameter(
 ) -> FreeParameter:
     own = [case for case in cases if scenarios is None or case.name in scenarios]
     if not own or (scenarios is not None and len(own) < len(scenarios)):
-        raise InputError(f"{path}: not all of {scenarios} are fitted", remedy=f"{[case.name for case in cases]} are")
+        raise InputError(
+            f"{path}: not all of {scenarios} are fitted",
+            remedy=f"{[case.name for case in cases]} are",
+        )
     for case in own:
         if any(path in values for values in case.conditions.values()):
-            raise InputError(f"{path} is free, but the conditions of {case.name} set it", remedy="remove it")
+            raise InputError(
+                f"{path} is free, but the conditions of {case.name} set it", remedy="remove it"
+            )
         for bound in (lower, upper):
             with_values(case.loaded, {path: bound})
     start = fmean(value_at(case.loaded, path) for case in own) if start is None else start
     if not lower <= start <= upper:
-        raise InputError(f"{path} starts at {start:g}, outside [{lower:g}, {upper:g}]", remedy="widen the bounds")
+        raise InputError(
+            f"{path} starts at {start:g}, outside [{lower:g}, {upper:g}]", remedy="widen the bounds"
+        )
     is_of_all = len(own) == len(cases)
-    return FreeParameter(path, lower, upper, start, () if is_of_all else tuple(case.name for case in own))
+    return FreeParameter(
+        path, lower, upper, start, () if is_of_all else tuple(case.name for case in own)
+    )
 
 
 def value_at(loaded: Any, path: str) -> Any:
@@ -270,7 +322,9 @@ def value_at(loaded: Any, path: str) -> Any:
 
 
 def fitted_scenario(problem: Problem, case: Case, values: Sequence[float], folder: Path) -> str:
-    """Return a scenario file for a folder: the case's scenario with the values of the problem's parameters."""
+    """Return a scenario file for a folder: the case's scenario with the values of the problem's
+    parameters.
+    """
     own = problem.values_of(case, values)
     fitted = with_values(case.loaded, own)
     data: dict[str, Any] = {}

@@ -43,7 +43,8 @@ def fit(
     seed: int = 1,
     on_generation: Callable[[int, Evaluation], None] | None = None,
 ) -> list[Evaluation]:
-    """Search for the values with the least loss, by CMA-ES (Hansen; package cma) in the box of the bounds.
+    """Search for the values with the least loss, by CMA-ES (Hansen; package cma) in the box of the
+    bounds.
 
     Args:
         problem: what is fitted to what.
@@ -56,7 +57,12 @@ def fit(
         All evaluations, in order.
     """
     start = [(free.start - free.lower) / (free.upper - free.lower) for free in problem.parameters]
-    settings = {"seed": seed % 2**32 or 2**32 - 1, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9}
+    settings = {
+        "seed": seed % 2**32 or 2**32 - 1,
+        "verbose": -9,
+        "maxfevals": evaluations,
+        "tolfun": 1e-9,
+    }
     search = cma.CMAEvolutionStrategy(start, FIRST_STEP, settings)
     tried: list[Evaluation] = []
     with evaluator(problem, workers) as evaluate_all:
@@ -71,7 +77,8 @@ def fit(
 
 
 def select(problem: Problem, tried: Sequence[Evaluation], workers: int) -> Evaluation:
-    """Choose the best of the few best evaluations, simulated again with more missions and other streams.
+    """Choose the best of the few best evaluations, simulated again with more missions and other
+    streams.
 
     The least of many noisy losses is partly luck; the second evaluation is not chosen for it.
     """
@@ -94,7 +101,8 @@ class Profile:
         best: its fitted value.
         values: where the loss was evaluated, rising.
         losses: the loss there.
-        low: least admitted value: where the loss, interpolated, crosses the threshold; the bound if it never does.
+        low: least admitted value: where the loss, interpolated, crosses the threshold; the bound if
+            it never does.
         high: greatest admitted value.
     """
 
@@ -108,9 +116,14 @@ class Profile:
 
 def profiles(problem: Problem, best: Evaluation, threshold: float, workers: int) -> list[Profile]:
     """Compute the profile of every parameter; a value is admitted up to a loss of `threshold`."""
-    grids = [_grid(parameter, value) for parameter, value in zip(problem.parameters, best.values, strict=True)]
+    grids = [
+        _grid(parameter, value)
+        for parameter, value in zip(problem.parameters, best.values, strict=True)
+    ]
     many = [
-        (*best.values[:place], value, *best.values[place + 1 :]) for place, grid in enumerate(grids) for value in grid
+        (*best.values[:place], value, *best.values[place + 1 :])
+        for place, grid in enumerate(grids)
+        for value in grid
     ]
     with evaluator(problem, workers) as evaluate_all:
         losses = iter([each.loss for each in evaluate_all(many)])
@@ -118,8 +131,12 @@ def profiles(problem: Problem, best: Evaluation, threshold: float, workers: int)
     for parameter, value, grid in zip(problem.parameters, best.values, grids, strict=True):
         along = tuple(next(losses) for _ in grid)
         points = list(zip(grid, along, strict=True))
-        low = _crossing(value, best.loss, [point for point in points[::-1] if point[0] < value], threshold)
-        high = _crossing(value, best.loss, [point for point in points if point[0] > value], threshold)
+        low = _crossing(
+            value, best.loss, [point for point in points[::-1] if point[0] < value], threshold
+        )
+        high = _crossing(
+            value, best.loss, [point for point in points if point[0] > value], threshold
+        )
         found.append(Profile(parameter, value, grid, along, low, high))
     return found
 
@@ -132,8 +149,12 @@ def _grid(parameter: FreeParameter, best: float) -> tuple[float, ...]:
     return tuple(sorted({*below.tolist(), *above.tolist()}))
 
 
-def _crossing(best: float, loss: float, outwards: Sequence[tuple[float, float]], threshold: float) -> float:
-    """Going outwards from the best value over values with their losses, where the loss first exceeds the threshold."""
+def _crossing(
+    best: float, loss: float, outwards: Sequence[tuple[float, float]], threshold: float
+) -> float:
+    """Going outwards from the best value over values with their losses, where the loss first
+    exceeds the threshold.
+    """
     before, loss_before = best, loss
     for value, here in outwards:
         if here > threshold:

@@ -1,12 +1,13 @@
 """Measure how far simulated missions are from real ones.
 
-The loss of a scenario is the mean over the managers of the energy distance between missions as vectors, plus the mean
-absolute difference of the shares of missions in clusters. The energy distance of the distributions of X and Y is
-2 E|X - Y| - E|X - X'| - E|Y - Y'| (Székely and Rizzo, 2013); it is zero only if they are equal. scipy has it for
-single values only. A mission is the vector of its search time, its distance inspected and the x of the
-pipeline point seen first, each divided by a scale, so that which values come together counts, too. Where real missions
-were made under known conditions, a manager's distance is the mean over them of that within a condition. The loss of
-several scenarios is the mean of theirs.
+The loss of a scenario is the mean over the managers of the energy distance between missions as
+vectors, plus the mean absolute difference of the shares of missions in clusters. The energy
+distance of the distributions of X and Y is 2 E|X - Y| - E|X - X'| - E|Y - Y'| (Székely and Rizzo,
+2013); it is zero only if they are equal. scipy has it for single values only. A mission is the
+vector of its search time, its distance inspected and the x of the pipeline point seen first, each
+divided by a scale, so that which values come together counts, too. Where real missions were made
+under known conditions, a manager's distance is the mean over them of that within a condition. The
+loss of several scenarios is the mean of theirs.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class CaseLoss:
 
     Attributes:
         distances: energy distance of each manager's missions, by name; over conditions, their mean.
-        share_difference: mean absolute difference of the clusters' shares; zero if none are compared.
+        share_difference: mean absolute difference of the clusters' shares; zero if none are
+            compared.
     """
 
     distances: Mapping[str, float]
@@ -68,7 +70,8 @@ class Evaluation:
 def energy_distance(x: Vectors, y: Vectors) -> float:
     """Energy distance between two samples of vectors, shapes (n, d) and (m, d).
 
-    A component that is nan in either vector of a pair is left out, and the others are scaled up in its place.
+    A component that is nan in either vector of a pair is left out, and the others are scaled up in
+    its place.
     """
     return 2.0 * _mean_distance(x, y) - _mean_distance(x, x) - _mean_distance(y, y)
 
@@ -89,12 +92,15 @@ def as_vectors(missions: pandas.DataFrame) -> Vectors:
 def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> pandas.DataFrame:
     """Simulate missions of one manager; a frame with the columns that are compared."""
     metrics = [simulator.run(manager, run, seed).metrics for run in range(1, runs + 1)]
-    rows = [{"manager": manager, **{name: getattr(each, name) for name in _COLUMNS}} for each in metrics]
+    rows = [
+        {"manager": manager, **{name: getattr(each, name) for name in _COLUMNS}} for each in metrics
+    ]
     return pandas.DataFrame(rows).astype({**dict.fromkeys(_COLUMNS, float), "pipeline_found": bool})
 
 
 def simulate_case(problem: Problem, case: Case, values: Sequence[float]) -> pandas.DataFrame:
-    """Simulate missions of all managers of a case, under all its conditions, with one set of parameter values.
+    """Simulate missions of all managers of a case, under all its conditions, with one set of
+    parameter values.
 
     Returns:
         A row for each mission: manager, condition, and the columns that are compared.
@@ -105,13 +111,16 @@ def simulate_case(problem: Problem, case: Case, values: Sequence[float]) -> pand
     for number, condition in case.conditions.items():
         simulator = Simulator(with_values(case.loaded, {**condition, **own}))
         frames += [
-            simulate(simulator, manager, runs, problem.seed).assign(**{CONDITION: number}) for manager in case.managers
+            simulate(simulator, manager, runs, problem.seed).assign(**{CONDITION: number})
+            for manager in case.managers
         ]
     return pandas.concat(frames, ignore_index=True)
 
 
 def runs_for_each(problem: Problem, case: Case) -> int:
-    """Return the number of missions of each manager under each condition: at least 2, for their spread."""
+    """Return the number of missions of each manager under each condition: at least 2, for their
+    spread.
+    """
     return max(2, -(-problem.runs // len(case.conditions))) if case.has_conditions else problem.runs
 
 
@@ -124,26 +133,36 @@ def evaluate(problem: Problem, values: Sequence[float]) -> Evaluation:
 def compare(case: Case, simulated: pandas.DataFrame) -> CaseLoss:
     """Compare simulated missions, as of simulate, with a case's real ones."""
     distances = {
-        manager: float(np.mean([energy_distance(*pair) for pair in _pairs(case, simulated, manager)]))
+        manager: float(
+            np.mean([energy_distance(*pair) for pair in _pairs(case, simulated, manager)])
+        )
         for manager in case.managers
     }
     difference = 0.0
     if case.shares:
         alike = balanced(case.real, simulated, case.managers) if case.has_conditions else simulated
         counted = [count(share, alike) for share, _ in case.shares]
-        apart = [abs(number / max(1, n) - real) for (number, n), (_, real) in zip(counted, case.shares, strict=True)]
+        apart = [
+            abs(number / max(1, n) - real)
+            for (number, n), (_, real) in zip(counted, case.shares, strict=True)
+        ]
         difference = float(np.mean(apart))
     return CaseLoss(distances, difference)
 
 
-def _pairs(case: Case, simulated: pandas.DataFrame, manager: str) -> Iterator[tuple[Vectors, Vectors]]:
-    """Yield simulated and real missions of a manager for each condition under which there are real ones.
+def _pairs(
+    case: Case, simulated: pandas.DataFrame, manager: str
+) -> Iterator[tuple[Vectors, Vectors]]:
+    """Yield simulated and real missions of a manager for each condition under which there are real
+    ones.
 
     A component that is never known in the real ones is left out.
     """
     ours, theirs = (side[side["manager"] == manager] for side in (simulated, case.real))
     for number in sorted(set(theirs[CONDITION])):
-        real, simulated_ones = (as_vectors(side[side[CONDITION] == number]) for side in (theirs, ours))
+        real, simulated_ones = (
+            as_vectors(side[side[CONDITION] == number]) for side in (theirs, ours)
+        )
         known = ~np.isnan(real).all(axis=0)
         yield simulated_ones[:, known], real[:, known]
 
@@ -155,7 +174,8 @@ class Judgement:
     Attributes:
         conditions: of the case, by number.
         loss: of the case.
-        median_difference_s: median over managers and conditions of |real - simulated median search time|.
+        median_difference_s: median over managers and conditions of |real - simulated median search
+            time|.
     """
 
     conditions: tuple[int, ...]
@@ -164,7 +184,9 @@ class Judgement:
 
 
 def judge(problem: Problem, case: Case, values: Sequence[float]) -> Judgement:
-    """Simulate a case with one set of values; return its loss and the difference of median search times."""
+    """Simulate a case with one set of values; return its loss and the difference of median search
+    times.
+    """
     simulated = simulate_case(problem, case, values)
     compared = compare_conditions(case.real, simulated, case.managers, ["search_time_s"])
     difference_s = float(compared["difference_of_medians"].abs().median())
@@ -176,7 +198,9 @@ def resampling_spread(problem: Problem, best: Evaluation, seed: int) -> float:
 
     A change of the loss smaller than this could as well come from which few missions were made.
     """
-    groups: list[list[list[tuple[Vectors, Vectors]]]] = []  # by case and manager, a pair for each condition
+    groups: list[
+        list[list[tuple[Vectors, Vectors]]]
+    ] = []  # by case and manager, a pair for each condition
     for case in problem.cases:
         simulated = simulate_case(problem, case, best.values)
         groups.append([list(_pairs(case, simulated, manager)) for manager in case.managers])
@@ -186,13 +210,30 @@ def resampling_spread(problem: Problem, best: Evaluation, seed: int) -> float:
 
         def of_manager(pairs: list[tuple[Vectors, Vectors]]) -> float:
             chosen = (real[next(rows)] if len(real) > 1 else real for _, real in pairs)
-            return float(np.mean([energy_distance(ours, real) for (ours, _), real in zip(pairs, chosen, strict=True)]))
+            return float(
+                np.mean(
+                    [
+                        energy_distance(ours, real)
+                        for (ours, _), real in zip(pairs, chosen, strict=True)
+                    ]
+                )
+            )
 
-        return float(np.mean([np.mean([of_manager(pairs) for pairs in managers]) for managers in groups]))
+        return float(
+            np.mean([np.mean([of_manager(pairs) for pairs in managers]) for managers in groups])
+        )
 
-    rows = [np.arange(len(real)) for managers in groups for pairs in managers for _, real in pairs if len(real) > 1]
+    rows = [
+        np.arange(len(real))
+        for managers in groups
+        for pairs in managers
+        for _, real in pairs
+        if len(real) > 1
+    ]
     if not rows:  # one real mission of each manager and condition says nothing of their spread
         return 0.0
     rng = np.random.default_rng(seed)
-    found = bootstrap(rows, mean_distance, n_resamples=RESAMPLES, vectorized=False, method="percentile", rng=rng)
+    found = bootstrap(
+        rows, mean_distance, n_resamples=RESAMPLES, vectorized=False, method="percentile", rng=rng
+    )
     return float(found.standard_error)

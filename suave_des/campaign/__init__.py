@@ -1,1 +1,3 @@
-"""Campaigns: many missions, their executors and result files. Most users need only `run_campaign`."""
+"""Campaigns: many missions, their executors and result files. Most users need only
+`run_campaign`.
+"""

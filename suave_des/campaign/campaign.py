@@ -1,4 +1,6 @@
-"""Campaigns, for programs: many missions of one scenario under several managers, saved as they finish; and training."""
+"""Campaigns, for programs: many missions of one scenario under several managers, saved as they
+finish; and training.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +12,37 @@ from typing import Any, Unpack
 from suave_des import files
 from suave_des.arguments import plain_arguments
 from suave_des.campaign import inputs
-from suave_des.campaign.missions import GIVEN_UP, Campaign, Executor, MissionRunner, Remark, WorkerError
+from suave_des.campaign.missions import (
+    GIVEN_UP,
+    Campaign,
+    Executor,
+    MissionRunner,
+    Remark,
+    WorkerError,
+)
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
-from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range, read_campaign_file
+from suave_des.campaign.spec import (
+    RUNS_LIMIT,
+    SEED_LIMIT,
+    CampaignSpec,
+    check_range,
+    read_campaign_file,
+)
 from suave_des.campaign.workers import LocalWorkers, in_process
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.learned import Learned
 from suave_des.metrics.result import MissionMetrics
 from suave_des.records.mission_folder import provenance
-from suave_des.records.store import STORE_FILE, MissionFailure, Store, StoreError, has_campaign, is_left_over, tidy
+from suave_des.records.store import (
+    STORE_FILE,
+    MissionFailure,
+    Store,
+    StoreError,
+    has_campaign,
+    is_left_over,
+    tidy,
+)
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 
@@ -47,32 +70,52 @@ def run_campaign(
     settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]] = lambda managers: {},
     **options: Any,
 ) -> CampaignResult:
-    """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose arguments it has.
+    """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose
+    arguments it has.
 
-    The result is the same however often the campaign was interrupted and resumed. `on_progress` is called when missions
-    are done; `settings_of` returns settings of the campaign's managers, which a campaign file may name.
+    The result is the same however often the campaign was interrupted and resumed. `on_progress` is
+    called when missions are done; `settings_of` returns settings of the campaign's managers, which
+    a campaign file may name.
 
     Raises:
         CampaignInterrupted: Ctrl-C; finished missions are kept.
         InputError, WorkerError, StoreError: as suave_des.run_campaign.
     """
     if managers is not None:
-        several = managers if isinstance(managers, Iterable) and not isinstance(managers, str | type) else [managers]
+        several = (
+            managers
+            if isinstance(managers, Iterable) and not isinstance(managers, str | type)
+            else [managers]
+        )
         managers = list(map(name_of, several))
     loaded = scenario if isinstance(scenario, LoadedScenario) else None
     named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
     given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
     spec = CampaignSpec.of(named, **given, **options)
     if spec.out is not None:
-        files.check_output_folder(spec.out, "campaign", overwrite=spec.overwrite, left_over=is_left_over)
+        files.check_output_folder(
+            spec.out, "campaign", overwrite=spec.overwrite, left_over=is_left_over
+        )
         if not spec.overwrite and has_campaign(spec.out):
             remedy = f"--resume {spec.out} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
-            raise InputError("the output folder is not empty: it has a campaign in it", file=spec.out, remedy=remedy)
+            raise InputError(
+                "the output folder is not empty: it has a campaign in it",
+                file=spec.out,
+                remedy=remedy,
+            )
     file = read_campaign_file(spec.scenario) if loaded is None else None
     if settings := settings_of(spec.with_file(file).managers):
-        spec = spec.model_copy(update={"replacements": {**spec.replacements, "manager_options": settings}})
+        spec = spec.model_copy(
+            update={"replacements": {**spec.replacements, "manager_options": settings}}
+        )
     with ExitStack() as stack:
-        return _run(stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded), None, on_progress)
+        return _run(
+            stack,
+            spec.with_file(file),
+            lambda: inputs.read_campaign(spec, file, loaded),
+            None,
+            on_progress,
+        )
 
 
 def resume_campaign(
@@ -85,9 +128,11 @@ def resume_campaign(
     managers: Collection[str] = (),
     confirmed: bool = False,
 ) -> CampaignResult:
-    """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it has.
+    """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it
+    has.
 
-    Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
+    Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run
+    again.
 
     Raises:
         InputError: the store is damaged or in use, or as suave_des.resume_campaign.
@@ -96,11 +141,15 @@ def resume_campaign(
     changed = {"runs": runs, "workers": workers, "scheduler": scheduler, "out": Path(folder)}
     changed = {name: value for name, value in changed.items() if value is not None}
     with ExitStack() as stack:
-        store, campaign = stack.enter_context(_stored(Path(folder), changed, managers, confirmed=confirmed))
+        store, campaign = stack.enter_context(
+            _stored(Path(folder), changed, managers, confirmed=confirmed)
+        )
         return _run(stack, campaign.spec, lambda: campaign, store, on_progress)
 
 
-def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: bool = False) -> MissionRunner:
+def opened_campaign(
+    folder: Path, managers: Collection[str] = (), *, confirmed: bool = False
+) -> MissionRunner:
     """Open the campaign in a folder, to run missions of it again.
 
     Args:
@@ -108,8 +157,8 @@ def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: 
         confirmed: whether all code that the folder names may run, see `check_trusted`.
 
     Raises:
-        InputError: there is no campaign in the folder, its inputs no longer exist, or it names code that is neither
-            installed nor named.
+        InputError: there is no campaign in the folder, its inputs no longer exist, or it names code
+            that is neither installed nor named.
     """
     changed = {"managers": tuple(managers)} if managers else {}
     with _stored(folder, changed, managers, confirmed=confirmed) as (_, campaign):
@@ -121,9 +170,13 @@ def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: 
 def _stored(
     folder: Path, changed: Mapping[str, Any], named: Collection[str] = (), *, confirmed: bool
 ) -> Iterator[tuple[Store, Campaign]]:
-    """Open the campaign in a folder, with options that differ from the stored ones; check that its code is trusted."""
+    """Open the campaign in a folder, with options that differ from the stored ones; check that its
+    code is trusted.
+    """
     if not has_campaign(folder):
-        raise InputError("there is no campaign in it", file=folder, remedy="give the --out folder of a campaign")
+        raise InputError(
+            "there is no campaign in it", file=folder, remedy="give the --out folder of a campaign"
+        )
     with closing(Store(folder / STORE_FILE)) as store:
         with store.reading():
             stored = CampaignSpec.model_validate(store.about("request"))
@@ -148,11 +201,14 @@ def _run(
 ) -> CampaignResult:
     """Check a campaign, run the missions that are not done yet, and write the files.
 
-    `stack` closes at the end what is opened here; `store` is that of a campaign that is resumed, None for a new one.
+    `stack` closes at the end what is opened here; `store` is that of a campaign that is resumed,
+    None for a new one.
     """
     executor: Executor = in_process
     spec.check()
-    if spec.processes > 1 and spec.scheduler is None:  # at once: they import while this process reads and checks
+    if (
+        spec.processes > 1 and spec.scheduler is None
+    ):  # at once: they import while this process reads and checks
         executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes
     campaign = read()
     decided_by = inputs.check_campaign(campaign)
@@ -165,7 +221,11 @@ def _run(
         executor = stack.enter_context(connected(spec.scheduler))
     folder, is_new = spec.out, store is None
     decides = inputs.deciding(campaign, decided_by)
-    about = {"request": campaign.request.stored(), "deciding": decides, "identity": inputs.identity(decides)}
+    about = {
+        "request": campaign.request.stored(),
+        "deciding": decides,
+        "identity": inputs.identity(decides),
+    }
     if store is None:
         store = stack.enter_context(_new_store(folder, about))
         if folder is not None:
@@ -183,10 +243,14 @@ def _run(
     command = f"suave-des campaign --resume {folder}"
     if isinstance(stopped, StoreError):
         kept = folder is not None and has_campaign(folder)
-        raise StoreError(f"{stopped}{f'; what was kept before is safe: {command} runs the rest' if kept else ''}")
+        raise StoreError(
+            f"{stopped}{f'; what was kept before is safe: {command} runs the rest' if kept else ''}"
+        )
     try:
         with store.reading():
-            result = gather(campaign, store.outcomes, (*map(str, remarks), *inputs.trained_on(campaign)))
+            result = gather(
+                campaign, store.outcomes, (*map(str, remarks), *inputs.trained_on(campaign))
+            )
             if folder is not None:
                 hashes = {**decided_by, **(campaign.file.inputs if campaign.file else {})}
                 made = provenance(campaign.loaded, hashes, campaign.spec.command)
@@ -207,7 +271,9 @@ def _run(
 
 @contextmanager
 def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]:
-    """Begin the store of a new campaign, in its folder or a temporary one; what is left empty is removed."""
+    """Begin the store of a new campaign, in its folder or a temporary one; what is left empty is
+    removed.
+    """
     if folder is None:
         store = Store(None)
         store.begin(about)
@@ -218,7 +284,9 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
         files.make_output_folder(folder)
         store = Store(folder / STORE_FILE, replace=True)
         try:
-            tidy(folder, is_new=True)  # first, or a kill would leave earlier results beside the new campaign
+            tidy(
+                folder, is_new=True
+            )  # first, or a kill would leave earlier results beside the new campaign
             store.begin(about)
             yield store
         finally:
@@ -232,7 +300,9 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
 def _work(
     campaign: Campaign, store: Store, executor: Executor, on_progress: OnProgress | None
 ) -> tuple[KeyboardInterrupt | SuaveDesError | None, list[Remark]]:
-    """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
+    """Run missions until all are done; return what stopped the campaign before that, and remarks
+    about managers.
+    """
     with store.reading():
         kept = store.about("remarks", default=[])
         remarks = {Remark(manager, text) for manager, text, *_ in kept if text != GIVEN_UP}
@@ -292,7 +362,8 @@ def train(
 
     Args:
         scenario: path of a scenario file, or name of a shipped one.
-        manager: name, or module:Class; it keeps what it learns in the dict that its hook `recall` is given.
+        manager: name, or module:Class; it keeps what it learns in the dict that its hook `recall`
+            is given.
         missions: how many: runs 1 to that.
         on_mission: called with the metrics of each mission.
         replacements: as of load_scenario.
@@ -301,7 +372,9 @@ def train(
         InputError: something given cannot be used, or nothing was learned; nothing is written then.
         MissionError: the manager raised; nothing is written then.
     """
-    from suave_des.simulation.simulator import Simulator  # with the compiler, which campaigns load in their workers
+    from suave_des.simulation.simulator import (
+        Simulator,
+    )  # with the compiler, which campaigns load in their workers
 
     files.check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)

@@ -1,7 +1,8 @@
 """The workers of a Dask cluster as an executor.
 
-Everything that a campaign needs is sent by value; all machines need suave-des and its libraries in the same versions. A
-worker is one process that runs one mission after the other (`dask worker --nworkers N --nthreads 1`).
+Everything that a campaign needs is sent by value; all machines need suave-des and its libraries in
+the same versions. A worker is one process that runs one mission after the other (`dask worker
+--nworkers N --nthreads 1`).
 """
 
 from __future__ import annotations
@@ -27,7 +28,14 @@ from typing import Any
 from distributed import Client, KilledWorker, get_worker
 
 from suave_des.campaign.inputs import MAIN, code_versions, user_modules
-from suave_des.campaign.missions import Campaign, Chunk, Executor, Finished, MissionRunner, WorkerError
+from suave_des.campaign.missions import (
+    Campaign,
+    Chunk,
+    Executor,
+    Finished,
+    MissionRunner,
+    WorkerError,
+)
 from suave_des.campaign.workers import finished, packed, unpacked
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.records.store import MissionKey
@@ -38,47 +46,66 @@ ANSWER_TIMEOUT_S, _LOOK_S = 10.0, 1.0
 _AHEAD = 3
 """Chunks for each worker: one under way and some to go on with."""
 _LARGEST_CHUNK, _SHARES = 50, 10
-"""Missions in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets at least."""
+"""Missions in a chunk, which is lost when a campaign is stopped; and chunks that each worker gets
+at least.
+"""
 _EXIT_AFTER_S = 30.0
-"""Missions that are so much over their time, in code that cannot be interrupted, end their worker."""
+"""Missions that are so much over their time, in code that cannot be interrupted, end their
+worker.
+"""
 
 
 @contextmanager
 def connected(scheduler: str) -> Iterator[Executor]:
-    """Connect to the cluster of a scheduler, such as tcp://127.0.0.1:8786, until it is no longer needed.
+    """Connect to the cluster of a scheduler, such as tcp://127.0.0.1:8786, until it is no longer
+    needed.
 
     Raises:
         InputError: there is no such scheduler.
     """
     with ExitStack() as stack:
         for name in list(logging.root.manager.loggerDict):
-            if name.startswith(("distributed", "tornado", "asyncio")) and not logging.getLogger(name).disabled:
-                logging.getLogger(name).disabled = True  # relevant problems are reported as errors of suave-des
+            if (
+                name.startswith(("distributed", "tornado", "asyncio"))
+                and not logging.getLogger(name).disabled
+            ):
+                logging.getLogger(
+                    name
+                ).disabled = True  # relevant problems are reported as errors of suave-des
                 stack.callback(setattr, logging.getLogger(name), "disabled", False)
         try:
-            client = stack.enter_context(Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False))
+            client = stack.enter_context(
+                Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False)
+            )
         except Exception as error:
             problem = f"scheduler: {scheduler} does not answer as a Dask scheduler: {error}"
-            raise InputError(problem, remedy="check that `dask scheduler` is running there") from None
+            raise InputError(
+                problem, remedy="check that `dask scheduler` is running there"
+            ) from None
         yield partial(_outcomes, client, scheduler)
 
 
 def _outcomes(
     client: Any, scheduler: str, campaign: Campaign, missions: Iterable[MissionKey], total: int
 ) -> Iterator[list[Finished]]:
-    """Run chunks of missions on whatever workers the cluster has at the time; yield outcomes chunk by chunk.
+    """Run chunks of missions on whatever workers the cluster has at the time; yield outcomes chunk
+    by chunk.
 
-    A worker that dies loses nothing: Dask gives its chunks to others. The missions of chunks with which workers die
-    again and again are run alone, one after the other, and one with which they die even so has failed.
+    A worker that dies loses nothing: Dask gives its chunks to others. The missions of chunks with
+    which workers die again and again are run alone, one after the other, and one with which they
+    die even so has failed.
     """
     token, remaining = uuid.uuid4().hex, iter(missions)
     under_way, suspects, ended = dict[Any, Chunk](), list[MissionKey](), SimpleQueue[Any]()
-    # As the result of a task, it can be made again wherever a worker died that had it, and is sent to each once.
+    # As the result of a task, it can be made again wherever a worker died that had it, and is sent
+    # to each once.
     parcel = client.submit(bytes, pack(campaign), key=f"suave_des_parcel-{token}")
     submit = partial(client.submit, run, token, parcel, pure=False)
     try:
         while client.status == "running":
-            workers = max(2, len(client.scheduler_info()["workers"]))  # one that grows with its work begins with none
+            workers = max(
+                2, len(client.scheduler_info()["workers"])
+            )  # one that grows with its work begins with none
             size = max(1, min(total // (_SHARES * workers), _LARGEST_CHUNK))
             while len(under_way) < _AHEAD * workers and (chunk := tuple(islice(remaining, size))):
                 under_way[future := submit(chunk)] = chunk
@@ -105,9 +132,13 @@ def _outcomes(
     except Exception as error:
         if client.status != "running" or any(future.cancelled() for future in (parcel, *under_way)):
             raise WorkerError(f"the connection to the scheduler {scheduler} is lost") from None
-        raise WorkerError(f"a task cannot be run on the cluster: {type(error).__name__}: {error}") from error
+        raise WorkerError(
+            f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
+        ) from error
     finally:
-        if client.status == "running":  # have the cluster forget the campaign, which may be over or not
+        if (
+            client.status == "running"
+        ):  # have the cluster forget the campaign, which may be over or not
             with suppress(Exception):
                 client.cancel([*under_way, parcel], force=True)
                 client.run(forget, token, on_error="ignore")
@@ -120,11 +151,18 @@ def pack(campaign: Campaign) -> bytes:
     managers = {name: manager_class(name) for name in campaign.spec.managers}
     loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), managers))
     with suppress(InputError):  # reported by the managers that reason with it, if there are any
-        loaded = replace(loaded, ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies))))
+        loaded = replace(
+            loaded, ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies)))
+        )
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]
     modules = user_modules(campaign.spec.managers, functions).items()
-    sources = {place: path.read_bytes() for place, path in modules if place != MAIN}  # its classes are sent by value
-    files = {path: path.read_bytes() for path in (*loaded.ontologies, *loaded.rules, *loaded.manager_files.values())}
+    sources = {
+        place: path.read_bytes() for place, path in modules if place != MAIN
+    }  # its classes are sent by value
+    files = {
+        path: path.read_bytes()
+        for path in (*loaded.ontologies, *loaded.rules, *loaded.manager_files.values())
+    }
     return pickle.dumps((code_versions(), packed(replace(campaign, loaded=loaded)), files, sources))
 
 
@@ -133,14 +171,17 @@ def pack(campaign: Campaign) -> bytes:
 _current: dict[str, tuple[MissionRunner, ExitStack]] = {}
 """What runs missions of a campaign, and what removes its files and modules, by its token."""
 _lock = threading.Lock()
-"""Missions run one at a time, however many threads a worker has: they need the process for themselves."""
+"""Missions run one at a time, however many threads a worker has: they need the process for
+themselves.
+"""
 
 
 def run(token: str, parcel: bytes, chunk: Chunk) -> list[Finished]:
-    """Run missions of a campaign, for which its token stands, in this process, and return their outcomes.
+    """Run missions of a campaign, for which its token stands, in this process, and return their
+    outcomes.
 
-    `parcel` is what pack returned on the machine that it was started on. Missions in code that cannot be interrupted
-    end the process, like those that have no memory.
+    `parcel` is what pack returned on the machine that it was started on. Missions in code that
+    cannot be interrupted end the process, like those that have no memory.
 
     Raises:
         InputError: the campaign cannot be run here.
@@ -159,14 +200,22 @@ def run(token: str, parcel: bytes, chunk: Chunk) -> list[Finished]:
 
 
 def _prepared(parcel: bytes) -> tuple[MissionRunner, ExitStack]:
-    """Write what was packed into a folder; return what runs the missions, and what removes the folder again."""
+    """Write what was packed into a folder; return what runs the missions, and what removes the
+    folder again.
+    """
     versions, content, files, sources = pickle.loads(parcel)
     worker = get_worker()
     for name, value in sorted(versions.items() - code_versions().items()):
         problem = f"{name} is {code_versions().get(name, 'missing')} on worker {worker.address}, and {value} here"
-        raise InputError(f"{problem}, which could change results", remedy="install the same version everywhere")
+        raise InputError(
+            f"{problem}, which could change results", remedy="install the same version everywhere"
+        )
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="suave-des-", dir=worker.local_directory)))
+        folder = Path(
+            stack.enter_context(
+                tempfile.TemporaryDirectory(prefix="suave-des-", dir=worker.local_directory)
+            )
+        )
 
         def written(place: str, text: bytes) -> Path:
             (path := folder / place).parent.mkdir(parents=True, exist_ok=True)
@@ -181,14 +230,20 @@ def _prepared(parcel: bytes) -> tuple[MissionRunner, ExitStack]:
         importlib.invalidate_caches()
         sys.path.insert(0, str(folder / "modules"))
         stack.callback(sys.path.remove, str(folder / "modules"))
-        # Each file is in a folder of its own: it keeps its name, which counts, and is beside no other.
-        here = {path: written(f"{n:06}/{path.name}", text) for n, (path, text) in enumerate(files.items())}
+        # Each file is in a folder of its own: it keeps its name, which counts, and is beside no
+        # other.
+        here = {
+            path: written(f"{n:06}/{path.name}", text)
+            for n, (path, text) in enumerate(files.items())
+        }
         campaign = unpacked(content)
         loaded = replace(
             campaign.loaded,
             ontologies=tuple(here[path] for path in campaign.loaded.ontologies),
             rules=tuple(here[path] for path in campaign.loaded.rules),
-            manager_files={name: here[path] for name, path in campaign.loaded.manager_files.items()},
+            manager_files={
+                name: here[path] for name, path in campaign.loaded.manager_files.items()
+            },
         )
         return MissionRunner(replace(campaign, loaded=loaded)), stack.pop_all()
 

@@ -1,7 +1,8 @@
-"""The inputs of a campaign, which determine its results: scenario, variation, managers, files, code and versions.
+"""The inputs of a campaign, which determine its results: scenario, variation, managers, files, code
+and versions.
 
-They are read first, which runs no code of the user's; then what they refer to may be trusted or not; then they are
-checked, and every file that decides results is hashed.
+They are read first, which runs no code of the user's; then what they refer to may be trusted or
+not; then they are checked, and every file that decides results is hashed.
 """
 
 from __future__ import annotations
@@ -33,24 +34,40 @@ from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, shown
 from suave_des.files import LIMIT_BYTES, sha256_of
 from suave_des.learned import read_file
 from suave_des.records.mission_folder import versions
-from suave_des.registry import cause_of, custom_functions, declared_files, is_built_in, manager_class, takes_argument
+from suave_des.registry import (
+    cause_of,
+    custom_functions,
+    declared_files,
+    is_built_in,
+    manager_class,
+    takes_argument,
+)
 from suave_des.resources import hashes, shipped_folder, shown_name
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 
 _TIME_OUTS_S = {"owlready2": 1800.0}
-"""Time that a mission may take with a reasoner, if not the default: owlready2 takes some two minutes a mission."""
+"""Time that a mission may take with a reasoner, if not the default: owlready2 takes some two
+minutes a mission.
+"""
 _told: set[Hashable] = set()
-"""What this process has checked for mistakes, and reported: a script may run thousands of missions with the same."""
+"""What this process has checked for mistakes, and reported: a script may run thousands of missions
+with the same.
+"""
 
 
-def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None) -> Campaign:
-    """Read the scenario of a campaign, unless it is given, and what varies, without running any code of the user's.
+def read_campaign(
+    request: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None
+) -> Campaign:
+    """Read the scenario of a campaign, unless it is given, and what varies, without running any
+    code of the user's.
 
     Raises:
         InputError: an input is invalid.
     """
     spec = request.with_file(file)
-    loaded = load_scenario(loaded or (spec.scenario if file is None else file.scenario), **spec.replacements)
+    loaded = load_scenario(
+        loaded or (spec.scenario if file is None else file.scenario), **spec.replacements
+    )
     with _located(file):
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw)
     inputs: dict[str, str] = {}
@@ -63,7 +80,9 @@ def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: Load
         spec = spec.model_copy(update={"time_out_s": time_out_s})
     if spec.suave_format and variation.sweep.points > 1:
         remedy = "omit --format suave, or run a campaign for each point"
-        raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
+        raise InputError(
+            "the exemplar's results file has no columns for swept values", remedy=remedy
+        )
     return Campaign(request, spec, loaded, variation, file, inputs)
 
 
@@ -76,11 +95,14 @@ def _located(file: CampaignFile | None) -> Iterator[None]:
         raise error if file is None else file.located(error) from None
 
 
-def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, confirmed: bool) -> None:
-    """Check that the user trusts the code that a campaign folder refers to; nothing is imported before that.
+def check_trusted(
+    campaign: Campaign, named: Collection[str], folder: Path, *, confirmed: bool
+) -> None:
+    """Check that the user trusts the code that a campaign folder refers to; nothing is imported
+    before that.
 
-    He does if he has named or confirmed it, if it is imported already, as by a script that resumes its own campaign,
-    or if he has begun the campaign himself.
+    He does if he has named or confirmed it, if it is imported already, as by a script that resumes
+    its own campaign, or if he has begun the campaign himself.
 
     Raises:
         InputError: a manager or a class is neither.
@@ -92,13 +114,17 @@ def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, c
     unknown = [name for name in campaign.code() if name not in named and not is_imported(name)]
     begun = dict(_begun().read()) if unknown else {}
     if not confirmed and any(_note(folder, name) not in begun for name in unknown):
-        problem = f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to"
+        problem = (
+            f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to"
+        )
         remedy = f"if you trust it, give --managers {shlex.quote(','.join(unknown))} or --yes"
         raise InputError(problem, file=folder, remedy=remedy)
 
 
 def note_own(campaign: Campaign, folder: Path) -> None:
-    """Note, outside of its folder, that this user has begun a campaign with its code, see `check_trusted`."""
+    """Note, outside of its folder, that this user has begun a campaign with its code, see
+    `check_trusted`.
+    """
     for name in campaign.code():
         _begun().add(_note(folder, name), True)
 
@@ -118,36 +144,46 @@ def _note(folder: Path, name: str) -> str:
 
 
 def check_campaign(campaign: Campaign) -> dict[str, str]:
-    """Check the inputs of a campaign as check_inputs does, and return the SHA-256 of each further file that decides."""
+    """Check the inputs of a campaign as check_inputs does, and return the SHA-256 of each further
+    file that decides.
+    """
     spec = campaign.spec
     with _located(campaign.file):
         check_drawn(campaign.loaded, campaign.variation)
     points = sorted(set(campaign.variation.sweep.each_value()))
     scenarios = (campaign.variation.scenario(campaign.loaded, point).scenario for point in points)
-    for words, number in Counter(words for each in scenarios for words in each.without_effect()).items():
+    for words, number in Counter(
+        words for each in scenarios for words in each.without_effect()
+    ).items():
         where = f", at {number} of {len(points)} swept values" if len(points) > 1 else ""
         logging.getLogger(MISTAKES_LOGGER).warning("note: %s%s", words, where)
-    return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, spec.replacements)}
+    return {
+        **campaign.inputs,
+        **check_inputs(tuple(campaign.scenarios()), spec.managers, spec.replacements),
+    }
 
 
 def check_inputs(
     scenarios: Sequence[LoadedScenario], managers: Sequence[str], replacements: Mapping[str, Any]
 ) -> dict[str, str]:
-    """Check the inputs of missions before they run: functions, knowledge base, managers and their files.
+    """Check the inputs of missions before they run: functions, knowledge base, managers and their
+    files.
 
     The knowledge base is opened if a manager uses it or the user gave ontologies or rules.
 
     Args:
-        scenarios: those of the missions; what differs between them is what managers and functions are set to.
+        scenarios: those of the missions; what differs between them is what managers and functions
+            are set to.
         replacements: what the user gave instead of the scenario's own files, as of load_scenario.
 
     Returns:
-        SHA-256 of each input file that is not among those of the scenario, by its name as shown to the user, or its
-        place among modules: of ontologies that are imported, of code, and of files that managers declare.
+        SHA-256 of each input file that is not among those of the scenario, by its name as shown to
+        the user, or its place among modules: of ontologies that are imported, of code, and of files
+        that managers declare.
 
     Raises:
-        InputError: a function has no node; the knowledge base cannot be used; a manager refuses the scenario, or a file
-            of it cannot be read.
+        InputError: a function has no node; the knowledge base cannot be used; a manager refuses the
+            scenario, or a file of it cannot be read.
     """
     files, kinds = list[Path](), {name: manager_class(name) for name in managers}
     given = any(replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
@@ -155,7 +191,9 @@ def check_inputs(
         files += _check_knowledge(scenarios[0])
     functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     code = user_modules(managers, functions)
-    for module in _defining(managers, functions):  # of a class that a package has installed, its module
+    for module in _defining(
+        managers, functions
+    ):  # of a class that a package has installed, its module
         path = Path(getattr(sys.modules[module], "__file__", None) or "")
         if path.is_file() and path not in code.values():
             code[f"{module.replace('.', '/')}{path.suffix}"] = path
@@ -168,15 +206,18 @@ def check_inputs(
             raise InputError(f"manager {manager}: check raised {cause_of(error)}") from error
     files += declared_files(scenarios, kinds).values()
     inputs = hashes(files, LIMIT_BYTES)
-    code = {place if place not in inputs else f"module {place}": path for place, path in code.items()}
+    code = {
+        place if place not in inputs else f"module {place}": path for place, path in code.items()
+    }
     return inputs | {place: sha256_of(path) for place, path in code.items()}
 
 
 def _check_knowledge(loaded: LoadedScenario) -> Sequence[Path]:
     """Open a scenario's knowledge base and draw its first conclusion; return its files.
 
-    What `kb check` would say without a reasoner is logged, errors and warnings, once for the same files. That takes
-    some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
+    What `kb check` would say without a reasoner is logged, errors and warnings, once for the same
+    files. That takes some 40 ms, and nothing if all files are the shipped ones, which have no
+    mistakes.
     """
     from suave_des.knowledge.checks import findings_in
     from suave_des.knowledge.state import KnowledgeState
@@ -197,20 +238,30 @@ def _check_knowledge(loaded: LoadedScenario) -> Sequence[Path]:
         return base.files
     _told.add(checked)
     subject = subject_of(loaded)
-    findings = [each for each in ordered(findings_in(base, subject)) if each.level is not Level.NOTE]
+    findings = [
+        each for each in ordered(findings_in(base, subject)) if each.level is not Level.NOTE
+    ]
     for each in findings:
         logger.warning("%s", each)
     if findings:
-        logger.warning("note: suave-des kb check, with the same files, looks for contradictions, too")
+        logger.warning(
+            "note: suave-des kb check, with the same files, looks for contradictions, too"
+        )
     return base.files
 
 
 def trained_on(campaign: Campaign) -> Iterator[str]:
-    """Yield a remark for each manager that was trained on missions of the campaign: its results say little."""
+    """Yield a remark for each manager that was trained on missions of the campaign: its results say
+    little.
+    """
     own = campaign.loaded.scenario.name, campaign.spec.seed
     for manager in campaign.spec.managers:
-        settings = [(each, each.manager_settings(manager).get("learned")) for each in campaign.scenarios()]
-        files = {each.manager_file(manager, str(name)) for each, name in settings if name is not None}
+        settings = [
+            (each, each.manager_settings(manager).get("learned")) for each in campaign.scenarios()
+        ]
+        files = {
+            each.manager_file(manager, str(name)) for each, name in settings if name is not None
+        }
         trainings = [read_file(path) for path in files]
         if seen := [each.missions for each in trainings if (each.scenario, each.seed) == own]:
             last = min(campaign.spec.runs, max(seen))
@@ -219,18 +270,32 @@ def trained_on(campaign: Campaign) -> Iterator[str]:
 
 # The code of users' managers and functions: it decides results, and is sent to other machines.
 
-_DECIDING = {"managers", "runs", "seed", "time_out_s", "sweep", "perturbations", "runs_per_draw", "record_knowledge"}
+_DECIDING = {
+    "managers",
+    "runs",
+    "seed",
+    "time_out_s",
+    "sweep",
+    "perturbations",
+    "runs_per_draw",
+    "record_knowledge",
+}
 """Fields of the specification that determine results as they are."""
 MAIN = "__main__.py"
 """Place of a script that defines a class itself."""
 _INSTALLED = (
-    *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+    *(
+        Path(sysconfig.get_path(kind)).resolve()
+        for kind in ("stdlib", "platstdlib", "purelib", "platlib")
+    ),
     Path(suave_des.__file__).resolve().parent,
 )
 
 
 def _defining(managers: Iterable[str], functions: Iterable[type]) -> list[str]:
-    """Return the modules that managers are named with, and those in which they and functions are defined."""
+    """Return the modules that managers are named with, and those in which they and functions are
+    defined.
+    """
     modules = [kind.__module__ for kind in functions]
     for manager in managers:
         if not is_built_in(manager) and not takes_argument(manager):
@@ -240,12 +305,15 @@ def _defining(managers: Iterable[str], functions: Iterable[type]) -> list[str]:
 
 
 def user_modules(managers: Iterable[str], functions: Iterable[type]) -> dict[str, Path]:
-    """Find the files that define managers and functions, and what these import: all that no package manager installed.
+    """Find the files that define managers and functions, and what these import: all that no package
+    manager installed.
 
-    Imports are read from the source, so that one inside a function counts too; one by a computed name does not.
+    Imports are read from the source, so that one inside a function counts too; one by a computed
+    name does not.
 
     Returns:
-        Each file by its place below a folder of modules, such as "package/module.py"; a script is at MAIN.
+        Each file by its place below a folder of modules, such as "package/module.py"; a script is
+        at MAIN.
     """
     found: dict[str, Path] = {}
     names = _defining(managers, functions)
@@ -265,7 +333,9 @@ def user_modules(managers: Iterable[str], functions: Iterable[type]) -> dict[str
             if not spec.has_location or spec.origin is None:
                 continue  # a folder without __init__.py
             path, is_package = Path(spec.origin), spec.submodule_search_locations is not None
-            place = "/".join(parts[:depth]) + (f"/__init__{path.suffix}" if is_package else path.suffix)
+            place = "/".join(parts[:depth]) + (
+                f"/__init__{path.suffix}" if is_package else path.suffix
+            )
             if place not in found:
                 found[place] = path
                 names += _imports(path, within if is_package else within.rpartition(".")[0])
@@ -281,10 +351,15 @@ def _spec(name: str) -> ModuleSpec | None:
 
 
 def _is_users(spec: ModuleSpec) -> bool:
-    places = [spec.origin] if spec.has_location and spec.origin else spec.submodule_search_locations or ()
+    places = (
+        [spec.origin]
+        if spec.has_location and spec.origin
+        else spec.submodule_search_locations or ()
+    )
     paths = [Path(place).resolve() for place in places]
     return bool(paths) and not any(
-        {"site-packages", "dist-packages"} & {*path.parts} or any(map(path.is_relative_to, _INSTALLED))
+        {"site-packages", "dist-packages"} & {*path.parts}
+        or any(map(path.is_relative_to, _INSTALLED))
         for path in paths
     )
 
@@ -293,13 +368,18 @@ def _imports(path: Path, package: str) -> Iterator[str]:
     """Yield the names that a file imports; some of them may be names in modules."""
     try:
         tree = ast.parse(path.read_bytes())
-    except (SyntaxError, ValueError):  # compiled, or an import that is not reached, or it would have been raised
+    except (
+        SyntaxError,
+        ValueError,
+    ):  # compiled, or an import that is not reached, or it would have been raised
         return
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
+            above = (
+                package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
+            )
             name = ".".join([*above, *([node.module] if node.module else [])])
             yield name
             yield from (f"{name}.{alias.name}" for alias in node.names)
@@ -310,7 +390,9 @@ def _imports(path: Path, package: str) -> Iterator[str]:
 
 @cache
 def code_versions() -> dict[str, str]:
-    """Return what must be equal on all machines of a campaign: versions, the code of suave-des itself, and the kind."""
+    """Return what must be equal on all machines of a campaign: versions, the code of suave-des
+    itself, and the kind.
+    """
     total, folder = hashlib.sha256(), Path(suave_des.__file__).parent
     for path in sorted(folder.rglob("*.py")):
         total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
@@ -318,12 +400,17 @@ def code_versions() -> dict[str, str]:
 
 
 def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """Return everything that determines a campaign's results, as plain data; `inputs` are those of check_campaign."""
+    """Return everything that determines a campaign's results, as plain data; `inputs` are those of
+    check_campaign.
+    """
     spec, loaded = campaign.spec, campaign.loaded
-    # The scenario's own files are compared by their content: another comment in them decides nothing.
+    # The scenario's own files are compared by their content: another comment in them decides
+    # nothing.
     modes = shown_name(loaded.modes_path)
     files = {
-        name: digest for name, digest in loaded.inputs.items() if name == modes or not name.endswith((".yaml", ".yml"))
+        name: digest
+        for name, digest in loaded.inputs.items()
+        if name == modes or not name.endswith((".yaml", ".yml"))
     }
     return {
         "versions": versions(),
@@ -336,13 +423,16 @@ def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
 
 
 def identity(decides: Mapping[str, Any]) -> str:
-    """Return the identity of a campaign, which added runs do not change, to tell it from others in its folder."""
+    """Return the identity of a campaign, which added runs do not change, to tell it from others in
+    its folder.
+    """
     same = {name: value for name, value in decides.items() if name != "runs"}
     return hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
 
 
 def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
-    """Check that everything that determines results is unchanged, except for added runs, so that a campaign can resume.
+    """Check that everything that determines results is unchanged, except for added runs, so that a
+    campaign can resume.
 
     Raises:
         InputError: something differs, with its name and both values.
@@ -350,7 +440,9 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
     for place, old, new in _differences(before, now, ""):
         if place == "runs" and new >= old:
             continue
-        problem = f"the campaign cannot be resumed: {place} was {shown(old)}, and is now {shown(new)}"
+        problem = (
+            f"the campaign cannot be resumed: {place} was {shown(old)}, and is now {shown(new)}"
+        )
         remedy = "undo that, or start a new campaign in another folder or with --overwrite"
         raise InputError(problem, file=folder, remedy=remedy)
 
@@ -358,8 +450,15 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
 def _differences(before: Any, now: Any, place: str) -> Iterator[tuple[str, Any, Any]]:
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for key in {**before, **now}:
-            yield from _differences(before.get(key), now.get(key), f"{place}.{key}" if place else str(key))
-    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now) and place != "managers":
+            yield from _differences(
+                before.get(key), now.get(key), f"{place}.{key}" if place else str(key)
+            )
+    elif (
+        isinstance(before, list)
+        and isinstance(now, list)
+        and len(before) == len(now)
+        and place != "managers"
+    ):
         for index, (old, new) in enumerate(zip(before, now, strict=True)):
             yield from _differences(old, new, f"{place}[{index}]")
     elif before != now:

@@ -1,4 +1,6 @@
-"""A campaign's missions: which have to be run, what they share, how one is run within its time, and what comes out."""
+"""A campaign's missions: which have to be run, what they share, how one is run within its time, and
+what comes out.
+"""
 
 from __future__ import annotations
 
@@ -33,10 +35,14 @@ NOT_REPEATABLE = (
     " to the next, or has its own source of randomness, so results depend on the number of workers."
     " To learn, use `suave-des train`; for random numbers, system.stream"
 )
-GIVEN_UP = "its first 3 missions here took too long, and none was finished, so the others were left out"
+GIVEN_UP = (
+    "its first 3 missions here took too long, and none was finished, so the others were left out"
+)
 _IN_VAIN = 3
 _REPEATED_AFTER = {2, *(4**power for power in range(1, 11))}
-"""Missions of a manager in a process after which its first is run again, as its class may keep state"""
+"""Missions of a manager in a process after which its first is run again, as its class may keep
+state
+"""
 _REPEAT_S = 1.0
 """A mission that swallowed the interruption is interrupted again after this time."""
 
@@ -86,28 +92,49 @@ class Campaign:
     def missions(self, settled: Callable[[int, int], Collection[int]]) -> Iterator[MissionKey]:
         """Yield the missions that have yet to be run, in order.
 
-        `settled` returns the runs of a manager at a point that need not be run; it is called when their turn comes.
+        `settled` returns the runs of a manager at a point that need not be run; it is called when
+        their turn comes.
         """
-        for point, manager in product(range(self.variation.sweep.points), range(len(self.spec.managers))):
+        for point, manager in product(
+            range(self.variation.sweep.points), range(len(self.spec.managers))
+        ):
             known = settled(point, manager)
-            yield from (MissionKey(point, manager, run) for run in range(1, self.spec.runs + 1) if run not in known)
+            yield from (
+                MissionKey(point, manager, run)
+                for run in range(1, self.spec.runs + 1)
+                if run not in known
+            )
 
     def scenarios(self) -> Iterator[LoadedScenario]:
-        """Yield scenarios that together have every swept value of what managers and functions are set to."""
-        if any(path.startswith(("managers.", "functions.")) for path in self.variation.paths.values()):
+        """Yield scenarios that together have every swept value of what managers and functions are
+        set to.
+        """
+        if any(
+            path.startswith(("managers.", "functions.")) for path in self.variation.paths.values()
+        ):
             for point in sorted(set(self.variation.sweep.each_value())):
                 yield self.variation.scenario(self.loaded, point)
         else:
             yield self.loaded
 
     def code(self) -> tuple[str, ...]:
-        """Return the managers and the classes of functions that it runs and that no package has installed."""
-        nodes = [each.node for scenario in self.scenarios() for each in scenario.scenario.functions.values()]
+        """Return the managers and the classes of functions that it runs and that no package has
+        installed.
+        """
+        nodes = [
+            each.node
+            for scenario in self.scenarios()
+            for each in scenario.scenario.functions.values()
+        ]
         managers = [name for name in self.spec.managers if not is_installed(name)]
         return tuple(dict.fromkeys([*managers, *(node for node in nodes if ":" in node)]))
 
-    def failed(self, key: MissionKey, cause: str, time_s: float | None = None) -> tuple[MissionKey, MissionFailure]:
-        """Return the outcome of a mission that was ended, at a mission time, or whose process was."""
+    def failed(
+        self, key: MissionKey, cause: str, time_s: float | None = None
+    ) -> tuple[MissionKey, MissionFailure]:
+        """Return the outcome of a mission that was ended, at a mission time, or whose process
+        was.
+        """
         manager = self.spec.managers[key.manager]
         return key, MissionFailure(manager, key.run, time_s, cause, lasting=False, point=key.point)
 
@@ -120,9 +147,10 @@ class Campaign:
 Executor = Callable[[Campaign, Iterable[MissionKey], int], Iterator[list[Finished]]]
 """Runs missions somewhere: in this process, in worker processes, or on a cluster.
 
-It takes the campaign, the keys of missions, each of which is requested only when a worker has room for it, and about
-how many they are. It yields their outcomes, some at a time, in the order in which they finish. It raises InputError if
-the scenario, a manager or the knowledge base cannot be used at all, and WorkerError if workers end again and again.
+It takes the campaign, the keys of missions, each of which is requested only when a worker has room
+for it, and about how many they are. It yields their outcomes, some at a time, in the order in which
+they finish. It raises InputError if the scenario, a manager or the knowledge base cannot be used at
+all, and WorkerError if workers end again and again.
 """
 
 
@@ -131,7 +159,8 @@ class MissionRunner:
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign, self._variation = campaign, campaign.variation
-        # Load or compile what missions run, before the first one's time counts: a mission of a second does.
+        # Load or compile what missions run, before the first one's time counts: a mission of a
+        # second does.
         short_mission(campaign.loaded)
         members = len(self._variation.ensemble.members) if self._variation.ensemble else 1
         self._simulator = lru_cache(members)(self._simulator_of)  # missions come point by point
@@ -169,13 +198,19 @@ class MissionRunner:
                 self._too_long[key.manager] += 1
                 if self._too_long[key.manager] == _IN_VAIN:
                     yield key, Remark(manager, GIVEN_UP)
-            if not is_built_in(manager) and not isinstance(outcome, MissionFailure) and self._differs(key, outcome):
+            if (
+                not is_built_in(manager)
+                and not isinstance(outcome, MissionFailure)
+                and self._differs(key, outcome)
+            ):
                 yield key, Remark(manager, NOT_REPEATABLE)
             for remark in remarks:
                 yield key, remark
 
     def _differs(self, key: MissionKey, outcome: Row | MissionFailure) -> bool:
-        """Whether a manager's first mission in this process gives another outcome when it is run again."""
+        """Whether a manager's first mission in this process gives another outcome when it is run
+        again.
+        """
         first, before = self._first.setdefault(key.manager, (key, outcome))
         self._number[key.manager] += 1
         if self._number[key.manager] not in _REPEATED_AFTER:
@@ -185,14 +220,20 @@ class MissionRunner:
 
     def _outcome(self, key: MissionKey) -> tuple[Row | MissionFailure, list[Remark]]:
         """Run a mission; return its outcome, and what its manager's author should know."""
-        spec, variation, manager = self.campaign.spec, self._variation, self.campaign.spec.managers[key.manager]
+        spec, variation, manager = (
+            self.campaign.spec,
+            self._variation,
+            self.campaign.spec.managers[key.manager],
+        )
         values, member = variation.sweep.values(key.point), variation.member(key.run)
         simulator = self._simulator(key.point, member)
         try:
             with _time_limit(spec.time_out_s):
                 result = simulator.run(manager, key.run, spec.seed, record=spec.record_knowledge)
         except MissionError as error:
-            return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point), []
+            return MissionFailure(
+                error.manager, error.run, error.time_s, error.cause, point=key.point
+            ), []
         except MissionTimeOut as error:
             place = place_of(error)
             cause = f"{self.campaign.too_long}{place and f', in {place}'}"
@@ -200,16 +241,28 @@ class MissionRunner:
             return failure, []
         drawn = (result.drawn[path] for path in variation.drawn)
         members = () if member is None else (member,)
-        row = (*row_of(result.metrics), *map(cell_of, values.values()), *drawn, *members, *further_of(result))
+        row = (
+            *row_of(result.metrics),
+            *map(cell_of, values.values()),
+            *drawn,
+            *members,
+            *further_of(result),
+        )
         if spec.record_knowledge:
             swept = {variation.paths[name]: value for name, value in values.items()}
-            known = mission_line(manager, key.point, key.run, result.knowledge, swept) if result.knowledge else ""
+            known = (
+                mission_line(manager, key.point, key.run, result.knowledge, swept)
+                if result.knowledge
+                else ""
+            )
             row = (*row, known)
         return row, [Remark(manager, text) for text in result.remarks]
 
     def _simulator_of(self, point: int, member: int | None) -> Simulator:
         """Make the simulator of a point and of a member of the ensemble."""
-        from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
+        from suave_des.simulation.simulator import (
+            Simulator,
+        )  # with it comes the compiler, which takes a while
 
         variation = self._variation
         loaded = variation.scenario(self.campaign.loaded, point, member)
@@ -223,7 +276,8 @@ class MissionRunner:
 def _time_limit(seconds: float) -> Iterator[None]:
     """Raise MissionTimeOut in the block when it takes longer, and again while it swallows that.
 
-    The alarm signal reaches the main thread in whatever it waits for; other threads when they return to Python.
+    The alarm signal reaches the main thread in whatever it waits for; other threads when they
+    return to Python.
     """
     if threading.current_thread() is threading.main_thread():
         with handled([signal.SIGALRM], _raise), alarm(seconds, _REPEAT_S):

@@ -36,16 +36,25 @@ def is_live() -> bool:
 
 @contextmanager
 def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
-    """Show progress of the campaign `label` until the end, and yield what to give to it as on_progress.
+    """Show progress of the campaign `label` until the end, and yield what to give to it as
+    on_progress.
 
-    Elsewhere than on a terminal or in a notebook it is lines, the first after 10 s and then every 30 s.
+    Elsewhere than on a terminal or in a notebook it is lines, the first after 10 s and then every
+    30 s.
     """
     if quiet or sys.stderr is None:
         yield None
         return
     label = "".join(char if char.isprintable() else "?" for char in label)
-    over, live, began_s, told = threading.Event(), is_live(), time.monotonic(), list[tuple[float, Progress]]()
-    waits_s: Iterable[float] = repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
+    over, live, began_s, told = (
+        threading.Event(),
+        is_live(),
+        time.monotonic(),
+        list[tuple[float, Progress]](),
+    )
+    waits_s: Iterable[float] = (
+        repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
+    )
 
     def take(progress: Progress) -> None:
         told[1:] = [(time.monotonic(), progress)]  # beside the first one
@@ -78,9 +87,11 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
 
 
 def _text(told: Sequence[tuple[float, Progress]], age_s: float) -> str:
-    """Return missions that are done and failed, their rate, and the time left, from the first and the last progress.
+    """Return missions that are done and failed, their rate, and the time left, from the first and
+    the last progress.
 
-    Missions that were done at first are not counted in the rate: those of a campaign that is resumed.
+    Missions that were done at first are not counted in the rate: those of a campaign that is
+    resumed.
     """
     if not told:
         return f"starting, {_time(age_s)} (the first run compiles the mission code: 20 to 60 s)"
@@ -88,7 +99,11 @@ def _text(told: Sequence[tuple[float, Progress]], age_s: float) -> str:
     parts = [f"{progress.done} of {progress.total} missions"]
     if progress.failed:
         parts.append(f"{progress.failed} failed")
-    done, took_s, left = progress.done - first.done, last_s - first_s, progress.total - progress.done
+    done, took_s, left = (
+        progress.done - first.done,
+        last_s - first_s,
+        progress.total - progress.done,
+    )
     if done and took_s > 0.0:
         rate = done / took_s
         parts.append(f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s")

@@ -1,4 +1,6 @@
-"""The result of a campaign, summarised from its store, so that few rows are in memory, and its files."""
+"""The result of a campaign, summarised from its store, so that few rows are in memory, and its
+files.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,8 @@ class CampaignResult:
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv, by column: for each manager, at each point that was reached.
         outcomes: reads the outcomes of all missions, in order.
-        remarks: what users should know about managers: whose missions cannot be repeated, or that request modes that
-            there are not.
+        remarks: what users should know about managers: whose missions cannot be repeated, or that
+            request modes that there are not.
     """
 
     campaign: Campaign
@@ -61,7 +63,11 @@ class CampaignResult:
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
-        return (*COLUMNS, *self.campaign.variation.columns, *self.campaign.loaded.scenario.further_columns)
+        return (
+            *COLUMNS,
+            *self.campaign.variation.columns,
+            *self.campaign.loaded.scenario.further_columns,
+        )
 
     def _kept(self) -> Iterator[tuple[MissionKey, Row]]:
         for key, outcome in self.outcomes():
@@ -69,7 +75,9 @@ class CampaignResult:
                 yield key, outcome
 
     def stream(self) -> Iterator[Row]:
-        """Yield the rows of runs.csv one by one, in its order and with its columns, read as they are requested."""
+        """Yield the rows of runs.csv one by one, in its order and with its columns, read as they
+        are requested.
+        """
         width = len(self.columns)
         return (row[:width] for _, row in self._kept())
 
@@ -81,18 +89,22 @@ class CampaignResult:
     def frame(self) -> pandas.DataFrame:
         """Return the rows as a data frame with the columns of runs.csv.
 
-        Its types, which suave_des.run_campaign lists, do not depend on the rows, but for a parameter that a sweep
-        varies: it has the type that pandas finds for it.
+        Its types, which suave_des.run_campaign lists, do not depend on the rows, but for a
+        parameter that a sweep varies: it has the type that pandas finds for it.
         """
         import pandas
 
-        types: dict[str, Any] = {name: _TYPES[kind] for name, kind in COLUMN_TYPES.items() if kind in _TYPES}
+        types: dict[str, Any] = {
+            name: _TYPES[kind] for name, kind in COLUMN_TYPES.items() if kind in _TYPES
+        }
         types["scenario"] = pandas.CategoricalDtype([self.campaign.loaded.scenario.name])
         types["manager"] = pandas.CategoricalDtype(list(self.campaign.spec.managers))
         return pandas.DataFrame.from_records(self.rows, columns=list(self.columns)).astype(types)
 
     def differences(self) -> list[dict[str, Any]]:
-        """Return how managers differ, over the members of the ensemble, as in ensemble.csv; empty without one."""
+        """Return how managers differ, over the members of the ensemble, as in ensemble.csv; empty
+        without one.
+        """
         varied = self.campaign.variation
         if varied.ensemble is None:
             return []
@@ -111,7 +123,11 @@ class CampaignResult:
             **({"remarks": list(self.remarks)} if self.remarks else {}),
             "failures": [
                 {
-                    **{"manager": each.manager, "run": each.run, **self.campaign.variation.sweep.values(each.point)},
+                    **{
+                        "manager": each.manager,
+                        "run": each.run,
+                        **self.campaign.variation.sweep.values(each.point),
+                    },
                     **{"time_s": each.time_s, "cause": each.cause},
                 }
                 for each in self.failures
@@ -126,7 +142,8 @@ class CampaignResult:
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
 
     def write(self, provenance: Mapping[str, Any]) -> None:
-        """Write the campaign's files, with its provenance in the manifest, into its folder, replacing earlier ones.
+        """Write the campaign's files, with its provenance in the manifest, into its folder,
+        replacing earlier ones.
 
         Raises:
             InputError: they cannot be written; nothing half-written stays.
@@ -139,7 +156,9 @@ class CampaignResult:
         files: dict[str, Content] = {
             store.RUNS_FILE: store.runs_pieces(self.columns, self.stream()),
             store.SUMMARY_FILE: csv_text(columns, [(*row.values(),) for row in self.summary]),
-            store.MANIFEST_FILE: json_text({**about, **self._varied(), **self.report(), **provenance}),
+            store.MANIFEST_FILE: json_text(
+                {**about, **self._varied(), **self.report(), **provenance}
+            ),
         }
         if self.campaign.variation.ensemble is not None:
             columns = (*ENSEMBLE_COLUMNS, *sweep.parameters)
@@ -147,7 +166,9 @@ class CampaignResult:
             files[store.ENSEMBLE_FILE] = csv_text(columns, rows)
         if spec.record_knowledge:
             files[CAMPAIGN_KNOWLEDGE_FILE] = self._knowledge_lines()
-        store.write_campaign(self.folder, files, dict(self._suave_files()) if spec.suave_format else {})
+        store.write_campaign(
+            self.folder, files, dict(self._suave_files()) if spec.suave_format else {}
+        )
 
     def _varied(self) -> dict[str, Any]:
         """Return what varies, for the manifest."""
@@ -159,7 +180,11 @@ class CampaignResult:
             "points": variation.sweep.points,
             "perturbations": dict(self.campaign.spec.perturbations),
             "runs_per_draw": self.campaign.spec.runs_per_draw,
-            **({"ensemble": ensemble.name, "ensemble_members": len(ensemble.members)} if ensemble else {}),
+            **(
+                {"ensemble": ensemble.name, "ensemble_members": len(ensemble.members)}
+                if ensemble
+                else {}
+            ),
         }
 
     def _knowledge_lines(self) -> Iterator[str]:
@@ -170,19 +195,32 @@ class CampaignResult:
                 yield str(line)
 
     def _suave_files(self) -> Iterator[tuple[str, Content]]:
-        """Yield name and content of the exemplar's own files, one for each manager, named as its runner does."""
-        from suave_des.records.runs import exemplar_names, suave_pieces  # with pandas, which takes a while
+        """Yield name and content of the exemplar's own files, one for each manager, named as its
+        runner does.
+        """
+        from suave_des.records.runs import (
+            exemplar_names,
+            suave_pieces,
+        )  # with pandas, which takes a while
 
-        scenario, runs, managers = self.campaign.loaded.scenario, self.campaign.spec.runs, self.campaign.spec.managers
+        scenario, runs, managers = (
+            self.campaign.loaded.scenario,
+            self.campaign.spec.runs,
+            self.campaign.spec.managers,
+        )
         revision, limit_s = scenario.revision.name, scenario.mission.time_limit_s
         files = exemplar_names(managers, revision, has_battery=scenario.battery is not None)
         for number, (file, name) in enumerate(files):
             # Each mission has its number in the campaign, from 1, whether or not all have a row.
-            rows = ((number * runs + key.run, row) for key, row in self._kept() if key.manager == number)
+            rows = (
+                (number * runs + key.run, row) for key, row in self._kept() if key.manager == number
+            )
             yield f"{file}.csv", suave_pieces(revision, name, COLUMNS, list(rows), limit_s)
 
 
-def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]) -> CampaignResult:
+def gather(
+    campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]
+) -> CampaignResult:
     """Summarise the outcomes of a campaign's missions, with remarks about managers for users."""
     spec, variation = campaign.spec, campaign.variation
     failures: list[MissionFailure] = []
@@ -199,7 +237,8 @@ def gather(campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remark
         found[place] = _figures(kept(group), variation.runs_sharing_draw)
     none = _figures((), 1)
     summary = tuple(
-        dict(zip(SUMMARY_COLUMNS, (name, *found.get((point, number), none)), strict=True)) | _swept(variation, point)
+        dict(zip(SUMMARY_COLUMNS, (name, *found.get((point, number), none)), strict=True))
+        | _swept(variation, point)
         for point in range(max((point for point, _ in found), default=0) + 1)
         for number, name in enumerate(spec.managers)
     )
@@ -212,7 +251,8 @@ def _swept(variation: Variation, point: int) -> dict[str, Any]:
 
 
 def _figures(rows: Iterable[tuple[int, Sequence[Any]]], runs_sharing_draw: int) -> Row:
-    """Return the cells of summary.csv after the first; a figure that needs more missions than there are is None.
+    """Return the cells of summary.csv after the first; a figure that needs more missions than there
+    are is None.
 
     Only the metrics are kept. Where runs share draws, the draws are what is independent.
     """
@@ -228,5 +268,11 @@ def _figures(rows: Iterable[tuple[int, Sequence[Any]]], runs_sharing_draw: int) 
     for own in values:
         mean = mean_of(own, None if runs_sharing_draw == 1 else draws)
         middle = median(own) if own else None
-        figures += (known(mean.value), known(std_of(own).value), middle, known(mean.low), known(mean.high))
+        figures += (
+            known(mean.value),
+            known(std_of(own).value),
+            middle,
+            known(mean.low),
+            known(mean.high),
+        )
     return (number, found / number if number else None, *figures)

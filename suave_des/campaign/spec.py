@@ -1,4 +1,6 @@
-"""The specification of a campaign: every option is declared here once, for Python, campaign files and commands."""
+"""The specification of a campaign: every option is declared here once, for Python, campaign files
+and commands.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ WORKERS_LIMIT = 256
 """More than one for each core gain nothing."""
 _WORKERS = 2
 _FEW_MISSIONS = 1000
-"""So many take one process no longer than two, which first load the compiler and Java, or compile, each for itself."""
+"""So many take one process no longer than two, which first load the compiler and Java, or compile,
+each for itself.
+"""
 
 Whole = Annotated[int, Field(strict=True)]
 
@@ -41,21 +45,27 @@ class Option(NamedTuple):
 class CampaignKeys(Strict):
     """What may stand in a campaign file, too; options of a command or a call take precedence."""
 
-    managers: Annotated[tuple[str, ...], Field(min_length=1), Option("NAME,...")] = ("none", "random", "metacontrol")
+    managers: Annotated[tuple[str, ...], Field(min_length=1), Option("NAME,...")] = (
+        "none",
+        "random",
+        "metacontrol",
+    )
     """Managing subsystems: names, or module:Class."""
     runs: Annotated[Whole, Field(ge=1, le=RUNS_LIMIT)] = 20
     """Missions for each manager, at each point of a sweep."""
     seed: Annotated[Whole, Field(ge=0, le=SEED_LIMIT)] = 1
     """Random seed."""
-    time_out_s: Annotated[Real, Field(gt=0, le=1e6), Option("SECONDS", "120; with the reasoner owlready2 1800")] = 120.0
+    time_out_s: Annotated[
+        Real, Field(gt=0, le=1e6), Option("SECONDS", "120; with the reasoner owlready2 1800")
+    ] = 120.0
     """Wall-clock limit for a mission, in s."""
     sweep: dict[str, Any] = Field(default_factory=dict)
-    """Lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the same) and
-    `zip` (lists of which the first values go together, then the second), which are combined with each other. Each
-    parameter is a column of runs.csv."""
+    """Lists of values by key path of the scenario, each combined with each; or a mapping with
+    `grid` (the same) and `zip` (lists of which the first values go together, then the second),
+    which are combined with each other. Each parameter is a column of runs.csv."""
     perturbations: dict[str, Any] = Field(default_factory=dict)
-    """Distributions by key path of the scenario: each run draws its own value, the same under all managers and at all
-    points. Each is a column of runs.csv."""
+    """Distributions by key path of the scenario: each run draws its own value, the same under all
+    managers and at all points. Each is a column of runs.csv."""
     runs_per_draw: Annotated[Whole, Field(ge=1, le=RUNS_LIMIT)] = 1
     """Number of consecutive runs that share a draw."""
     ensemble: Annotated[str | None, Option("FILE")] = None
@@ -72,7 +82,9 @@ class CampaignSettings(CampaignKeys):
 
 
 class CampaignSpec(CampaignKeys):
-    """The specification of a campaign. Make one with `of`, which leaves missing values to the campaign file."""
+    """The specification of a campaign. Make one with `of`, which leaves missing values to the
+    campaign file.
+    """
 
     scenario: str
     """A scenario or campaign file, or a shipped scenario."""
@@ -84,7 +96,9 @@ class CampaignSpec(CampaignKeys):
     """Record knowledge states for `kb try`."""
     out: Annotated[Path | None, Option("DIR")] = None
     """Folder for result files."""
-    workers: Annotated[Whole | None, Field(ge=1, le=WORKERS_LIMIT), Option(default="2, or 1 for few missions")] = None
+    workers: Annotated[
+        Whole | None, Field(ge=1, le=WORKERS_LIMIT), Option(default="2, or 1 for few missions")
+    ] = None
     """Worker processes."""
     scheduler: Annotated[str | None, Option("tcp://HOST:PORT")] = None
     """Run missions on the workers of this Dask scheduler."""
@@ -97,7 +111,8 @@ class CampaignSpec(CampaignKeys):
 
     @classmethod
     def of(cls, scenario: str | Path, **options: Any) -> Self:
-        """Make a specification from options by name; None leaves one to the campaign file, or to the defaults.
+        """Make a specification from options by name; None leaves one to the campaign file, or to
+        the defaults.
 
         Options of load_scenario are taken, too.
 
@@ -106,7 +121,14 @@ class CampaignSpec(CampaignKeys):
         """
         given = {name: plain(value) for name, value in options.items() if value is not None}
         replaced = {name: given.pop(name) for name in Replacements.__annotations__ if name in given}
-        return cls.read({"scenario": str(scenario), "replacements": replaced, "folder": str(Path.cwd()), **given})
+        return cls.read(
+            {
+                "scenario": str(scenario),
+                "replacements": replaced,
+                "folder": str(Path.cwd()),
+                **given,
+            }
+        )
 
     @classmethod
     def read(cls, data: Mapping[str, Any]) -> Self:
@@ -122,7 +144,9 @@ class CampaignSpec(CampaignKeys):
             raise InputError(f"{'.'.join(map(str, keys))}: {problem}", remedy=remedy) from None
 
     def stored(self) -> dict[str, Any]:
-        """Return what a resumed campaign needs, as plain data: not how and where it runs, which may differ then."""
+        """Return what a resumed campaign needs, as plain data: not how and where it runs, which may
+        differ then.
+        """
         how = {"out", "workers", "scheduler", "overwrite"}
         return self.model_dump(mode="json", exclude_unset=True, exclude=how)
 
@@ -130,7 +154,10 @@ class CampaignSpec(CampaignKeys):
         """Return the specification completed by a campaign file, if there is one."""
         if file is None:
             return self
-        left = file.settings.model_fields_set & CampaignKeys.model_fields.keys() - self.model_fields_set
+        left = (
+            file.settings.model_fields_set
+            & CampaignKeys.model_fields.keys() - self.model_fields_set
+        )
         return self.model_copy(update={name: getattr(file.settings, name) for name in left})
 
     @property
@@ -150,16 +177,26 @@ class CampaignSpec(CampaignKeys):
         for index, manager in enumerate(self.managers):
             manager_class(manager)
             if manager in self.managers[:index]:
-                raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
+                raise InputError(
+                    f"manager {manager!r} is given twice", remedy="name each manager once"
+                )
         if self.scheduler is not None and self.workers not in (None, 1):
-            remedy = "omit it; `dask worker --nworkers N` sets how many missions run there at a time"
-            raise InputError(f"workers: {self.workers} cannot be used with a scheduler", remedy=remedy)
+            remedy = (
+                "omit it; `dask worker --nworkers N` sets how many missions run there at a time"
+            )
+            raise InputError(
+                f"workers: {self.workers} cannot be used with a scheduler", remedy=remedy
+            )
 
 
 def check_range(what: str, number: int, least: int, greatest: int) -> None:
-    """Raise an InputError if a number is no whole one, or not between two others, which are allowed, too."""
+    """Raise an InputError if a number is no whole one, or not between two others, which are
+    allowed, too.
+    """
     if not (isinstance(number, Integral) and least <= number <= greatest):
-        raise InputError(f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}")
+        raise InputError(
+            f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}"
+        )
 
 
 # Campaign files.

@@ -1,7 +1,9 @@
-"""Differences between a campaign's missions apart from manager and run: a sweep, each run's draws, and an ensemble.
+"""Differences between a campaign's missions apart from manager and run: a sweep, each run's draws,
+and an ensemble.
 
-Unknown parameters of the real vehicle and its software are not noise, but the same in all its missions. So each run has
-one member of an ensemble, the same under all managers, and a difference between these can be analysed by member.
+Unknown parameters of the real vehicle and its software are not noise, but the same in all its
+missions. So each run has one member of an ensemble, the same under all managers, and a difference
+between these can be analysed by member.
 """
 
 from __future__ import annotations
@@ -53,13 +55,19 @@ class Sweep(Strict):
     grid: dict[str, Values] = Field(default_factory=dict)
     """Values by key path; all combinations are used."""
     zip: dict[str, Values] = Field(default_factory=dict)
-    """Values by key path, of equal number: the first values together, then the second, and so on."""
+    """Values by key path, of equal number: the first values together, then the second, and so
+    on.
+    """
 
     @model_validator(mode="after")
     def _rows_are_whole(self) -> Self:
         if len({len(values) for values in self.zip.values()}) > 1:
             listed = ", ".join(f"{name} has {len(values)}" for name, values in self.zip.items())
-            raise wrong(f"the lists differ in length: {listed}", "give lists of the same length, or use grid", "zip")
+            raise wrong(
+                f"the lists differ in length: {listed}",
+                "give lists of the same length, or use grid",
+                "zip",
+            )
         return self
 
     @property
@@ -77,7 +85,9 @@ class Sweep(Strict):
         import numpy as np
 
         *grid, row = map(int, np.unravel_index(point, self._sizes()))
-        values = {path: own[place] for (path, own), place in zip(self.grid.items(), grid, strict=True)}
+        values = {
+            path: own[place] for (path, own), place in zip(self.grid.items(), grid, strict=True)
+        }
         return values | {path: column[row] for path, column in self.zip.items()}
 
     def each_value(self) -> Iterator[int]:
@@ -96,7 +106,9 @@ class Sweep(Strict):
 
 
 def plain(given: Any) -> Any:
-    """Convert what a caller gives to the form of a file: arrays, ranges and series become lists, paths text."""
+    """Convert what a caller gives to the form of a file: arrays, ranges and series become lists,
+    paths text.
+    """
     if isinstance(given, Path):
         return str(given)
     if isinstance(given, Mapping):
@@ -110,12 +122,16 @@ def plain(given: Any) -> Any:
 
 def cell_of(value: Any) -> str | int | float | bool | None:
     """Return a parameter's value as in runs.csv: lists and mappings as JSON."""
-    return value if value is None or isinstance(value, str | int | float | bool) else json.dumps(value)
+    return (
+        value if value is None or isinstance(value, str | int | float | bool) else json.dumps(value)
+    )
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Parameter sets that fit real missions equally well: for each member the values at the key paths of scenarios."""
+    """Parameter sets that fit real missions equally well: for each member the values at the key
+    paths of scenarios.
+    """
 
     name: str
     paths: tuple[str, ...]
@@ -150,18 +166,28 @@ class Variation:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of all that varies, as given, which are further columns of runs.csv."""
-        return (*self.sweep.parameters, *self.drawn.values(), *((ENSEMBLE_COLUMN,) if self.ensemble else ()))
+        return (
+            *self.sweep.parameters,
+            *self.drawn.values(),
+            *((ENSEMBLE_COLUMN,) if self.ensemble else ()),
+        )
 
     @property
     def runs_sharing_draw(self) -> int:
-        """Number of consecutive runs that share a draw, and so are not independent; 1 where nothing is drawn."""
+        """Number of consecutive runs that share a draw, and so are not independent; 1 where nothing
+        is drawn.
+        """
         return self.runs_per_draw if self.drawn else 1
 
     def member(self, run: int) -> int | None:
-        """Return the number, from 1, of the parameter set that a run has; none without an ensemble."""
+        """Return the number, from 1, of the parameter set that a run has; none without an
+        ensemble.
+        """
         return None if self.ensemble is None else self.ensemble.member(run)
 
-    def scenario(self, loaded: LoadedScenario, point: int, member: int | None = None) -> LoadedScenario:
+    def scenario(
+        self, loaded: LoadedScenario, point: int, member: int | None = None
+    ) -> LoadedScenario:
         """Return the scenario of a point's missions, or of those with one member of the ensemble.
 
         Raises:
@@ -174,17 +200,22 @@ class Variation:
             return loaded
         at = ", ".join(f"{name}={shown(value)}" for name, value in named.items())
         with located(f"at {at}: ", loaded.path):
-            return with_values(loaded, {self.paths.get(name, name): value for name, value in named.items()})
+            return with_values(
+                loaded, {self.paths.get(name, name): value for name, value in named.items()}
+            )
 
 
 def vary(
-    loaded: LoadedScenario, sweep: Mapping[str, Any], perturbations: Mapping[str, Any], runs_per_draw: int
+    loaded: LoadedScenario,
+    sweep: Mapping[str, Any],
+    perturbations: Mapping[str, Any],
+    runs_per_draw: int,
 ) -> tuple[LoadedScenario, Variation]:
     """Put the distributions of perturbations into a scenario; return it with the variation.
 
     Raises:
-        InputError: a key path leads nowhere, a value is not allowed there, or the sweep has no points; its place is
-            the key path within what was given.
+        InputError: a key path leads nowhere, a value is not allowed there, or the sweep has no
+            points; its place is the key path within what was given.
     """
     varied: dict[str, str] = {}
 
@@ -193,7 +224,9 @@ def vary(
         with located(place=place):
             value_at(loaded, path)
             if path in varied:
-                raise InputError(f"varies {path}, as {varied[path]} does", remedy="vary each key once")
+                raise InputError(
+                    f"varies {path}, as {varied[path]} does", remedy="vary each key once"
+                )
         varied[path] = place
         return path
 
@@ -202,15 +235,22 @@ def vary(
         with located(place=f"perturbations.{name}"):
             if not isinstance(distribution := perturbations[name], Mapping):
                 remedy = "such as {distribution: normal, mean: 1, std: 2}"
-                raise InputError(f"expected a distribution, got {shown(distribution)}", remedy=remedy)
+                raise InputError(
+                    f"expected a distribution, got {shown(distribution)}", remedy=remedy
+                )
             loaded = with_values(loaded, {path: dict(distribution)})
     found, places = _sweep(sweep)
     paths = {name: path_of(places[name], name) for name in found.parameters}
     for names in (*([name] for name in found.grid), list(found.zip)):
         rows = zip(*[(found.grid | found.zip)[name] for name in names], strict=True)
-        points = [tuple(float(cell) if isinstance(cell, int | float) else repr(cell) for cell in row) for row in rows]
+        points = [
+            tuple(float(cell) if isinstance(cell, int | float) else repr(cell) for cell in row)
+            for row in rows
+        ]
         if len(set(points)) < len(points):
-            raise InputError("has a point twice", place=places[names[0]], remedy="give each point once")
+            raise InputError(
+                "has a point twice", place=places[names[0]], remedy="give each point once"
+            )
     variation = Variation(found, drawn, paths, runs_per_draw)
     with located(place=next(iter(places.values())) if len(places) == 1 else "sweep"):
         for point in islice(found.each_value(), _CHECKED_POINTS):
@@ -229,21 +269,33 @@ def _sweep(given: Mapping[str, Any]) -> tuple[Sweep, dict[str, str]]:
         places = [key for key in ("sweep", *keys) if forms or key != "grid"]
         raise InputError(problem, place=".".join(map(str, places)), remedy=remedy) from None
     parts = {"grid.": sweep.grid, "zip.": sweep.zip}
-    return sweep, {name: f"sweep.{part if forms else ''}{name}" for part, names in parts.items() for name in names}
+    return sweep, {
+        name: f"sweep.{part if forms else ''}{name}"
+        for part, names in parts.items()
+        for name in names
+    }
 
 
 def check_drawn(loaded: LoadedScenario, variation: Variation) -> None:
-    """Raise an InputError about a perturbation that is drawn at each use, like latencies and noise, not once a run."""
+    """Raise an InputError about a perturbation that is drawn at each use, like latencies and noise,
+    not once a run.
+    """
     drawn = short_mission(loaded).drawn if variation.drawn else {}
     for path, name in variation.drawn.items():
         if path not in drawn:
             remedy = "put the distribution into the scenario itself, or sweep its parameters"
-            raise InputError("is drawn at each use, not once per run", place=f"perturbations.{name}", remedy=remedy)
+            raise InputError(
+                "is drawn at each use, not once per run",
+                place=f"perturbations.{name}",
+                remedy=remedy,
+            )
 
 
 def short_mission(loaded: LoadedScenario) -> MissionResult:
     """Run a mission of one second without a managing subsystem."""
-    from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
+    from suave_des.simulation.simulator import (
+        Simulator,
+    )  # with it comes the compiler, which takes a while
 
     short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
     return Simulator(replace(loaded, scenario=short)).run("none", 1, 0)
@@ -257,42 +309,58 @@ def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
     """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
 
     Args:
-        name: of a file, or of a shipped one, such as seams2023. Its columns are named by the key paths of the scenario;
-            columns `member` and `loss` are only for information.
+        name: of a file, or of a shipped one, such as seams2023. Its columns are named by the key
+            paths of the scenario; columns `member` and `loss` are only for information.
 
     Returns:
         The ensemble, its path, and the SHA-256 of the file.
 
     Raises:
-        InputError: with file and line: it cannot be read, has fewer than two members, or something else than numbers.
+        InputError: with file and line: it cannot be read, has fewer than two members, or something
+            else than numbers.
     """
     path = find(name, "scenarios/ensembles")
     header, rows, digest = read_csv(path, _ENSEMBLE_LIMIT_BYTES, "a row for each member")
     paths = tuple(name for name in header if name not in _NO_PARAMETERS)
     if not paths or not all(header) or len(set(header)) < len(header):
-        raise line_error(path, 1, "has no column for each parameter", "name each once, by its key path in the scenario")
+        raise line_error(
+            path,
+            1,
+            "has no column for each parameter",
+            "name each once, by its key path in the scenario",
+        )
     members = []
     for line, row in rows:
-        member = {name: as_number(cell) for name, cell in zip(header, row, strict=False) if name not in _NO_PARAMETERS}
+        member = {
+            name: as_number(cell)
+            for name, cell in zip(header, row, strict=False)
+            if name not in _NO_PARAMETERS
+        }
         if len(row) != len(header) or not all(map(math.isfinite, member.values())):
             problem = f"expected {len(header)} numbers, got {', '.join(row)}"
             raise line_error(path, line, problem, "give each column one")
         members.append(tuple(member.values()))
     if len(members) < 2:
-        raise line_error(path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more")
+        raise line_error(
+            path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more"
+        )
     return Ensemble(path.stem, paths, tuple(members)), path, digest
 
 
-def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemble, path: Path) -> Variation:
+def with_ensemble(
+    loaded: LoadedScenario, variation: Variation, ensemble: Ensemble, path: Path
+) -> Variation:
     """Return a variation with an ensemble, which was read from a path.
 
     Raises:
-        InputError: a parameter is not a number of this scenario, a member's values are not allowed in it, or it is
-            swept or perturbed, too.
+        InputError: a parameter is not a number of this scenario, a member's values are not allowed
+            in it, or it is swept or perturbed, too.
     """
     for name in ensemble.paths:
         for other in {*variation.drawn, *variation.paths.values()}:
-            if f"{name}.".startswith(f"{other}.") or f"{other}.".startswith(f"{name}."):  # one is below the other
+            if f"{name}.".startswith(f"{other}.") or f"{other}.".startswith(
+                f"{name}."
+            ):  # one is below the other
                 problem = f"varies {name}, as the campaign's sweep or perturbations do"
                 raise InputError(problem, file=path, remedy="vary each key once")
     found = replace(variation, ensemble=ensemble)
@@ -303,15 +371,20 @@ def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemb
 
 
 def differences(
-    variation: Variation, rows: Iterable[tuple[MissionKey, Row]], managers: Sequence[str], metrics: Mapping[str, int]
+    variation: Variation,
+    rows: Iterable[tuple[MissionKey, Row]],
+    managers: Sequence[str],
+    metrics: Mapping[str, int],
 ) -> Iterator[dict[str, Any]]:
-    """Yield the difference of each pair of managers in each metric, point by point: columns of ensemble.csv.
+    """Yield the difference of each pair of managers in each metric, point by point: columns of
+    ensemble.csv.
 
-    The difference is paired by run, over the runs that both have. Its 95% interval is by Student's t over independent
-    draws, for chance alone. The range in which the differences of 95 in 100 parameter sets lie is the prediction
-    interval for a further set: the mean ± Student's t times the standard deviation of the members' means, times the
-    root of 1 + 1 / their number. The few runs of each member make it wider than the parameters do; with more of them it
-    becomes narrower, down to that.
+    The difference is paired by run, over the runs that both have. Its 95% interval is by Student's
+    t over independent draws, for chance alone. The range in which the differences of 95 in 100
+    parameter sets lie is the prediction interval for a further set: the mean ± Student's t times
+    the standard deviation of the members' means, times the root of 1 + 1 / their number. The few
+    runs of each member make it wider than the parameters do; with more of them it becomes narrower,
+    down to that.
 
     Args:
         rows: of runs.csv, ordered by their keys.
@@ -322,21 +395,37 @@ def differences(
         by_manager: dict[int, dict[int, Sequence[Any]]] = {}
         for key, row in group:
             by_manager.setdefault(key.manager, {})[key.run] = row
-        for (metric, place), (second, first) in product(metrics.items(), combinations(sorted(by_manager), 2)):
+        for (metric, place), (second, first) in product(
+            metrics.items(), combinations(sorted(by_manager), 2)
+        ):
             ours, theirs = by_manager[first], by_manager[second]
-            by_run: dict[int, Any] = {run: ours[run][place] - theirs[run][place] for run in ours if run in theirs}
+            by_run: dict[int, Any] = {
+                run: ours[run][place] - theirs[run][place] for run in ours if run in theirs
+            }
             if not by_run:
                 continue
             by_member: dict[int, list[float]] = {}
             for run, value in by_run.items():
                 by_member.setdefault(variation.ensemble.member(run), []).append(value)
             means, mean = list(map(fmean, by_member.values())), fmean(by_run.values())
-            interval = mean_of(list(by_run.values()), [(run - 1) // variation.runs_sharing_draw for run in by_run])
+            interval = mean_of(
+                list(by_run.values()), [(run - 1) // variation.runs_sharing_draw for run in by_run]
+            )
             members, half = len(means), math.nan
             if members > 1:
                 half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)
             ends = (known(each) for each in (interval.low, interval.high))
             signs = (sum(each > 0.0 for each in means), sum(each < 0.0 for each in means))
             ranges = (known(mean - half), known(mean + half))
-            cells = (managers[first], managers[second], metric, len(by_run), mean, *ends, members, *signs, *ranges)
+            cells = (
+                managers[first],
+                managers[second],
+                metric,
+                len(by_run),
+                mean,
+                *ends,
+                members,
+                *signs,
+                *ranges,
+            )
             yield {**dict(zip(ENSEMBLE_COLUMNS, cells, strict=True)), "point": point}

@@ -28,7 +28,9 @@ from suave_des.records.store import MissionKey
 from suave_des.registry import is_built_in
 
 _LARGEST_CHUNK = 10
-"""Missions: few, as chunks under way are lost when a campaign is stopped, and workers are to end together."""
+"""Missions: few, as chunks under way are lost when a campaign is stopped, and workers are to end
+together.
+"""
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
 _ATTEMPTS = 3
@@ -36,7 +38,9 @@ _ATTEMPTS = 3
 _IN_A_ROW = 8
 """Workers that may end one after the other without an outcome in between."""
 _MARGIN_S = 60.0
-"""Added to the time that a chunk's missions may take, such as for starting Java, before its worker is killed."""
+"""Added to the time that a chunk's missions may take, such as for starting Java, before its worker
+is killed.
+"""
 _START_S = 300.0
 """Time to start: Python, perhaps from a slow shared disk, and the compiler."""
 _STOP_TIMEOUT_S = 5.0
@@ -45,26 +49,35 @@ _Task = tuple[Chunk, int]
 """Missions to run, and how many times a worker has died with them."""
 
 
-def in_process(campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+def in_process(
+    campaign: Campaign, missions: Iterable[MissionKey], total: int
+) -> Iterator[list[Finished]]:
     """Run missions one after the other in this process; an Executor."""
     return ([each] for each in MissionRunner(campaign).each(missions))
 
 
 class LocalWorkers:
-    """Runs chunks of missions in worker processes; an Executor, and a context at whose end they are stopped.
+    """Runs chunks of missions in worker processes; an Executor, and a context at whose end they are
+    stopped.
 
-    Workers are spawned, never forked: a forked child would hang on its parent's Java virtual machine. One that dies
-    before its work is done (killed, out of memory, a crash of Java) is replaced, and the missions that it was running
-    are run again one by one. A mission during which that happens _ATTEMPTS times has failed; so has one that its own
-    time-out does not end.
+    Workers are spawned, never forked: a forked child would hang on its parent's Java virtual
+    machine. One that dies before its work is done (killed, out of memory, a crash of Java) is
+    replaced, and the missions that it was running are run again one by one. A mission during which
+    that happens _ATTEMPTS times has failed; so has one that its own time-out does not end.
 
-    Each worker has a pipe of its own. A ProcessPoolExecutor has one for all, and waits for ever when a worker is killed
-    while it writes into it; it does not say either which chunk a worker had.
+    Each worker has a pipe of its own. A ProcessPoolExecutor has one for all, and waits for ever
+    when a worker is killed while it writes into it; it does not say either which chunk a worker
+    had.
     """
 
     def __init__(self, managers: Sequence[str], workers: int) -> None:
         self._may_be_killed = all(map(is_built_in, managers))
-        self._size, self._workers, self._is_done, self._in_a_row = workers, list[_Worker](), False, 0
+        self._size, self._workers, self._is_done, self._in_a_row = (
+            workers,
+            list[_Worker](),
+            False,
+            0,
+        )
         self._again = deque[_Task]()
 
     def __enter__(self) -> Self:
@@ -85,7 +98,9 @@ class LocalWorkers:
         for worker in self._workers:
             worker.join()
 
-    def outcomes(self, campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+    def outcomes(
+        self, campaign: Campaign, missions: Iterable[MissionKey], total: int
+    ) -> Iterator[list[Finished]]:
         """Yield outcomes chunk by chunk; see Executor."""
         size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
         remaining, content = iter(missions), packed(campaign)
@@ -113,10 +128,17 @@ class LocalWorkers:
                     worker.tasks.popleft()
                     self._in_a_row = 0
                 room = range(_AHEAD - len(worker.tasks))
-                for task in filter(None, (self._again.popleft() if self._again else next(tasks, None) for _ in room)):
+                for task in filter(
+                    None,
+                    (self._again.popleft() if self._again else next(tasks, None) for _ in room),
+                ):
                     worker.tasks.append(task)
                     worker.send(task[0])
-                limit_s = campaign.spec.time_out_s * len(worker.tasks[0][0]) + _MARGIN_S if worker.tasks else inf
+                limit_s = (
+                    campaign.spec.time_out_s * len(worker.tasks[0][0]) + _MARGIN_S
+                    if worker.tasks
+                    else inf
+                )
                 worker.due_s = time.monotonic() + limit_s
                 if found is not None:
                     yield found
@@ -134,10 +156,14 @@ class LocalWorkers:
             return worker
         except OSError as error:  # the system's limit of processes, files or memory
             problem = f"a worker process cannot be started: {error.strerror}"
-            raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
+            raise WorkerError(
+                f"{problem} (raise the limit, see ulimit -a, or give --workers 1)"
+            ) from None
 
     def _ended(self, worker: _Worker, campaign: Campaign) -> Iterator[list[Finished]]:
-        """Have what a worker was running when it ended run again, one by one; or yield that it has failed."""
+        """Have what a worker was running when it ended run again, one by one; or yield that it has
+        failed.
+        """
         worker.process.kill()
         worker.connection.close()
         status = worker.join()
@@ -160,10 +186,11 @@ class LocalWorkers:
 
 @dataclass
 class _Worker:
-    """One worker process, with this end of its pipe, which ends when the process does, and its tasks, oldest first.
+    """One worker process, with this end of its pipe, which ends when the process does, and its
+    tasks, oldest first.
 
-    `due_s` is when it has to be done with the oldest, infinite if it has nothing to do; once that is over, it is killed
-    as overdue.
+    `due_s` is when it has to be done with the oldest, infinite if it has nothing to do; once that
+    is over, it is killed as overdue.
     """
 
     process: SpawnProcess
@@ -178,7 +205,9 @@ class _Worker:
             self.connection.send(message)
 
     def join(self) -> int | None:
-        """Wait for the process to end, and return its exit status; it is killed if that takes long."""
+        """Wait for the process to end, and return its exit status; it is killed if that takes
+        long.
+        """
         self.process.join(_STOP_TIMEOUT_S)
         self.process.kill()
         self.process.join()
@@ -187,10 +216,11 @@ class _Worker:
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Let a process start that leaves Ctrl-C and kill to this one, and imports neither its script nor its files.
+    """Let a process start that leaves Ctrl-C and kill to this one, and imports neither its script
+    nor its files.
 
-    It inherits that the signals are blocked. A file such as signal.py in the current folder would be taken for Python's
-    own module of that name while Python starts.
+    It inherits that the signals are blocked. A file such as signal.py in the current folder would
+    be taken for Python's own module of that name while Python starts.
     """
     was_safe, main = os.environ.get(_SAFE_PATH), sys.modules["__main__"]
     os.environ[_SAFE_PATH] = "1"
@@ -208,13 +238,17 @@ def _quietly() -> Iterator[None]:
 
 
 def packed(campaign: Campaign) -> bytes:
-    """Pack a campaign, and the classes of it that the main program defines, which no other process can import."""
+    """Pack a campaign, and the classes of it that the main program defines, which no other process
+    can import.
+    """
     own = [name.removeprefix(_MAIN) for name in campaign.code() if name.startswith(_MAIN)]
     if not own:
         return pickle.dumps(({}, campaign))
     import cloudpickle  # takes a class by its content where it cannot be imported
 
-    content: bytes = cloudpickle.dumps(({name: getattr(sys.modules["__main__"], name) for name in own}, campaign))
+    content: bytes = cloudpickle.dumps(
+        ({name: getattr(sys.modules["__main__"], name) for name in own}, campaign)
+    )
     return content
 
 
@@ -231,7 +265,9 @@ def unpacked(content: bytes) -> Campaign:
 
 
 def finished(runner: MissionRunner, chunk: Chunk) -> list[Finished]:
-    """Run missions; without memory for them this process ends as if killed for it: a new one begins with little."""
+    """Run missions; without memory for them this process ends as if killed for it: a new one begins
+    with little.
+    """
     try:
         return list(runner.each(chunk))
     except MemoryError:
@@ -239,10 +275,14 @@ def finished(runner: MissionRunner, chunk: Chunk) -> list[Finished]:
 
 
 def work(connection: Connection[Any, Any]) -> None:
-    """Receive a campaign, then chunks of its missions, and send back their outcomes, until the other end is closed."""
+    """Receive a campaign, then chunks of its missions, and send back their outcomes, until the
+    other end is closed.
+    """
     import suave_des.simulation.simulator  # noqa: F401 - all that missions need, before the campaign arrives
 
-    with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the campaign is over, or its process has ended
+    with suppress(
+        EOFError, BrokenPipeError, ConnectionResetError
+    ):  # the campaign is over, or its process has ended
         runner = None
         while True:
             message = connection.recv()

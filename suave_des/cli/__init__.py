@@ -1,1 +1,3 @@
-"""The command line: one module for each group of commands. Heavy imports happen inside the commands."""
+"""The command line: one module for each group of commands. Heavy imports happen inside the
+commands.
+"""

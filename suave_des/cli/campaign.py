@@ -1,4 +1,6 @@
-"""suave-des run, campaign, reproduce, train and serve: missions, their result files, and summaries."""
+"""suave-des run, campaign, reproduce, train and serve: missions, their result files, and
+summaries.
+"""
 
 from __future__ import annotations
 
@@ -57,14 +59,21 @@ def campaign(
     scenario: Annotated[str | None, any_scenario(False)] = None,
     *,
     options: Annotated[
-        Given, Fields(("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite"))
+        Given,
+        Fields(
+            ("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite")
+        ),
     ],
     resume: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Continue the campaign in this folder; --runs may add runs."
+        ),
     ] = None,
     yes: Trusted = False,
     form: Annotated[
-        Literal["suave"] | None, typer.Option("--format", help="Also write the exemplar's own files into DIR/suave.")
+        Literal["suave"] | None,
+        typer.Option("--format", help="Also write the exemplar's own files into DIR/suave."),
     ] = None,
     manager_option: ManagerOptions = None,
     quiet: Quiet = False,
@@ -72,13 +81,20 @@ def campaign(
 ) -> None:
     """Run many missions and write their results.
 
-    A campaign file may hold all settings, with sweeps and values drawn in each run; options override it. Finished
-    missions are kept; after an interruption, --resume DIR runs those that are missing.
+    A campaign file may hold all settings, with sweeps and values drawn in each run; options
+    override it. Finished missions are kept; after an interruption, --resume DIR runs those that are
+    missing.
     """
     if resume is not None:
         fixed = {name: value for name, value in options.items() if name not in _MAY_CHANGE}
         check_no_use(
-            {"SCENARIO": scenario, "--format": form, "--manager-option": manager_option, **flags(fixed), **files.given},
+            {
+                "SCENARIO": scenario,
+                "--format": form,
+                "--manager-option": manager_option,
+                **flags(fixed),
+                **files.given,
+            },
             "with --resume: the settings of a campaign cannot be changed",
             "remove it, or start a new campaign in another folder",
         )
@@ -95,12 +111,20 @@ def campaign(
             result = resume_campaign(resume, confirmed=yes, **settings)
         else:
             assert scenario is not None
-            settings |= {"suave_format": form == "suave", "command": command_line(), **files.replacements}
-            result = run_campaign(scenario, settings_of=partial(manager_options, manager_option), **settings)
+            settings |= {
+                "suave_format": form == "suave",
+                "command": command_line(),
+                **files.replacements,
+            }
+            result = run_campaign(
+                scenario, settings_of=partial(manager_options, manager_option), **settings
+            )
     console = output()
     print_table(console, _summary(result))
     if (sharing := result.campaign.variation.runs_sharing_draw) > 1:
-        console.print(f"{sharing} runs share each draw: intervals treat draws as independent, not runs")
+        console.print(
+            f"{sharing} runs share each draw: intervals treat draws as independent, not runs"
+        )
     if len(result.summary) > _ROWS_SHOWN:
         more = f"... and {len(result.summary) - _ROWS_SHOWN + 1} rows more"
         console.print(f"{more}, all in {result.folder}/summary.csv")
@@ -118,27 +142,34 @@ def _summary(result: CampaignResult) -> Table:
     from suave_des.records.metrics import METRICS, PAPER_METRICS
 
     def figures(cells: Mapping[str, Any], metric: str) -> tuple[str, str]:
-        mean, low, high, std = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std"))
+        mean, low, high, std = (
+            cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std")
+        )
         half = "" if low is None or high is None else f" ± {(high - low) / 2.0:.2f}"
         return "" if mean is None else f"{mean:.2f}{half}", "" if std is None else f"{std:.2f}"
 
     parameters = result.campaign.variation.sweep.parameters
     rows = []
-    for cells in result.summary[: _ROWS_SHOWN if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1]:
-        swept = (f"{cells[name]:.6g}" if isinstance(cells[name], float) else str(cells[name]) for name in parameters)
+    for cells in result.summary[
+        : _ROWS_SHOWN if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1
+    ]:
+        swept = (
+            f"{cells[name]:.6g}" if isinstance(cells[name], float) else str(cells[name])
+            for name in parameters
+        )
         found = "" if cells["found_share"] is None else percent(cells["found_share"])
         measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
         rows.append([*swept, cells["manager"], str(cells["n"]), found, *measured])
-    title = (
-        f"{result.campaign.loaded.scenario.name}, seed {result.campaign.spec.seed}: means ± half their 95% intervals"
-    )
+    title = f"{result.campaign.loaded.scenario.name}, seed {result.campaign.spec.seed}: means ± half their 95% intervals"
     means = [heading for metric in PAPER_METRICS for heading in (METRICS[metric].brief, "std")]
     headings = [*parameters, "manager", "missions", "found", *means]
     return Table(headings, rows, f"{title}, standard deviations", f"{'r' * len(parameters)}l")
 
 
 def _differences(found: list[dict[str, Any]], parameters: Sequence[str]) -> Table:
-    """How managers differ, and in how many of the ensemble's parameter sets they do so in the same direction."""
+    """How managers differ, and in how many of the ensemble's parameter sets they do so in the same
+    direction.
+    """
     from suave_des.records.metrics import METRICS
 
     def bounds(low: float | None, high: float | None) -> str:
@@ -149,11 +180,30 @@ def _differences(found: list[dict[str, Any]], parameters: Sequence[str]) -> Tabl
         rows.append([METRICS[metric].brief])
         for each in group:
             same = f"{max(each['members_above_0'], each['members_below_0'])} of {each['members']}"
-            ranges = [bounds(each[f"{name}_low"], each[f"{name}_high"]) for name in ("ci95", "range95")]
+            ranges = [
+                bounds(each[f"{name}_low"], each[f"{name}_high"]) for name in ("ci95", "range95")
+            ]
             swept = [str(each[name]) for name in parameters]
-            rows.append([*swept, f"  {each['first']} - {each['second']}", f"{each['difference']:+.2f}", *ranges, same])
-    headings = [*parameters, "first - second", "difference", "by chance", "over the sets", "same sign"]
-    return Table(headings, rows, "Differences, paired by run, with 95% ranges", f"{'r' * len(parameters)}l")
+            rows.append(
+                [
+                    *swept,
+                    f"  {each['first']} - {each['second']}",
+                    f"{each['difference']:+.2f}",
+                    *ranges,
+                    same,
+                ]
+            )
+    headings = [
+        *parameters,
+        "first - second",
+        "difference",
+        "by chance",
+        "over the sets",
+        "same sign",
+    ]
+    return Table(
+        headings, rows, "Differences, paired by run, with 95% ranges", f"{'r' * len(parameters)}l"
+    )
 
 
 def exit_telling_failures(result: CampaignResult) -> None:
@@ -169,7 +219,9 @@ def exit_telling_failures(result: CampaignResult) -> None:
     for first, *others in islice(alike.values(), _FAILURES_SHOWN):
         count = f" ({len(others) + 1} missions like this)" if others else ""
         console.print(f"suave-des: failed: {' '.join(str(first).split())}{count}")
-    console.print(f"suave-des: {len(result.failures)} of {result.campaign.planned} missions failed, see manifest.json")
+    console.print(
+        f"suave-des: {len(result.failures)} of {result.campaign.planned} missions failed, see manifest.json"
+    )
     raise typer.Exit(3)
 
 
@@ -200,7 +252,9 @@ def reproduce(
 
     settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}
     with progress.shown("reproduce", quiet=quiet) as show:
-        result = run_campaign(DEFAULT_SCENARIO, list(PAPER_ORDER), on_progress=show, **settings, **files.replacements)
+        result = run_campaign(
+            DEFAULT_SCENARIO, list(PAPER_ORDER), on_progress=show, **settings, **files.replacements
+        )
     comparison = compare_with_paper(result.frame())
     console = output()
     for metric in PAPER_METRICS:
@@ -212,7 +266,9 @@ def reproduce(
         console.print("\nNo files were written; --out DIR keeps each mission's figures.")
     else:
         write_files(result.folder, {PAPER_FILE: comparison.markdown()})
-        console.print(f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{PAPER_FILE}")
+        console.print(
+            f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{PAPER_FILE}"
+        )
     exit_telling_failures(result)
 
 
@@ -227,7 +283,12 @@ def run(
         ),
     ],
     manager: Annotated[
-        str, typer.Option(metavar="NAME", help="A manager's name, or module:Class.", autocompletion=complete_managers)
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="A manager's name, or module:Class.",
+            autocompletion=complete_managers,
+        ),
     ] = "metacontrol",
     run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run number.")] = 1,
     manager_option: ManagerOptions = None,
@@ -237,7 +298,9 @@ def run(
     from suave_des.api import run_mission
 
     replaced = files.with_options(manager_option, [manager])
-    result = run_mission(scenario, manager, run_number, command=command_line(), **options, **replaced)
+    result = run_mission(
+        scenario, manager, run_number, command=command_line(), **options, **replaced
+    )
     for remark in result.remarks:
         errors().print(f"suave-des: manager {manager}: {remark}")
     console = output()
@@ -251,7 +314,9 @@ def train(
     manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
     missions: Annotated[int, typer.Option(help="Number of training missions.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
-    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = DEFAULT_SCENARIO,
+    scenario: Annotated[
+        str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")
+    ] = DEFAULT_SCENARIO,
     seed: Annotated[int, typer.Option(help="Training seed.")] = 0,
     overwrite: Overwrite = False,
     manager_option: ManagerOptions = None,
@@ -266,12 +331,24 @@ def train(
 
     found: list[MissionMetrics] = []
     options = files.with_options(manager_option, [manager])
-    trained(scenario, manager, missions, out, seed=seed, overwrite=overwrite, on_mission=found.append, **options)
+    trained(
+        scenario,
+        manager,
+        missions,
+        out,
+        seed=seed,
+        overwrite=overwrite,
+        on_mission=found.append,
+        **options,
+    )
     size = -(-missions // _BLOCKS)
     rows = []
     for first in range(0, missions, size):
         block = found[first : first + size]
-        means = fmean(each.search_time_s for each in block), fmean(each.distance_inspected_m for each in block)
+        means = (
+            fmean(each.search_time_s for each in block),
+            fmean(each.distance_inspected_m for each in block),
+        )
         rows.append((f"{first + 1} to {first + len(block)}", *(f"{mean:.2f}" for mean in means)))
     headings = ("missions", "search time, s", "distance, m")
     console = output()
@@ -283,10 +360,13 @@ def serve(
     scenario: Scenario,
     host: Annotated[str, typer.Option(help="Address.")] = ("127.0.0.1"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")] = 3000,
-    run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run of the first mission.")] = 1,
+    run_number: Annotated[
+        int, typer.Option("--run", metavar="K", help="Run of the first mission.")
+    ] = 1,
     seed: Seed = 1,
     real_time_factor: Annotated[
-        float, typer.Option(metavar="X", help="Mission seconds per second; 0: advance only on request.")
+        float,
+        typer.Option(metavar="X", help="Mission seconds per second; 0: advance only on request."),
     ] = 0.0,
     *,
     files: Files,
@@ -296,7 +376,9 @@ def serve(
     from suave_des.scenario.loader import load_scenario
     from suave_des.simulation.simulator import Simulator
 
-    session = Session(Simulator(load_scenario(scenario, **files.replacements)), run_number, seed, real_time_factor)
+    session = Session(
+        Simulator(load_scenario(scenario, **files.replacements)), run_number, seed, real_time_factor
+    )
     with Server(session, host, port) as server:
         print(f"http://{host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
         server.serve_forever(poll_interval=0.1)

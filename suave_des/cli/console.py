@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from suave_des.metrics.result import MissionMetrics, MissionResult
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202f\u205f-\u2069]")
-"""Control characters but for tabs and ends of lines, and those that turn the direction of text, or are not seen."""
+"""Control characters but for tabs and ends of lines, and those that turn the direction of text, or
+are not seen.
+"""
 TEXT_WIDTH = 95
 """Columns of text at most, which is hard to read in longer lines."""
 
@@ -33,13 +35,17 @@ def plain(text: str) -> str:
 
 
 class PlainConsole(Console):
-    """A console that writes text as it is: control characters as text, no markup, and lines that it does not wrap."""
+    """A console that writes text as it is: control characters as text, no markup, and lines that it
+    does not wrap.
+    """
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(highlight=False, markup=False, emoji=False, **settings)
 
     def print(self, *objects: Any, **settings: Any) -> None:
-        """Print; what is all text is left to the terminal to wrap, so that tools that search find whole lines."""
+        """Print; what is all text is left to the terminal to wrap, so that tools that search find
+        whole lines.
+        """
         is_text = all(isinstance(each, str | Text) for each in objects)
         super().print(*objects, **({"soft_wrap": is_text} | settings))
 
@@ -47,7 +53,9 @@ class PlainConsole(Console):
         """Leave the end to the command, whatever version of rich."""
         raise BrokenPipeError
 
-    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
         """Render to segments of text and style."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=plain(segment.text))
@@ -105,18 +113,32 @@ def print_timeline(console: Console, result: MissionResult) -> None:
         console.print(f"{name:<{names}}  {value:>{values}}  {remark}".rstrip())
 
 
-def _metrics_rows(metrics: MissionMetrics, further: Mapping[str, float | int | None]) -> Iterator[tuple[str, str, str]]:
+def _metrics_rows(
+    metrics: MissionMetrics, further: Mapping[str, float | int | None]
+) -> Iterator[tuple[str, str, str]]:
     """Name, value with its unit, and a remark on it."""
     reaction_s = metrics.mean_reaction_time_s
     no_reaction = ("none", "no reaction was completed")
-    yield "search time", f"{metrics.search_time_s:.1f} s", "" if metrics.pipeline_found else _NOT_FOUND
+    yield (
+        "search time",
+        f"{metrics.search_time_s:.1f} s",
+        "" if metrics.pipeline_found else _NOT_FOUND,
+    )
     yield "distance inspected", f"{metrics.distance_inspected_m:.2f} m", ""
-    yield "mean reaction time", *(no_reaction if reaction_s is None else (f"{reaction_s:.2f} s", ""))
+    yield (
+        "mean reaction time",
+        *(no_reaction if reaction_s is None else (f"{reaction_s:.2f} s", "")),
+    )
     yield "adaptations", str(metrics.adaptations), ""
     yield "mission duration", f"{metrics.mission_duration_s:.1f} s", ""
     for column, value in further.items():
         name, unit = next(
-            ((column.removesuffix(end), unit) for end, unit in _UNITS.items() if column.endswith(end)), (column, "")
+            (
+                (column.removesuffix(end), unit)
+                for end, unit in _UNITS.items()
+                if column.endswith(end)
+            ),
+            (column, ""),
         )
         text = f"{value:.2f}" if isinstance(value, float) else str(value)
         yield name.replace("_", " "), "none" if value is None else text + unit, ""

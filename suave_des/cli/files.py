@@ -1,4 +1,6 @@
-"""suave-des import-config, export-config, scenarios, schema, tree: files that describe missions, and what follows."""
+"""suave-des import-config, export-config, scenarios, schema, tree: files that describe missions,
+and what follows.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,10 @@ def scenarios() -> None:
 
     folder = shipped_folder("scenarios")
     files = sorted(folder.glob("*.yaml"))
-    kinds = {kind: [path for path in files if path.stem.endswith(f"_{kind}")] for kind in ("campaign", "modes")}
+    kinds = {
+        kind: [path for path in files if path.stem.endswith(f"_{kind}")]
+        for kind in ("campaign", "modes")
+    }
     rows = []
     for path in files:
         if not any(path in others for others in kinds.values()):
@@ -46,33 +51,48 @@ def schema() -> None:
 
 
 def import_config(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="The exemplar's files, in any order.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="The exemplar's files, in any order.")
+    ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
-    campaign: Annotated[Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")] = None,
+    campaign: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")
+    ] = None,
     revision: Annotated[
         str | None, typer.Option(metavar="NAME", help="Revision of the files, if they fit several.")
     ] = None,
     runner_seed: Annotated[
         int | None,
-        typer.Option(metavar="SEED", help="Write the values that the exemplar's runner draws from this seed."),
+        typer.Option(
+            metavar="SEED", help="Write the values that the exemplar's runner draws from this seed."
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Import the exemplar's configuration files.
 
-    Keys without a counterpart are reported. Files may be of any revision, with or without leading slashes.
+    Keys without a counterpart are reported. Files may be of any revision, with or without leading
+    slashes.
     """
     from suave_des.registry import manager_names
     from suave_des.scenario.exemplar import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
     for target in targets:
-        if target.resolve() in [file.resolve() for file in (*files, *targets) if file is not target]:
-            raise InputError("is one of the other files, too", file=target, remedy="give the output a different name")
+        if target.resolve() in [
+            file.resolve() for file in (*files, *targets) if file is not target
+        ]:
+            raise InputError(
+                "is one of the other files, too",
+                file=target,
+                remedy="give the output a different name",
+            )
         check_output_file(target, overwrite=overwrite)
     given = {"revision": revision, "campaign": campaign, "runner_seed": runner_seed}
     imported = imported_from(files, out, managers=manager_names(), **given)  # type: ignore[arg-type]
-    for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
+    for target, text in zip(
+        targets, filter(None, (imported.scenario, imported.campaign)), strict=True
+    ):
         write_files(target.parent, {target.name: text})
     for note in imported.notes:
         print(plain(note))
@@ -83,9 +103,15 @@ def import_config(
 
 def export_config(
     scenario: Annotated[str, any_scenario(False)],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml.")],
+    out: Annotated[
+        Path,
+        typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml."),
+    ],
     revision: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Revision that is to read them.", show_default="the scenario's")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Revision that is to read them.", show_default="the scenario's"
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -100,7 +126,9 @@ def export_config(
     file = read_campaign_file(scenario)
     loaded = load_scenario(scenario if file is None else file.scenario)
     settings = CampaignSettings(campaign=1, scenario="") if file is None else file.settings
-    given = {"managers", "runs", "seed"} | (set() if file is None else file.settings.model_fields_set)
+    given = {"managers", "runs", "seed"} | (
+        set() if file is None else file.settings.model_fields_set
+    )
     texts, lost = exported(loaded, settings.model_dump(mode="json", include=given), revision)
     for name in texts:
         check_output_file(out / name if out.is_dir() else out, overwrite=overwrite)
@@ -112,10 +140,12 @@ def export_config(
 
 
 def tree(
-    manager: Annotated[str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")],
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario with the tree's settings.")] = (
-        "release15"
-    ),
+    manager: Annotated[
+        str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")
+    ],
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="Scenario with the tree's settings.")
+    ] = ("release15"),
 ) -> None:
     """Draw the behaviour tree of a manager."""
     from suave_des.simulation.mission import Mission

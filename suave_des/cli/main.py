@@ -35,8 +35,20 @@ class _Commands(CommandsUnderHeadings):
     """Handles interruptions before typer does, which would not report what is kept."""
 
     headings: ClassVar[Headings] = {
-        "Run missions": (campaign.reproduce, campaign.run, campaign.campaign, campaign.train, campaign.serve),
-        "Look at results": (results.compare, results.figure, results.report, results.replay, results.validate),
+        "Run missions": (
+            campaign.reproduce,
+            campaign.run,
+            campaign.campaign,
+            campaign.train,
+            campaign.serve,
+        ),
+        "Look at results": (
+            results.compare,
+            results.figure,
+            results.report,
+            results.replay,
+            results.validate,
+        ),
         "Knowledge, rules and trees": (kb.app, files.tree),
         "Files": (files.import_config, files.export_config, files.scenarios, files.schema),
     }
@@ -80,7 +92,10 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+        ),
     ] = False,
 ) -> None:
     """Options of the command itself."""
@@ -92,10 +107,12 @@ def _command_line() -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command `suave-des`; an error that is meant for the user is reported in one line, with an exit status.
+    """Run the command `suave-des`; an error that is meant for the user is reported in one line,
+    with an exit status.
 
     Args:
-        arguments: of the command line; left out: the process's own. Without any, the help is printed.
+        arguments: of the command line; left out: the process's own. Without any, the help is
+            printed.
 
     Raises:
         SystemExit: always, with the exit status.
@@ -106,34 +123,55 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # ? for what the terminal's encoding lacks
     atexit.unregister(gc.freeze)  # as of an earlier call
-    atexit.register(gc.freeze)  # a last collection of all that was imported would take a tenth of a second
+    atexit.register(
+        gc.freeze
+    )  # a last collection of all that was imported would take a tenth of a second
     abandoned = _abandoned()
     try:
         with signals_raised():
-            status = _command_line().main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+            status = (
+                _command_line().main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+            )
             if sys.stdout is not None:
                 sys.stdout.flush()  # what cannot be written is reported here, not while Python ends
-            if was_interrupted() and status == 128 + signal.SIGINT:  # typer's for any signal before the command began
+            if (
+                was_interrupted() and status == 128 + signal.SIGINT
+            ):  # typer's for any signal before the command began
                 status = _report("interrupted", exit_status())
     except _CommandInterruptedError as interruption:
         status = _report(str(interruption), exit_status())
     except SuaveDesError as error:
-        status = _report(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
+        status = _report(
+            str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING
+        )
     except BaseException as error:
         if was_interrupted():  # in the middle of an import, whose own error this may be
             _leave(_report("interrupted", exit_status()), by_force=False)
         if not isinstance(error, Exception):
             raise
-        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):  # stdout: files have own errors
+        if isinstance(error, OSError) and error.errno in (
+            errno.ENOSPC,
+            errno.EDQUOT,
+        ):  # stdout: files have own errors
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
-            _leave(_report(f"the output cannot be written: {error.strerror}", BAD_INPUT), by_force=False)
-        # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
+            _leave(
+                _report(f"the output cannot be written: {error.strerror}", BAD_INPUT),
+                by_force=False,
+            )
+        # A wrong option or argument: a class that is private to typer, and was click's in earlier
+        # versions of it.
         if not hasattr(error, "format_message"):
             raise
         context: Any = getattr(error, "ctx", None)
         path = "suave-des" if context is None else context.command_path
-        names = "several names have commas between them, without blanks; " if "extra argument" in str(error) else ""
-        status = _report(f"{error.format_message().rstrip('.')} ({names}see {path} --help)", BAD_INPUT)
+        names = (
+            "several names have commas between them, without blanks; "
+            if "extra argument" in str(error)
+            else ""
+        )
+        status = _report(
+            f"{error.format_message().rstrip('.')} ({names}see {path} --help)", BAD_INPUT
+        )
     _leave(status, by_force=_abandoned() > abandoned)
 
 
@@ -144,7 +182,9 @@ def _abandoned() -> int:
 
 
 def _leave(status: int, *, by_force: bool) -> None:
-    """Exit with a status, even while an abandoned reasoner still runs in Java, which cannot be stopped."""
+    """Exit with a status, even while an abandoned reasoner still runs in Java, which cannot be
+    stopped.
+    """
     if by_force:
         sys.stdout.flush()
         sys.stderr.flush()

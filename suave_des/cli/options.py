@@ -1,6 +1,8 @@
-"""Arguments and options of commands: those that several share, those of campaigns' fields, and how commands are built.
+"""Arguments and options of commands: those that several share, those of campaigns' fields, and how
+commands are built.
 
-An option of campaigns is declared once, as a documented field of `CampaignSpec`; `Fields` makes options of them.
+An option of campaigns is declared once, as a documented field of `CampaignSpec`; `Fields` makes
+options of them.
 """
 
 from __future__ import annotations
@@ -36,7 +38,11 @@ def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]
 
 
 def _scenarios() -> Iterable[str]:
-    return sorted(path.stem for path in shipped_folder("scenarios").glob("*.yaml") if "_modes" not in path.stem)
+    return sorted(
+        path.stem
+        for path in shipped_folder("scenarios").glob("*.yaml")
+        if "_modes" not in path.stem
+    )
 
 
 # Modules that take a while are imported only when a shell asks.
@@ -47,29 +53,46 @@ complete_scenarios = _completing(_scenarios)
 Scenario = Annotated[
     str,
     typer.Argument(
-        metavar="SCENARIO", help="A scenario file, or the name of a shipped one.", autocompletion=complete_scenarios
+        metavar="SCENARIO",
+        help="A scenario file, or the name of a shipped one.",
+        autocompletion=complete_scenarios,
     ),
 ]
-Results = Annotated[list[Path], typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files.")]
+Results = Annotated[
+    list[Path],
+    typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files."),
+]
 Modes = Annotated[
-    Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file instead of the scenario's.")
+    Path | None,
+    typer.Option("--modes", metavar="FILE", help="System Modes file instead of the scenario's."),
 ]
 Reasoner = Annotated[
-    str | None, typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow).")
+    str | None,
+    typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow)."),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
 Workers = Annotated[int, typer.Option("--workers", help="Worker processes.")]
 
 
 def any_scenario(default: str | Literal[False]) -> Any:
-    """Declare the argument SCENARIO of commands that take campaign files, too, with its default as shown."""
+    """Declare the argument SCENARIO of commands that take campaign files, too, with its default as
+    shown.
+    """
     text = "A scenario or campaign file, or a shipped scenario."
-    return typer.Argument(metavar="SCENARIO", help=text, show_default=default, autocompletion=complete_scenarios)
+    return typer.Argument(
+        metavar="SCENARIO", help=text, show_default=default, autocompletion=complete_scenarios
+    )
 
 
 def managers_option(text: str, default: str | None = None, *names: str) -> Any:
-    """Declare an option that takes names of managers, with its help, its default as shown, and further names for it."""
-    settings: dict[str, Any] = {"metavar": "NAME,...", "help": text, "autocompletion": complete_managers}
+    """Declare an option that takes names of managers, with its help, its default as shown, and
+    further names for it.
+    """
+    settings: dict[str, Any] = {
+        "metavar": "NAME,...",
+        "help": text,
+        "autocompletion": complete_managers,
+    }
     return typer.Option("--managers", *names, show_default=default or True, **settings)
 
 
@@ -81,9 +104,13 @@ def _quiet(context: typer.Context, value: bool) -> bool:
     return value
 
 
-Quiet = Annotated[bool, typer.Option("--quiet", callback=_quiet, help="Show no progress, and no warnings.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", callback=_quiet, help="Show no progress, and no warnings.")
+]
 Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in the output folder.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace earlier results in the output folder.")
+]
 ManagerOptions = Annotated[
     list[str] | None,
     typer.Option(
@@ -98,7 +125,8 @@ Given = dict[str, Any]
 
 @dataclass(frozen=True)
 class Fields:
-    """Options for fields of CampaignSpec: the annotation of a command's parameter, which takes what is given of them.
+    """Options for fields of CampaignSpec: the annotation of a command's parameter, which takes what
+    is given of them.
 
     `help` and `default`, as shown, are of fields for which they differ here from a campaign's.
     """
@@ -115,24 +143,35 @@ class Fields:
         texts = field_docs(CampaignSpec)
         for name in self.names:
             declared = CampaignSpec.model_fields[name]
-            shown_as = next((each for each in declared.metadata if isinstance(each, Option)), Option())
+            shown_as = next(
+                (each for each in declared.metadata if isinstance(each, Option)), Option()
+            )
             kind: Any = next(each for each in _KINDS if each in _types_in(declared.annotation))
             given = typer.Option(
                 _flag(name),
                 metavar=shown_as.metavar,
                 help=self.help.get(name) or " ".join(texts[name].split()),
-                show_default=self.default.get(name) or shown_as.default or _written(declared.default) or False,
+                show_default=self.default.get(name)
+                or shown_as.default
+                or _written(declared.default)
+                or False,
                 autocompletion=complete_managers if name == "managers" else None,
             )
             default, accepted = (False, bool) if kind is bool else (None, kind | None)
             yield _keyword(name, default, Annotated[accepted, given])
 
     def taken(self, given: dict[str, Any]) -> Given:
-        """Take what is given from a command's arguments; of names, there may be several, with commas between them."""
+        """Take what is given from a command's arguments; of names, there may be several, with
+        commas between them.
+        """
         from suave_des.campaign.spec import CampaignSpec
 
         values = {name: value for name in self.names if _is_given(value := given.pop(name))}
-        lists = [name for name in values if tuple in _types_in(CampaignSpec.model_fields[name].annotation)]
+        lists = [
+            name
+            for name in values
+            if tuple in _types_in(CampaignSpec.model_fields[name].annotation)
+        ]
         return values | {name: comma_separated(values[name]) for name in lists}
 
 
@@ -149,7 +188,13 @@ def _types_in(annotation: Any) -> set[Any]:
 
 
 def _written(default: Any) -> str:
-    return ",".join(default) if isinstance(default, tuple) else str(default) if _is_given(default) else ""
+    return (
+        ",".join(default)
+        if isinstance(default, tuple)
+        else str(default)
+        if _is_given(default)
+        else ""
+    )
 
 
 def flags(given: Given) -> dict[str, Any]:
@@ -159,30 +204,45 @@ def flags(given: Given) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class KnowledgeFiles:
-    """Options that replace or add to a scenario's ontologies, rules and values; a field is named as its option."""
+    """Options that replace or add to a scenario's ontologies, rules and values; a field is named as
+    its option.
+    """
 
     ontology: Annotated[
-        list[Path] | None, typer.Option(metavar="FILE", help="Ontology instead of the scenario's; repeatable.")
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Ontology instead of the scenario's; repeatable."),
     ] = None
     rules: Annotated[
-        list[Path] | None, typer.Option(metavar="FILE", help="File of rules to add to the ontologies; repeatable.")
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="File of rules to add to the ontologies; repeatable."),
     ] = None
-    disable_rule: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Rule to disable; repeatable.")] = None
+    disable_rule: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Rule to disable; repeatable.")
+    ] = None
     set: Annotated[
         list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="Value of the scenario, such as visibility.period_s=40; repeatable."),
+        typer.Option(
+            metavar="KEY=VALUE",
+            help="Value of the scenario, such as visibility.period_s=40; repeatable.",
+        ),
     ] = None
 
     @property
     def given(self) -> dict[str, object]:
         """The options by name, with what is given of them."""
-        return {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
+        return {
+            f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)
+        }
 
     @property
     def replacements(self) -> Replacements:
         """What is given, as the loader takes it."""
         changed: Replacements = {"values": self.values} if self.values else {}
-        files = {"ontologies": self.ontology, "rules": self.rules, "disabled_rules": self.disable_rule}
+        files = {
+            "ontologies": self.ontology,
+            "rules": self.rules,
+            "disabled_rules": self.disable_rule,
+        }
         return changed | {name: value or () for name, value in files.items()}  # type: ignore[return-value]
 
     @property
@@ -214,7 +274,9 @@ def _is_given(value: object) -> bool:
 
 
 def check_no_use(options: Mapping[str, object], where: str, remedy: str = "remove it") -> None:
-    """Raise an InputError if one of some options, with their values, is given where it has no use."""
+    """Raise an InputError if one of some options, with their values, is given where it has no
+    use.
+    """
     for option, value in options.items():
         if _is_given(value):
             raise InputError(f"{option} cannot be used {where}", remedy=remedy)
@@ -235,12 +297,17 @@ def key_and_value(word: str, option: str) -> tuple[str, Any]:
 
     key, equals, value = word.partition("=")
     if not equals or not key.strip():
-        raise InputError(f"{shown(word)} is not KEY=VALUE", place=option, remedy=f"for instance {option} key=1.5")
+        raise InputError(
+            f"{shown(word)} is not KEY=VALUE", place=option, remedy=f"for instance {option} key=1.5"
+        )
     return key.strip(), read_value(value, option)
 
 
-def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Read settings, given as MANAGER.KEY=VALUE or KEY=VALUE, of the managers that missions are run with, by key.
+def manager_options(
+    words: Sequence[str] | None, managers: Sequence[str]
+) -> dict[str, dict[str, Any]]:
+    """Read settings, given as MANAGER.KEY=VALUE or KEY=VALUE, of the managers that missions are run
+    with, by key.
 
     Raises:
         InputError: a word has another form, or is for no manager of these.
@@ -250,12 +317,18 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
     settings: dict[str, dict[str, Any]] = {}
     own = [name for name in managers if not is_built_in(name)]
     for word in words or ():
-        named = max((name for name in managers if word.startswith(f"{name}.")), key=len, default=None)
+        named = max(
+            (name for name in managers if word.startswith(f"{name}.")), key=len, default=None
+        )
         key, value = key_and_value(word.removeprefix(f"{named}."), "--manager-option")
         targets = [named] if named is not None else managers if len(managers) == 1 else own
         if not targets or (named is None and ":" in key):
             remedy = f"write MANAGER.KEY=VALUE, with one of {', '.join(managers) or '--managers'}"
-            raise InputError(f"{shown(word)} is for none of the managers", place="--manager-option", remedy=remedy)
+            raise InputError(
+                f"{shown(word)} is for none of the managers",
+                place="--manager-option",
+                remedy=remedy,
+            )
         for target in targets:
             settings.setdefault(target, {})[key] = value
     return settings
@@ -274,7 +347,8 @@ def command_line() -> list[str]:
     return ["suave-des", *_arguments]
 
 
-# Commands are built of functions when they are called for: what their options are read from is slow to import.
+# Commands are built of functions when they are called for: what their options are read from is slow
+# to import.
 
 Command = Callable[..., None] | typer.Typer
 Headings = Mapping[str, tuple[Command, ...]]
@@ -282,7 +356,9 @@ Headings = Mapping[str, tuple[Command, ...]]
 
 
 class CommandsUnderHeadings(TyperGroup):
-    """A command with others below it, which its help shows under headings, with the whole first line of their help."""
+    """A command with others below it, which its help shows under headings, with the whole first
+    line of their help.
+    """
 
     headings: ClassVar[Headings] = {}
 
@@ -320,11 +396,17 @@ def _summary(command: Command) -> str:
 
 def name_of(command: Command) -> str:
     """Return the name that a command is called by."""
-    return str(command.info.name) if isinstance(command, typer.Typer) else command.__name__.strip("_").replace("_", "-")
+    return (
+        str(command.info.name)
+        if isinstance(command, typer.Typer)
+        else command.__name__.strip("_").replace("_", "-")
+    )
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn each parameter of a command that is a dataclass, or has `Fields`, into options, one for each field."""
+    """Turn each parameter of a command that is a dataclass, or has `Fields`, into options, one for
+    each field.
+    """
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
     last: list[inspect.Parameter] = []
@@ -351,7 +433,9 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _keyword(name: str, default: object, annotation: Any) -> inspect.Parameter:
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    return inspect.Parameter(
+        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
+    )
 
 
 def _group(kind: Any, given: dict[str, Any]) -> Any:

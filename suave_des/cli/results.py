@@ -1,4 +1,6 @@
-"""suave-des compare, validate, figure, replay and report: results as tables, pictures, and pages for a browser."""
+"""suave-des compare, validate, figure, replay and report: results as tables, pictures, and pages
+for a browser.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,11 @@ def compare(
     managers: Annotated[str | None, managers_option("Only these, in this order.", "all")] = None,
     against: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Compare all others with this one only.", show_default="each with each"),
+        typer.Option(
+            metavar="NAME",
+            help="Compare all others with this one only.",
+            show_default="each with each",
+        ),
     ] = None,
     metrics: Annotated[
         str | None,
@@ -59,29 +65,42 @@ def compare(
         ),
     ] = None,
     by: Annotated[
-        str | None, typer.Option(metavar="KEY,...", help="Compare values of these swept parameters, too.")
+        str | None,
+        typer.Option(metavar="KEY,...", help="Compare values of these swept parameters, too."),
     ] = None,
     half_width: Annotated[
         list[str] | None,
-        typer.Option(metavar="METRIC:VALUE", help="Estimate the runs needed for an interval this narrow; repeatable."),
+        typer.Option(
+            metavar="METRIC:VALUE",
+            help="Estimate the runs needed for an interval this narrow; repeatable.",
+        ),
     ] = None,
-    unpaired: Annotated[bool, typer.Option("--unpaired", help="Treat runs as independent.")] = False,
+    unpaired: Annotated[
+        bool, typer.Option("--unpaired", help="Treat runs as independent.")
+    ] = False,
     assisted_by: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="DIR... are real missions; this is a campaign under the same conditions."),
+        typer.Option(
+            metavar="DIR",
+            help="DIR... are real missions; this is a campaign under the same conditions.",
+        ),
     ] = None,
     population: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="With --assisted-by: a campaign under many such conditions.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="With --assisted-by: a campaign under many such conditions."
+        ),
     ] = None,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = "table",
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing."),
     ] = None,
 ) -> None:
     """Compare managers by their results.
 
-    Runs that share their random numbers are compared in pairs, which takes fewer missions. A few real missions can be
-    assisted by simulated ones.
+    Runs that share their random numbers are compared in pairs, which takes fewer missions. A few
+    real missions can be assisted by simulated ones.
     """
     from suave_des.records.missions import read_missions
     from suave_des.results.compare import compare_assisted, compare_groups
@@ -97,16 +116,25 @@ def compare(
         remedy = "give both: suave-des campaign makes them"
         raise InputError("--assisted-by and --population are needed together", remedy=remedy)
     if assisted_by is not None:
-        unused = {"--by": by, "--against": against, "--half-width": half_width, "--unpaired": unpaired}
+        unused = {
+            "--by": by,
+            "--against": against,
+            "--half-width": half_width,
+            "--unpaired": unpaired,
+        }
         check_no_use(unused, "with --assisted-by")
     missions = read_missions(results)
-    simulated = [read_missions([folder]) for folder in (assisted_by, population) if folder is not None]
+    simulated = [
+        read_missions([folder]) for folder in (assisted_by, population) if folder is not None
+    ]
     groups = grouped(missions, names, columns, points, simulated=simulated)
     comparison: Written
     if simulated:
         comparison = compare_assisted(groups)
     else:
-        comparison = compare_groups(groups, against=against, half_widths=half_width or (), unpaired=unpaired)
+        comparison = compare_groups(
+            groups, against=against, half_widths=half_width or (), unpaired=unpaired
+        )
     if out is None:
         print(comparison.written(as_format, min(output().width, TEXT_WIDTH)), end="")
     else:
@@ -133,12 +161,17 @@ def validate(
         ),
     ] = None,
     runs_file: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Compare this runs.csv; nothing is simulated.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Compare this runs.csv; nothing is simulated."),
     ] = None,
-    managers: Annotated[str | None, managers_option("Managers to compare; by default all in the data.")] = None,
+    managers: Annotated[
+        str | None, managers_option("Managers to compare; by default all in the data.")
+    ] = None,
     targets: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."),
+        typer.Option(
+            metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."
+        ),
     ] = None,
     *,
     options: Annotated[
@@ -153,17 +186,28 @@ def validate(
         ),
     ],
     strict: Annotated[
-        bool, typer.Option("--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met.")
+        bool,
+        typer.Option(
+            "--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met."
+        ),
     ] = False,
     quiet: Quiet = False,
     files: Files,
 ) -> None:
     """Compare simulated missions with real ones: distributions, clusters, conclusions.
 
-    With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
+    With a campaign file that sweeps the conditions of the real missions, each is compared under its
+    own condition.
     """
     from suave_des import __version__
-    from suave_des.results.real import PAPERS_RUNS, numbered, published_for, read_conditions, read_real, targets_of
+    from suave_des.results.real import (
+        PAPERS_RUNS,
+        numbered,
+        published_for,
+        read_conditions,
+        read_real,
+        targets_of,
+    )
     from suave_des.results.validation import FILES
     from suave_des.results.validation import validate as compare
 
@@ -204,9 +248,13 @@ def validate(
             result = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
         simulated = result.frame()
         sources |= {"scenario": result.campaign.loaded.scenario.name, "runs": settings["runs"]}
-        if not set(result.campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
+        if not set(result.campaign.spec.managers) <= set(
+            simulated["manager"]
+        ):  # one has no mission to compare
             exit_telling_failures(result)
-    validation = compare(real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed)
+    validation = compare(
+        real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed
+    )
     console = output()
     for line in [*real.notes, ""] if real.notes else ():
         console.print(line)
@@ -239,8 +287,12 @@ def _is_shipped(path: Path) -> bool:
 
 
 def figure(
-    folders: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Result folders or CSV files.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Result folders or CSV files.")
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")
+    ],
     kind: Annotated[
         FigureKind,
         typer.Option(
@@ -248,12 +300,14 @@ def figure(
         ),
     ] = "auto",
     parameters: Annotated[
-        str | None, typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all")
+        str | None,
+        typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all"),
     ] = None,
 ) -> None:
     """Draw a mission's map or a campaign's results.
 
-    By default the contents of DIR decide: the map of a mission, a campaign's distributions, or the means of a sweep.
+    By default the contents of DIR decide: the map of a mission, a campaign's distributions, or the
+    means of a sweep.
     """
     from suave_des.results.figures import draw_results
 
@@ -272,23 +326,38 @@ Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser
 def replay(
     folders: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[DIR]...", help="Folder of a campaign, or one or two of run.", show_default=False),
+        typer.Argument(
+            metavar="[DIR]...",
+            help="Folder of a campaign, or one or two of run.",
+            show_default=False,
+        ),
     ] = None,
     scenario: Annotated[
         str | None, typer.Option(metavar="SCENARIO", help="Run missions of this scenario instead.")
     ] = None,
     managers: Annotated[
         str | None,
-        managers_option("One or two managers.", "metacontrol; for a campaign, the last and the first", "--manager"),
+        managers_option(
+            "One or two managers.",
+            "metacontrol; for a campaign, the last and the first",
+            "--manager",
+        ),
     ] = None,
-    run_number: Annotated[int | None, typer.Option("--run", metavar="K", help="Run number.", show_default="1")] = None,
+    run_number: Annotated[
+        int | None, typer.Option("--run", metavar="K", help="Run number.", show_default="1")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Random seed.", show_default="1")] = None,
     point: Annotated[
-        int | None, typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default="0")
+        int | None,
+        typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default="0"),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Page to write.", show_default="replay.html, in DIR or the current folder"),
+        typer.Option(
+            metavar="FILE",
+            help="Page to write.",
+            show_default="replay.html, in DIR or the current folder",
+        ),
     ] = None,
     show: Open = False,
     yes: Trusted = False,
@@ -297,7 +366,8 @@ def replay(
 ) -> None:
     """Make a page that plays a mission, or two side by side.
 
-    It needs no network, and shows the vehicle, what its camera sees, and what its manager knew, inferred and decided.
+    It needs no network, and shows the vehicle, what its camera sees, and what its manager knew,
+    inferred and decided.
     """
     from suave_des.pages.page import write_page
     from suave_des.pages.replay import missions_in, missions_run, replay_page
@@ -306,7 +376,9 @@ def replay(
     folders = folders or []
     if bool(folders) == (scenario is not None):
         problem = "both DIR and --scenario are given" if folders else "there is nothing to play"
-        raise InputError(problem, remedy="give DIR, the --out folder of run or campaign, or --scenario NAME")
+        raise InputError(
+            problem, remedy="give DIR, the --out folder of run or campaign, or --scenario NAME"
+        )
     if folders:
         check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
     else:
@@ -327,10 +399,16 @@ def replay(
 def report(
     results: Results,
     paths: Annotated[
-        int, typer.Option(metavar="N", min=0, max=100, help="Runs of each manager with path and timeline.")
+        int,
+        typer.Option(
+            metavar="N", min=0, max=100, help="Runs of each manager with path and timeline."
+        ),
     ] = 12,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR"
+        ),
     ] = None,
     show: Open = False,
 ) -> None:

@@ -1,1 +1,3 @@
-"""Missions and managers for other programs: step by step, as a Gymnasium environment, over HTTP, in other languages."""
+"""Missions and managers for other programs: step by step, as a Gymnasium environment, over HTTP, in
+other languages.
+"""

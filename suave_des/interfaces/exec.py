@@ -1,7 +1,9 @@
-"""Managers in other processes and languages: `exec:COMMAND` exchanges JSON lines with a program by stdin and stdout.
+"""Managers in other processes and languages: `exec:COMMAND` exchanges JSON lines with a program by
+stdin and stdout.
 
-Each message is a line, and gets a line as its answer; mission time stands still until then. The program is started once
-in each process that runs missions, and serves one mission after the other. The messages: docs/guides/other-programs.md.
+Each message is a line, and gets a line as its answer; mission time stands still until then. The
+program is started once in each process that runs missions, and serves one mission after the other.
+The messages: docs/guides/other-programs.md.
 """
 
 from __future__ import annotations
@@ -57,17 +59,26 @@ class _Program:
     def __init__(self, command: tuple[str, ...]) -> None:
         try:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, start_new_session=True
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                bufsize=0,
+                start_new_session=True,
             )
         except OSError as error:
             remedy = "give a program that can be run, such as exec:./my_manager or exec:perl my_manager.pl"
-            raise InputError(f"cannot be run: {error.strerror}", file=command[0], remedy=remedy) from None
+            raise InputError(
+                f"cannot be run: {error.strerror}", file=command[0], remedy=remedy
+            ) from None
         assert self._process.stdin is not None and self._process.stdout is not None
         self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
-        # If this process is killed, its end of the pipe closes, and the shell kills the program with its children.
+        # If this process is killed, its end of the pipe closes, and the shell kills the program
+        # with its children.
         group = str(self._process.pid)
         self._watcher = subprocess.Popen(
-            ("sh", "-c", _KILLS_AT_END_OF_INPUT, "sh", group), stdin=subprocess.PIPE, start_new_session=True
+            ("sh", "-c", _KILLS_AT_END_OF_INPUT, "sh", group),
+            stdin=subprocess.PIPE,
+            start_new_session=True,
         )
         self._poll = select.poll()
         self._poll.register(self._out, select.POLLIN)
@@ -75,7 +86,9 @@ class _Program:
 
     def ask(self, message: Mapping[str, Any], time_out_s: float) -> dict[str, Any]:
         """Send a message, and return its answer."""
-        line = json.dumps(message, separators=(",", ":"), default=dict).encode() + b"\n"  # of mappings of other types
+        line = (
+            json.dumps(message, separators=(",", ":"), default=dict).encode() + b"\n"
+        )  # of mappings of other types
         try:
             while line:
                 line = line[os.write(self._in, line) :]
@@ -85,7 +98,9 @@ class _Program:
         try:
             found = json.loads(answer)
         except (ValueError, RecursionError):
-            raise ProgramError(f"answered {shown(answer[:80].decode(errors='replace'))}, which is not JSON") from None
+            raise ProgramError(
+                f"answered {shown(answer[:80].decode(errors='replace'))}, which is not JSON"
+            ) from None
         if not isinstance(found, dict):
             raise ProgramError(f"answered {shown(found)}, which is not an object")
         return found
@@ -112,13 +127,17 @@ class _Program:
         return ProgramError("closed its output")
 
     def end(self) -> None:
-        """End the program: it sees the end of its input; then whatever is left of it and its children is killed."""
+        """End the program: it sees the end of its input; then whatever is left of it and its
+        children is killed.
+        """
         for stream in (self._process.stdin, self._process.stdout):
             assert stream is not None
             stream.close()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_END_S)
-        with suppress(ProcessLookupError, PermissionError):  # nobody is left; macOS says so by a PermissionError
+        with suppress(
+            ProcessLookupError, PermissionError
+        ):  # nobody is left; macOS says so by a PermissionError
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         self._watcher.kill()
@@ -155,7 +174,9 @@ class ExecManager(ManagingSubsystem):
         self._begin: dict[str, Any] = {}
 
     def _located(self, word: str) -> str:
-        """Return where the file is that a word of the command names, or the word if it names none."""
+        """Return where the file is that a word of the command names, or the word if it names
+        none.
+        """
         try:
             return str(self.system.file(word).resolve())
         except InputError:
@@ -174,7 +195,9 @@ class ExecManager(ManagingSubsystem):
             settings=settings,
             learned=learned,
             attributes=list(system.measurements),
-            functions={function: system.modes.available_modes(function) for function in system.modes.nodes},
+            functions={
+                function: system.modes.available_modes(function) for function in system.modes.nodes
+            },
             mission_wide_functions=system.functions,
         )
         if answer.pop("protocol", PROTOCOL) != PROTOCOL:
@@ -194,7 +217,9 @@ class ExecManager(ManagingSubsystem):
             raise ValueError(f"subscribes_to: {did_you_mean(unknown[0], KINDS)}")
         self._subscribes_to = tuple(KINDS[name] for name in names)
         if (edges := answer.pop("depends_on", None)) is not None:
-            self._depends_on = {name: tuple(sorted(map(float, each))) for name, each in edges.items()}
+            self._depends_on = {
+                name: tuple(sorted(map(float, each))) for name, each in edges.items()
+            }
 
     def mission_started(self) -> None:
         """Send the program this message with the settings, and carry out its answer."""
@@ -217,18 +242,24 @@ class ExecManager(ManagingSubsystem):
         """Pass a diagnostic on."""
         kind = _NAMES.get(diagnostic.kind)
         if kind is not None:
-            self._carry_out(self._ask("diagnostic", kind=kind, key=diagnostic.key, value=diagnostic.value))
+            self._carry_out(
+                self._ask("diagnostic", kind=kind, key=diagnostic.key, value=diagnostic.value)
+            )
 
     def adapt(self) -> None:
         """Let the program adapt, with all current measurements."""
         measured = self.system.measured
-        self._carry_out(self._ask("adapt", measured={name: measured(name) for name in self.system.measurements}))
+        self._carry_out(
+            self._ask("adapt", measured={name: measured(name) for name in self.system.measurements})
+        )
 
     def _ask(self, kind: str, /, **content: Any) -> dict[str, Any]:
         if (program := _programs.get(self._command)) is None:
             program = _programs[self._command] = _Program(self._command)
         try:
-            answer = program.ask({"type": kind, "time_s": self.system.now_s, **content}, self._time_out_s)
+            answer = program.ask(
+                {"type": kind, "time_s": self.system.now_s, **content}, self._time_out_s
+            )
         except BaseException as error:  # a time-out of the mission, too, leaves an answer under way
             _programs.pop(self._command).end()
             if isinstance(error, ProgramError):
@@ -236,18 +267,25 @@ class ExecManager(ManagingSubsystem):
             raise
         known = _FIRST_ANSWER if kind == "mission_started" else _ANSWER
         if unknown := [key for key in answer if key not in known]:
-            raise self._error(f"answered {shown(unknown[0])} to {kind}: {did_you_mean(unknown[0], known)}")
+            raise self._error(
+                f"answered {shown(unknown[0])} to {kind}: {did_you_mean(unknown[0], known)}"
+            )
         return answer
 
     def _carry_out(self, answer: Mapping[str, Any]) -> None:
         modes, lines = answer.get("modes", {}), answer.get("log", ())
         if not isinstance(modes, dict) or not isinstance(lines, list | tuple):
-            raise self._error(f"answered {shown(dict(answer))}; modes is an object, log a list of texts")
+            raise self._error(
+                f"answered {shown(dict(answer))}; modes is an object, log a list of texts"
+            )
         for line in lines:
             self.system.log("says", str(line))
         for function, mode in modes.items():
             if not isinstance(mode, str) or not self.system.change_mode(function, mode):
-                known = {each: self.system.modes.available_modes(each) for each in self.system.modes.nodes}
+                known = {
+                    each: self.system.modes.available_modes(each)
+                    for each in self.system.modes.nodes
+                }
                 near = did_you_mean(mode, known.get(function, known), "known")
                 raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
 

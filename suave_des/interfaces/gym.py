@@ -12,7 +12,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from suave_des.domain import BATTERY_LEVEL, FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTER_NAMES
+from suave_des.domain import (
+    BATTERY_LEVEL,
+    FOLLOW_PIPELINE,
+    GENERATE_RECHARGE_PATH,
+    MISSION_FUNCTIONS,
+    THRUSTER_NAMES,
+)
 from suave_des.errors import InputError, shown
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.resources import DEFAULT_SCENARIO
@@ -28,24 +34,27 @@ SEED_LIMIT: Final = 2**31
 _SPREADS: Final = 6.0
 """So many standard deviations are taken for the bounds of a normal distribution that has none."""
 REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
-"""Weights of a step's events: a metre of pipeline that was inspected, a second of search, finding the pipeline, and an
-adaptation. A metre earns what 10 s of search cost; a mission gives about -10 to 60."""
+"""Weights of a step's events: a metre of pipeline that was inspected, a second of search, finding
+the pipeline, and an adaptation. A metre earns what 10 s of search cost; a mission gives about -10
+to 60."""
 
 
 class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     """SUAVE's mission; an episode is a mission, a step is one adaptation period.
 
-    Observation: a vector of float32, named by `observation_names`: the values that monitors measured last, -1 before
-    the first; for each thruster 1 unless it was reported as failed; whether the pipeline is inspected; the distance
-    inspected in m; mission time as a share of the limit; for each function with a choice, the index of the mode that
-    was requested last, or -1.
+    Observation: a vector of float32, named by `observation_names`: the values that monitors
+    measured last, -1 before the first; for each thruster 1 unless it was reported as failed;
+    whether the pipeline is inspected; the distance inspected in m; mission time as a share of the
+    limit; for each function with a choice, the index of the mode that was requested last, or -1.
 
-    Action: for each function in `mode_names` the index of a mode. That of a function that the current task does not
-    need has no effect. A function with one mode has it as long as it is needed.
+    Action: for each function in `mode_names` the index of a mode. That of a function that the
+    current task does not need has no effect. A function with one mode has it as long as it is
+    needed.
 
-    An episode terminates with the mission: at the time limit, which belongs to the task, or at the end of the path. It
-    is never truncated. `reset(seed=s)` gives the mission of run 1 of a campaign with seed s; without a seed one is
-    drawn. `gymnasium.make_vec(..., num_envs=8)` gives many side by side (gymnasium's SyncVectorEnv).
+    An episode terminates with the mission: at the time limit, which belongs to the task, or at the
+    end of the path. It is never truncated. `reset(seed=s)` gives the mission of run 1 of a campaign
+    with seed s; without a seed one is drawn. `gymnasium.make_vec(..., num_envs=8)` gives many side
+    by side (gymnasium's SyncVectorEnv).
 
     Example:
         >>> environment = PipelineInspection("seams2023", period_s=2.0)
@@ -53,13 +62,16 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         >>> observation, reward, terminated, truncated, info = environment.step([2, 0])
 
     Args:
-        scenario: path of a scenario file, name of a shipped one, or a Simulator, which several environments may share.
+        scenario: path of a scenario file, name of a shipped one, or a Simulator, which several
+            environments may share.
         period_s: mission time of a step.
         reward: weights by name in place of those in `REWARD`.
-        render_mode: "rgb_array": `render` draws the vehicle's way so far and the pipeline, from above.
+        render_mode: "rgb_array": `render` draws the vehicle's way so far and the pipeline, from
+            above.
 
     Attributes:
-        mode_names: functions with a choice, in the order of an action, and their modes in the order of its values.
+        mode_names: functions with a choice, in the order of an action, and their modes in the order
+            of its values.
 
     Raises:
         InputError: something given cannot be used, or an action is out of range.
@@ -77,18 +89,28 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         if not 0.05 <= period_s < inf:
             raise InputError(f"period_s: {period_s} is out of range", remedy="give 0.05 s or more")
         if not reward.keys() <= REWARD.keys():
-            raise InputError(f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}")
+            raise InputError(
+                f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}"
+            )
         self._weights = REWARD | dict(reward)
-        self._simulator = scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
+        self._simulator = (
+            scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
+        )
         self._period_s, self.render_mode = period_s, render_mode
         loaded, duration_s = self._simulator.loaded, self._simulator.duration_s
         self._limit_s = loaded.scenario.mission.time_limit_s
         has_battery = loaded.scenario.battery is not None
-        self._attributes = (*sorted(loaded.scenario.signals), *((BATTERY_LEVEL,) if has_battery else ()))
+        self._attributes = (
+            *sorted(loaded.scenario.signals),
+            *((BATTERY_LEVEL,) if has_battery else ()),
+        )
         self.mode_names = {
             function: modes
             for function in loaded.modes.functions
-            if (function in MISSION_FUNCTIONS or (function == GENERATE_RECHARGE_PATH and has_battery))
+            if (
+                function in MISSION_FUNCTIONS
+                or (function == GENERATE_RECHARGE_PATH and has_battery)
+            )
             and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
         }
         entries = (
@@ -99,7 +121,9 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             *((function, -1.0, len(modes) - 1.0) for function, modes in self.mode_names.items()),
         )
         self.observation_names, low, high = zip(*entries, strict=True)
-        self.observation_space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
+        self.observation_space = spaces.Box(
+            np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32
+        )
         self.action_space = spaces.MultiDiscrete([len(modes) for modes in self.mode_names.values()])
         self._mission: Mission | None = None
         self._requested: list[int] = []
@@ -119,7 +143,9 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._task_changed(mission)
         return self._observation(mission), {"seed": drawn, **self._info(mission)}
 
-    def step(self, action: Sequence[int] | NDArray[np.int64]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(
+        self, action: Sequence[int] | NDArray[np.int64]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Request the modes of an action, and advance by a period."""
         mission = self._mission
         if mission is None:
@@ -147,10 +173,14 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         """Draw the vehicle's way so far and the pipeline, from above.
 
         Raises:
-            InputError: the environment was made without render_mode="rgb_array", or there is no mission.
+            InputError: the environment was made without render_mode="rgb_array", or there is no
+                mission.
         """
         if self.render_mode is None or self._mission is None:
-            raise InputError("there is nothing to draw", remedy='make it with render_mode="rgb_array", and call reset')
+            raise InputError(
+                "there is nothing to draw",
+                remedy='make it with render_mode="rgb_array", and call reset',
+            )
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
@@ -174,8 +204,12 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _read_modes(self, mission: Mission) -> None:
         """Look up the indices of the modes that were requested last."""
-        requested = [(mission.current_mode(function), modes) for function, modes in self.mode_names.items()]
-        self._mode_indices = [float(modes.index(mode)) if mode in modes else -1.0 for mode, modes in requested]
+        requested = [
+            (mission.current_mode(function), modes) for function, modes in self.mode_names.items()
+        ]
+        self._mode_indices = [
+            float(modes.index(mode)) if mode in modes else -1.0 for mode, modes in requested
+        ]
 
     def _task_changed(self, mission: Mission) -> None:
         self._requested = []  # a task brings modes of its own
@@ -211,7 +245,10 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _info(self, mission: Mission) -> dict[str, Any]:
         """Return mission time and task; at the end the metrics."""
-        now = {"time_s": min(self._time_s, mission.now_s), "task": self._task.name if self._task else ""}
+        now = {
+            "time_s": min(self._time_s, mission.now_s),
+            "task": self._task.name if self._task else "",
+        }
         return now | ({"metrics": mission.metrics()} if mission.is_over else {})
 
 
@@ -237,4 +274,6 @@ def _span(distribution: AnyDistribution) -> tuple[float, float]:
     return low, high
 
 
-gymnasium.register(id="suave_des/PipelineInspection-v0", entry_point=f"{__name__}:PipelineInspection")
+gymnasium.register(
+    id="suave_des/PipelineInspection-v0", entry_point=f"{__name__}:PipelineInspection"
+)

@@ -1,7 +1,8 @@
-"""The mission over HTTP, as UPISAS expects it of an exemplar: monitor, execute, adaptation options and their schemas.
+"""The mission over HTTP, as UPISAS expects it of an exemplar: monitor, execute, adaptation options
+and their schemas.
 
-The standard library's server does: one machine, one client at a time, small bodies; a framework would be one more
-dependency for ten paths.
+The standard library's server does: one machine, one client at a time, small bodies; a framework
+would be one more dependency for ten paths.
 """
 
 from __future__ import annotations
@@ -40,12 +41,18 @@ class Session:
 
     Args:
         run, seed: of the first mission.
-        real_time_factor: seconds of mission time per second; 0: time advances only when a client requests it.
+        real_time_factor: seconds of mission time per second; 0: time advances only when a client
+            requests it.
     """
 
-    def __init__(self, simulator: Simulator, run: int = 1, seed: int = 1, real_time_factor: float = 0.0) -> None:
+    def __init__(
+        self, simulator: Simulator, run: int = 1, seed: int = 1, real_time_factor: float = 0.0
+    ) -> None:
         if not 0.0 <= real_time_factor < inf:
-            raise InputError(f"real-time factor: {real_time_factor:g} is out of range", remedy="0, or a number above")
+            raise InputError(
+                f"real-time factor: {real_time_factor:g} is out of range",
+                remedy="0, or a number above",
+            )
         self._simulator, self._factor = simulator, real_time_factor
         self._run, self._seed = run, seed
         self._lock = threading.Lock()
@@ -100,11 +107,15 @@ class Session:
         return found | dict(zip(pose._fields, pose, strict=True))
 
     def _options(self) -> Json:
-        return {function: list(grounding_modes(modes)) for function, modes in self._mission.modes.items()}
+        return {
+            function: list(grounding_modes(modes))
+            for function, modes in self._mission.modes.items()
+        }
 
     def _execute(self, content: Any) -> Json:
         wanted = _object(content, (*self._mission.modes, _ADVANCE))
-        # UPISAS sends every key of the schema: null leaves things as they are, like a key that is not there.
+        # UPISAS sends every key of the schema: null leaves things as they are, like a key that is
+        # not there.
         wanted = {key: value for key, value in wanted.items() if value is not None}
         step_s = _seconds(wanted.pop(_ADVANCE, 0.0))
         for function, mode in wanted.items():
@@ -133,8 +144,12 @@ class Session:
         return _schema({name: kinds.get(name, number) for name in self._monitor()}, required=True)
 
     def _execute_schema(self) -> Json:
-        modes = {function: {"enum": [*each, None]} for function, each in self._mission.modes.items()}
-        return _schema({**modes, _ADVANCE: {"type": ["number", "null"], "minimum": 0}}, required=False)
+        modes = {
+            function: {"enum": [*each, None]} for function, each in self._mission.modes.items()
+        }
+        return _schema(
+            {**modes, _ADVANCE: {"type": ["number", "null"], "minimum": 0}}, required=False
+        )
 
     def _options_schema(self) -> Json:
         modes = {"type": "array", "items": {"type": "string"}}
@@ -154,15 +169,21 @@ def _schema(properties: Json, *, required: bool) -> Json:
 def _object(content: Any, known: Sequence[str]) -> Json:
     """Return a copy of an object, which may have no other keys than the known ones."""
     if not isinstance(content, dict):
-        raise InputError(f"expected an object, got {shown(content)}", remedy='such as {"advance_s": 2.0}')
+        raise InputError(
+            f"expected an object, got {shown(content)}", remedy='such as {"advance_s": 2.0}'
+        )
     if unknown := [key for key in content if key not in known]:
         raise InputError(f"unknown key {shown(unknown[0])}", remedy=did_you_mean(unknown[0], known))
     return dict(content)
 
 
 def _seconds(value: Any) -> float:
-    if type(value) not in (int, float) or not 0 <= value <= _LONGEST_S:  # true is an int, too, and nan in no range
-        raise InputError(f"{shown(value)} is not a time in seconds", remedy=f"a number from 0 to {_LONGEST_S:g}")
+    if (
+        type(value) not in (int, float) or not 0 <= value <= _LONGEST_S
+    ):  # true is an int, too, and nan in no range
+        raise InputError(
+            f"{shown(value)} is not a time in seconds", remedy=f"a number from 0 to {_LONGEST_S:g}"
+        )
     return float(value)
 
 
@@ -173,8 +194,9 @@ class _RefusedError(Exception):
 class _Handler(BaseHTTPRequestHandler):
     """Reads requests and writes answers; the session interprets them.
 
-    Requests that a web page on another site may have a browser send are refused: a page can neither choose the address
-    in Host, nor hide the one in Origin, nor send JSON without asking this server first.
+    Requests that a web page on another site may have a browser send are refused: a page can neither
+    choose the address in Host, nor hide the one in Origin, nor send JSON without asking this server
+    first.
     """
 
     server: Server
@@ -214,28 +236,40 @@ class _Handler(BaseHTTPRequestHandler):
         with suppress(ValueError):
             is_known = urlsplit(f"//{host}").hostname in known
         if not is_known:
-            raise _RefusedError(HTTPStatus.MISDIRECTED_REQUEST, f"Host {shown(host)} is not this server's address")
+            raise _RefusedError(
+                HTTPStatus.MISDIRECTED_REQUEST, f"Host {shown(host)} is not this server's address"
+            )
         if origin is not None and origin != f"http://{host}":
-            raise _RefusedError(HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server")
+            raise _RefusedError(
+                HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server"
+            )
 
     def _content(self) -> Any:
         length, kind = self.headers.get("Content-Length", "0"), self.headers.get_content_type()
         if not (length.isascii() and length.isdigit()) or self.headers.get("Transfer-Encoding"):
-            raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body's length is not given (send a Content-Length)")
+            raise _RefusedError(
+                HTTPStatus.BAD_REQUEST, "the body's length is not given (send a Content-Length)"
+            )
         if len(length) > _LENGTH_DIGITS or int(length) > BODY_LIMIT_BYTES:
             problem = f"the body has more than {BODY_LIMIT_BYTES:,} bytes"
             raise _RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, problem)
         if kind != _JSON:
-            raise _RefusedError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"the body is {kind} (send Content-Type: {_JSON})")
+            raise _RefusedError(
+                HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+                f"the body is {kind} (send Content-Type: {_JSON})",
+            )
         body = self.rfile.read(int(length))
         try:
             return json.loads(body or b"{}")
         except (ValueError, RecursionError):
-            raise InputError(f"the body is not JSON: {shown(body[:60].decode(errors='replace'))}") from None
+            raise InputError(
+                f"the body is not JSON: {shown(body[:60].decode(errors='replace'))}"
+            ) from None
 
 
 class Server(ThreadingHTTPServer):
-    """Serves a session until it is shut down: at 127.0.0.1 only to this machine, at port 0 on any that is free.
+    """Serves a session until it is shut down: at 127.0.0.1 only to this machine, at port 0 on any
+    that is free.
 
     Raises:
         InputError: the address cannot be used.
@@ -249,7 +283,9 @@ class Server(ThreadingHTTPServer):
             super().__init__((host, port), _Handler)
         except (OSError, OverflowError) as error:
             why = getattr(error, "strerror", None) or error
-            raise InputError(f"{host}:{port} cannot be used: {why}", remedy="give another --host or --port") from None
+            raise InputError(
+                f"{host}:{port} cannot be used: {why}", remedy="give another --host or --port"
+            ) from None
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Let clients leave in the middle of a request or an answer; report anything else."""

@@ -18,8 +18,8 @@ MAX_TICKED: Final = 100_000
 class PyTreesManager(ManagingSubsystem):
     """Base of managers that tick a tree of py_trees; derive from it, and make the tree.
 
-    The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick whose outcome differs from that of
-    the one before is in the timeline of a recorded mission.
+    The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick whose outcome
+    differs from that of the one before is in the timeline of a recorded mission.
 
     Example:
         >>> class Mine(PyTreesManager):
@@ -41,17 +41,22 @@ class PyTreesManager(ManagingSubsystem):
 
     def make_tree(self) -> Behaviour:
         """Make the tree; called once, before the mission."""
-        raise NotImplementedError("derive from PyTreesManager, and return the root of your tree from make_tree")
+        raise NotImplementedError(
+            "derive from PyTreesManager, and return the root of your tree from make_tree"
+        )
 
     def condition(self, name: str, holds: Callable[[], bool]) -> Behaviour:
         """Make a behaviour that succeeds while a condition holds."""
         return _Leaf(name, holds)
 
     def set_mode(self, function: str, mode: str) -> Behaviour:
-        """Make a behaviour that requests a mode and succeeds; it fails while no task needs the function."""
+        """Make a behaviour that requests a mode and succeeds; it fails while no task needs the
+        function.
+        """
         system = self.system
         return _Leaf(
-            f"{function} = {mode}", lambda: function in system.functions and system.change_mode(function, mode)
+            f"{function} = {mode}",
+            lambda: function in system.functions and system.change_mode(function, mode),
         )
 
     def adapt(self) -> None:

@@ -1,17 +1,20 @@
-"""Whether tests are adequate: what they cover of the rules, and whether they notice small mistakes in them.
+"""Whether tests are adequate: what they cover of the rules, and whether they notice small mistakes
+in them.
 
-Coverage is whether each rule fired, each atom held and failed, and how values compared. All of it is asked of Pellet,
-with rules that have the beginning of a rule's body as their body. What no state of the model reaches is told apart, and
-few states that cover the rest are found among the states of the policy.
+Coverage is whether each rule fired, each atom held and failed, and how values compared. All of it
+is asked of Pellet, with rules that have the beginning of a rule's body as their body. What no state
+of the model reaches is told apart, and few states that cover the rest are found among the states of
+the policy.
 
-A mutant is killed when a test fails. One that no test kills is equivalent when nothing that follows, and nothing that
-is decided, differs in any state of the policy: over all regions of measured values, all groundings, and reports of
-components. The others survive, each with a state that tells it apart.
+A mutant is killed when a test fails. One that no test kills is equivalent when nothing that
+follows, and nothing that is decided, differs in any state of the policy: over all regions of
+measured values, all groundings, and reports of components. The others survive, each with a state
+that tells it apart.
 
-Pellet is asked once in each state for all mutants, with a probe for each: where neither the old rule nor the new one
-fires, a mutant changes nothing, as entailment with Horn axioms is monotonic. Where one of them fires, the mutant itself
-is loaded and asked. An ontology with axioms that are not Horn (unions, complements, cardinalities) gets no such
-shortcut.
+Pellet is asked once in each state for all mutants, with a probe for each: where neither the old
+rule nor the new one fires, a mutant changes nothing, as entailment with Horn axioms is monotonic.
+Where one of them fires, the mutant itself is loaded and asked. An ontology with axioms that are not
+Horn (unions, complements, cardinalities) gets no such shortcut.
 """
 
 from __future__ import annotations
@@ -53,9 +56,12 @@ class Goal:
     """Something that a test can cover.
 
     Attributes:
-        atom: number of an atom of its body, in the order in which they are tried; -1 for the rule itself.
-        outcome: "fires", "does not fire", "holds", "fails", or, of a comparison, "less", "equal" or "greater".
-        holds, fails: it is covered where one conjunction of atoms holds, which an empty one always does, and another
+        atom: number of an atom of its body, in the order in which they are tried; -1 for the rule
+            itself.
+        outcome: "fires", "does not fire", "holds", "fails", or, of a comparison, "less", "equal" or
+            "greater".
+        holds, fails: it is covered where one conjunction of atoms holds, which an empty one always
+        does, and another
             one fails; None: no other one.
     """
 
@@ -89,13 +95,17 @@ def _goals(rules: Iterable[Rule]) -> Iterator[Goal]:
                 yield Goal(rule.name, number, FAILS, text, before, (*before, atom))
 
 
-def _covering(knowledge: KnowledgeBase, goals: Sequence[Goal]) -> Callable[[Situation], frozenset[Goal]]:
+def _covering(
+    knowledge: KnowledgeBase, goals: Sequence[Goal]
+) -> Callable[[Situation], frozenset[Goal]]:
     bodies = (body for goal in goals for body in (goal.holds, goal.fails) if body)
     probes = Probes(knowledge.base, knowledge.limit, bodies)
 
     def covered(situation: Situation) -> frozenset[Goal]:
         holding = {(), *(probes.holding(situation) or ())}
-        return frozenset(goal for goal in goals if goal.holds in holding and goal.fails not in holding)
+        return frozenset(
+            goal for goal in goals if goal.holds in holding and goal.fails not in holding
+        )
 
     return covered
 
@@ -105,7 +115,8 @@ class Coverage(NamedTuple):
 
     Attributes:
         covered: number of situations that cover each goal; none if it is missing.
-        missing: goals that no situation covers, but that a state of the model reaches; further ones nothing reaches.
+        missing: goals that no situation covers, but that a state of the model reaches; further ones
+            nothing reaches.
         proposed: states that would cover what is missing, few ones, each with what it would add.
     """
 
@@ -125,14 +136,21 @@ class Coverage(NamedTuple):
         for rule in sorted({goal.rule for goal in self.goals}):
             own = [goal for goal in self.goals if goal.rule == rule]
             covered, missing, no_state = (
-                sum(goal in kind for goal in own) for kind in (self.covered, self.missing, self.unreachable)
+                sum(goal in kind for goal in own)
+                for kind in (self.covered, self.missing, self.unreachable)
             )
-            fired, not_fired = (str(self.covered[Goal(rule, -1, outcome)]) for outcome in (FIRES, FIRES_NOT))
+            fired, not_fired = (
+                str(self.covered[Goal(rule, -1, outcome)]) for outcome in (FIRES, FIRES_NOT)
+            )
             share = f"{covered}/{covered + missing}"
             rows.append((rule, fired, not_fired, share, str(missing or ""), str(no_state or "")))
         covered, reachable = len(self.covered), len(self.covered) + len(self.missing)
-        title = f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
-        return Table(("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll")
+        title = (
+            f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
+        )
+        return Table(
+            ("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll"
+        )
 
     def lines(self) -> Iterator[str]:
         """What is missing, and states that would cover it."""
@@ -147,8 +165,11 @@ class Coverage(NamedTuple):
                 yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
 
 
-def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], max_failed: int) -> Coverage:
-    """Measure what the situations of tests cover; in states that are proposed at most `max_failed` components report.
+def measure_coverage(
+    knowledge: KnowledgeBase, situations: Iterable[Situation], max_failed: int
+) -> Coverage:
+    """Measure what the situations of tests cover; in states that are proposed at most `max_failed`
+    components report.
 
     Raises:
         InputError: there would be too many states.
@@ -176,14 +197,33 @@ def measure_coverage(knowledge: KnowledgeBase, situations: Iterable[Situation], 
 # Mutants.
 
 _NOT_HORN: Final = (
-    *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),
-    *("cardinality", "qualifiedCardinality", "minQualifiedCardinality", "minCardinality", "allValuesFrom"),
+    *(
+        "unionOf",
+        "complementOf",
+        "oneOf",
+        "disjointUnionOf",
+        "maxCardinality",
+        "maxQualifiedCardinality",
+    ),
+    *(
+        "cardinality",
+        "qualifiedCardinality",
+        "minQualifiedCardinality",
+        "minCardinality",
+        "allValuesFrom",
+    ),
 )
 #: By how much thresholds are moved, up and down.
 _MOVED: Final = (Decimal("1.1"), Decimal("0.9"))
 #: Kinds of changes.
 OPERATORS: Final = (
-    *("comparison turned", "comparison shifted", "atom dropped", "variable exchanged", "conclusion changed"),
+    *(
+        "comparison turned",
+        "comparison shifted",
+        "atom dropped",
+        "variable exchanged",
+        "conclusion changed",
+    ),
     *("rule removed", "threshold moved", "status exchanged", "individual exchanged"),
 )
 _T = TypeVar("_T")
@@ -218,8 +258,15 @@ class Mutant:
         if self.new is None:
             return "the rule is removed"
         before, after = (list(map(write_atom, rule.atoms)) for rule in (self.old, self.new))
-        at = next((n for n, (one, other) in enumerate(zip(before, after, strict=False)) if one != other), -1)
-        return f"{before[at]} becomes {after[at]}" if len(before) == len(after) else f"{before[at]} is left out"
+        at = next(
+            (n for n, (one, other) in enumerate(zip(before, after, strict=False)) if one != other),
+            -1,
+        )
+        return (
+            f"{before[at]} becomes {after[at]}"
+            if len(before) == len(after)
+            else f"{before[at]} is left out"
+        )
 
     def __str__(self) -> str:
         return f"{self.name}: {self.operator}: {self.text}"
@@ -231,7 +278,9 @@ class Mutant:
 
 
 def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
-    """All mutants of the enabled rules, by rule and operator; those that no reasoner could use are left out."""
+    """All mutants of the enabled rules, by rule and operator; those that no reasoner could use are
+    left out.
+    """
     found = [Mutant("rule removed", rule, None) for rule in base.content.enabled_rules]
     for operator, rule, number, atom in _changes(base):
         body, head = list(rule.body), list(rule.head)
@@ -258,7 +307,9 @@ def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
     literals: dict[str, set[Lit]] = {}
     for atom in (atom for rule in rules for atom in rule.atoms if atom.kind == "data"):
         known = literals.setdefault(atom.predicate, set())
-        known |= {term for term in atom.arguments if isinstance(term, Lit) and term.datatype not in EXACT}
+        known |= {
+            term for term in atom.arguments if isinstance(term, Lit) and term.datatype not in EXACT
+        }
     for rule in rules:
         is_value: dict[Term, bool] = {}
         for atom in rule.atoms:
@@ -275,21 +326,31 @@ def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
             for place, term in enumerate(atom.arguments):
                 operator = ""
                 others: Sequence[Term] = ()
-                if isinstance(term, Variable) and in_body:  # the next one of the rule that stands for the same kind
+                if (
+                    isinstance(term, Variable) and in_body
+                ):  # the next one of the rule that stands for the same kind
                     operator = "variable exchanged"
-                    others = [_next(term, [each for each in is_value if is_value[each] == is_value[term]])]
+                    others = [
+                        _next(term, [each for each in is_value if is_value[each] == is_value[term]])
+                    ]
                 elif isinstance(term, Named):  # the next one of its class
                     operator = "individual exchanged"
-                    groups = (each for each in classes.values() if term.iri in each and len(each) > 1)
+                    groups = (
+                        each for each in classes.values() if term.iri in each and len(each) > 1
+                    )
                     others = [Named(_next(term.iri, group)) for group in groups][:1]
                 elif isinstance(term, Lit) and term.datatype in EXACT:
                     operator, others = "threshold moved", list(_tenths(term))
-                elif isinstance(term, Lit) and atom.kind == "data":  # others that rules mention of the same property
+                elif (
+                    isinstance(term, Lit) and atom.kind == "data"
+                ):  # others that rules mention of the same property
                     operator = "status exchanged" if in_body else "conclusion changed"
                     known = literals[atom.predicate]
                     others = [each for each in sorted(known) if each.datatype == term.datatype]
                     if term.datatype == XSD + "boolean":
-                        others = [Lit("false" if term.text in ("true", "1") else "true", term.datatype)]
+                        others = [
+                            Lit("false" if term.text in ("true", "1") else "true", term.datatype)
+                        ]
                 for other in others:
                     arguments = (*atom.arguments[:place], other, *atom.arguments[place + 1 :])
                     yield operator, rule, number, replace(atom, arguments=arguments)
@@ -316,15 +377,23 @@ def _tenths(value: Lit) -> Iterator[Lit]:
 
 
 def sample(mutants: Sequence[Mutant], most: int | None) -> tuple[Mutant, ...]:
-    """Take at most so many mutants, spread evenly over rules and operators; the same ones each time."""
+    """Take at most so many mutants, spread evenly over rules and operators; the same ones each
+    time.
+    """
     if most is None or most >= len(mutants):
         return tuple(mutants)
     return tuple(mutants[number * len(mutants) // most] for number in range(most))
 
 
 def is_horn(base: Ontology) -> bool:
-    """Whether no axiom leaves a choice, so that what follows is what the rules and axioms build up step by step."""
-    datatypes = {line.split(" ", 1)[0] for line in base.content.structure if f"<{RDF_TYPE}> <{RDFS}Datatype>" in line}
+    """Whether no axiom leaves a choice, so that what follows is what the rules and axioms build up
+    step by step.
+    """
+    datatypes = {
+        line.split(" ", 1)[0]
+        for line in base.content.structure
+        if f"<{RDF_TYPE}> <{RDFS}Datatype>" in line
+    }
     return not any(
         f"<{OWL}{name}>" in line and line.split(" ", 1)[0] not in datatypes
         for line in base.content.structure
@@ -359,7 +428,9 @@ class _Mutants:
     def __init__(self, knowledge: KnowledgeBase, mutants: Sequence[Mutant]) -> None:
         bodies = dict.fromkeys(body for mutant in mutants for body in mutant.bodies if body)
         is_sure = is_horn(knowledge.base)
-        holding = Probes(knowledge.base, knowledge.limit, bodies).holding if is_sure else lambda _: None
+        holding = (
+            Probes(knowledge.base, knowledge.limit, bodies).holding if is_sure else lambda _: None
+        )
         self.knowledge = knowledge
         self.unchanged, self._holding = cache(knowledge.outcome), cache(holding)
 
@@ -371,7 +442,9 @@ class _Mutants:
     def deciding(self, mutant: Mutant) -> Decide:
         """What follows and is decided with a change, which is loaded where it is first needed."""
         load = cache(lambda: self.knowledge.changed(mutant.applied(self.knowledge.base)))
-        return lambda situation: (load().outcome if self.touches(mutant, situation) else self.unchanged)(situation)
+        return lambda situation: (
+            load().outcome if self.touches(mutant, situation) else self.unchanged
+        )(situation)
 
     def killer(self, mutant: Mutant, tests: Iterable[RuleTest]) -> str | None:
         """The test that fails, or why the mutant cannot be used; None if all pass."""
@@ -400,14 +473,18 @@ def mutate(
         on_result: called after each mutant.
 
     Returns:
-        what became of each mutant, and the number of kinds of states in which those left by tests were compared.
+        what became of each mutant, and the number of kinds of states in which those left by tests
+        were compared.
 
     Raises:
         InputError: there would be too many states.
         KnowledgeError: the reasoner takes too long.
     """
     results: dict[Mutant, MutantResult] = {}
-    in_order, every = sorted(tests, key=lambda test: len(test.situations)), _Mutants(knowledge, mutants)
+    in_order, every = (
+        sorted(tests, key=lambda test: len(test.situations)),
+        _Mutants(knowledge, mutants),
+    )
     for mutant in mutants:
         if (killer := every.killer(mutant, in_order)) is not None:
             results[mutant] = MutantResult(mutant, KILLED, killer)
@@ -430,8 +507,12 @@ def mutate(
             results[mutant] = MutantResult(mutant, EQUIVALENT, reason)
         else:
             situation, before, after = found
-            words = ", in a state of a test that does not expect it" if situation in of_tests else ""
-            results[mutant] = MutantResult(mutant, SURVIVED, difference(before, after) + words, situation.state)
+            words = (
+                ", in a state of a test that does not expect it" if situation in of_tests else ""
+            )
+            results[mutant] = MutantResult(
+                mutant, SURVIVED, difference(before, after) + words, situation.state
+            )
         on_result()
     return [results[mutant] for mutant in mutants], len(states)
 
@@ -445,7 +526,9 @@ def mutation_table(results: Sequence[MutantResult]) -> Table:
     title = f"mutation: {killed} of {killed + survived} mutants killed, {share:.0%}; {equivalent} equivalent"
     operators = dict.fromkeys(each.mutant.operator for each in results)
     return Table(
-        ("operator", *kinds), [(name, *(str(counts[name, kind]) for kind in kinds)) for name in operators], title
+        ("operator", *kinds),
+        [(name, *(str(counts[name, kind]) for kind in kinds)) for name in operators],
+        title,
     )
 
 

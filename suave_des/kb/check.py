@@ -1,4 +1,6 @@
-"""Check a knowledge base before anything runs: rules, names, model, shapes (SHACL), and what Pellet reports."""
+"""Check a knowledge base before anything runs: rules, names, model, shapes (SHACL), and what Pellet
+reports.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,13 @@ from suave_des.caches import SharedEntries, private_cache
 from suave_des.errors import Finding, InputError, KnowledgeError, Level, has_level, ordered
 from suave_des.kb.space import PolicySpace
 from suave_des.kb.states import ManagingSettings
-from suave_des.knowledge.checks import Subject, check_revision, findings_in, rules_of_2023, static_findings
+from suave_des.knowledge.checks import (
+    Subject,
+    check_revision,
+    findings_in,
+    rules_of_2023,
+    static_findings,
+)
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, place_of
 from suave_des.knowledge.pellet import TimeLimit
@@ -36,7 +44,8 @@ _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info:
 def check(subject: Subject) -> tuple[Finding, ...]:
     """Check a knowledge base.
 
-    Pellet is asked at the end, even after an ERROR, unless it prevents the knowledge base from being loaded.
+    Pellet is asked at the end, even after an ERROR, unless it prevents the knowledge base from
+    being loaded.
 
     Returns:
         all findings, the worst first.
@@ -69,27 +78,39 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
     except KnowledgeError:  # it is among the findings, and contradictions follow from it
         return
     for reason in regions_of(base).reasons:
-        yield Finding(Level.NOTE, f"inferences are cached for equal measured values only, which is slower: {reason}")
+        yield Finding(
+            Level.NOTE,
+            f"inferences are cached for equal measured values only, which is slower: {reason}",
+        )
     try:
-        # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
+        # What is in its cache has been asked with this very knowledge base, without a contradiction
+        # or a dropped rule.
         pellet = Reasoner(base, "cached", TimeLimit(subject.time_limit_s, "--time-limit"))
         for state in [KnowledgeState(), *islice(states_to_ask(base, subject.measured), MAX_STATES)]:
             pellet.analyze(state)
     except InputError as error:
         found, left_out = Finding.of(error), "contradictions were not checked with Pellet"
         if found.rule in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
-            found = Finding(Level.NOTE, f"{left_out}: it does not use rule {found.rule} until it is corrected")
+            found = Finding(
+                Level.NOTE, f"{left_out}: it does not use rule {found.rule} until it is corrected"
+            )
         yield found
 
 
-def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:
-    """States in which contradictions are looked for: all designs, reports, and ranges of measured values occur in one.
+def states_to_ask(
+    base: Ontology, measured: Collection[str] | None = None
+) -> Iterator[KnowledgeState]:
+    """States in which contradictions are looked for: all designs, reports, and ranges of measured
+    values occur in one.
 
-    Pellet's reasoning is monotonic, so a contradiction occurs in every state that contains it. Only attributes that
-    have an effect and, if those are given, are measured count, and one component of those that are treated alike. With
-    the rules of 2023, which contradict any other problem once a component recovered, that is in states of its own.
+    Pellet's reasoning is monotonic, so a contradiction occurs in every state that contains it. Only
+    attributes that have an effect and, if those are given, are measured count, and one component of
+    those that are treated alike. With the rules of 2023, which contradict any other problem once a
+    component recovered, that is in states of its own.
     """
-    settings = ManagingSettings(measured=tuple(base.model.attributes if measured is None else measured))
+    settings = ManagingSettings(
+        measured=tuple(base.model.attributes if measured is None else measured)
+    )
     space, apart = PolicySpace.of(base, settings), RECOVERED if rules_of_2023(base) else None
     designs = {function: found for function in base.functions if (found := base.designs(function))}
     for number in range(max(map(len, designs.values()), default=0)):
@@ -106,9 +127,13 @@ def states_to_ask(base: Ontology, measured: Collection[str] | None = None) -> It
 
 
 def check_shapes(sources: Sequence[OntologyFile]) -> list[Finding]:
-    """Check the model of ontologies against SHACL shapes; the same files are checked once, then cached."""
+    """Check the model of ontologies against SHACL shapes; the same files are checked once, then
+    cached.
+    """
     shapes = (shipped_folder("ontology") / "tomasys-shapes.ttl").read_bytes()
-    total = hashlib.sha256(f"{version('pyshacl')}{Path(__file__).read_bytes()!r}{shapes!r}".encode())
+    total = hashlib.sha256(
+        f"{version('pyshacl')}{Path(__file__).read_bytes()!r}{shapes!r}".encode()
+    )
     for source in sources:
         total.update(str(source.path).encode() + hashlib.sha256(source.content).digest())
     kept = SharedEntries(private_cache("findings"), total.hexdigest())
@@ -126,23 +151,34 @@ def _validate(sources: Sequence[OntologyFile], shapes: Graph) -> Iterator[Findin
     for triple in chain.from_iterable(source.graph for source in sources):
         if str(triple[2]) != "NaN":  # which compares with nothing; another finding tells it
             data.add(triple)
-    _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
+    _, report, _ = validate(
+        data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False
+    )
     assert isinstance(report, Graph)
     for result in report.subjects(_SH.resultSeverity, None):
-        # A query (SPARQL) is about the value that it gives, other constraints are about their focus.
-        is_query = report.value(result, _SH.sourceConstraintComponent) == _SH.SPARQLConstraintComponent
-        thing = (report.value(result, _SH.value) if is_query else None) or report.value(result, _SH.focusNode)
+        # A query (SPARQL) is about the value that it gives, other constraints are about their
+        # focus.
+        is_query = (
+            report.value(result, _SH.sourceConstraintComponent) == _SH.SPARQLConstraintComponent
+        )
+        thing = (report.value(result, _SH.value) if is_query else None) or report.value(
+            result, _SH.focusNode
+        )
         if is_query or not _is_placeholder(thing, data):
             yield _finding(report, result, thing, sources)
 
 
 def _is_placeholder(node: Node | None, data: Graph) -> bool:
-    """Whether an individual has nothing but a class, and nothing refers to it, so that it has no effect."""
+    """Whether an individual has nothing but a class, and nothing refers to it, so that it has no
+    effect.
+    """
     is_mentioned = any(predicate != RDF.type for predicate in data.predicates(node, None))
     return isinstance(node, URIRef) and not is_mentioned and (None, None, node) not in data
 
 
-def _finding(report: Graph, result: Node, thing: Node | None, sources: Sequence[OntologyFile]) -> Finding:
+def _finding(
+    report: Graph, result: Node, thing: Node | None, sources: Sequence[OntologyFile]
+) -> Finding:
     name, path = local_name(str(thing)), report.value(result, _SH.resultPath)
     level = _LEVELS.get(URIRef(str(report.value(result, _SH.resultSeverity))), Level.ERROR)
     words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or ""))

@@ -1,4 +1,5 @@
-"""Compare two knowledge bases: their axioms and rules as text, what they decide in every state, and the same missions.
+"""Compare two knowledge bases: their axioms and rules as text, what they decide in every state, and
+the same missions.
 
 Campaigns and statistics are imported when missions are compared: a knowledge base needs neither.
 """
@@ -20,7 +21,16 @@ from suave_des.kb.matching import Probes
 from suave_des.kb.space import Decide, PolicySpace, Situation, States, add_decisions, compare
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
-from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
+from suave_des.knowledge.rdf import (
+    RDF_TYPE,
+    SWRL,
+    Lit,
+    Triple,
+    fact_of,
+    is_fact,
+    local_name,
+    term_of,
+)
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.rules import write_term
 from suave_des.knowledge.state import KnowledgeState
@@ -102,11 +112,13 @@ class PolicyDifference:
 
     Attributes:
         compared: number of states that both have.
-        cells: a row for each kind of state that is decided differently: the columns of a policy's cases that tell it
-            from others; `statuses` and what happens, `_then`, of both, with `_a` and `_b` at the end; one such `state`.
+        cells: a row for each kind of state that is decided differently: the columns of a policy's
+            cases that tell it from others; `statuses` and what happens, `_then`, of both, with `_a`
+            and `_b` at the end; one such `state`.
         reported: number of states in which they decide alike, but infer different statuses.
         functions: that have an objective.
-        no_proof: why rules may do more than compare; if there are any reasons, the ranges are samples only.
+        no_proof: why rules may do more than compare; if there are any reasons, the ranges are
+            samples only.
     """
 
     compared: int
@@ -126,7 +138,9 @@ class PolicyDifference:
         yield f"{self.states} of {self.compared} states {'is' if self.states == 1 else 'are'} decided differently"
         if self.reported:
             yield f"{self.reported} more have other statuses, but the same decisions"
-        yield from (f"{reason}: each range was tried with one value only" for reason in self.no_proof)
+        yield from (
+            f"{reason}: each range was tried with one value only" for reason in self.no_proof
+        )
         groups: dict[str, list[int]] = {}
         for number, case in enumerate(self.cells.to_dict("records")):
             for name in self.functions:
@@ -143,16 +157,25 @@ class PolicyDifference:
     def _ranges(self, cells: pandas.DataFrame) -> Iterator[str]:
         """The ranges of measured values, neighbours joined, and the number of states in each."""
         names, scale = list(self.space.attributes), self.space.scale
-        boxes = Counter[tuple[tuple[int, int], ...]]()  # number of states by first and last place of each attribute
+        boxes = Counter[
+            tuple[tuple[int, int], ...]
+        ]()  # number of states by first and last place of each attribute
         for *places, number in cells[[*names, "states"]].itertuples(index=False):
             boxes[tuple((place, place) for place in places)] += number
         for at in reversed(range(len(names))):
-            joined: dict[Any, tuple[int, int]] = {}  # first place and number of states by all other ends
+            joined: dict[
+                Any, tuple[int, int]
+            ] = {}  # first place and number of states by all other ends
             for box, number in sorted(boxes.items(), key=lambda each: each[0][at]):
                 first, last = box[at]
                 first, before = joined.pop((box[:at], first - 1, box[at + 1 :]), (first, 0))
                 joined[box[:at], last, box[at + 1 :]] = first, before + number
-            boxes = Counter({(*a, (first, last), *b): number for (a, last, b), (first, number) in joined.items()})
+            boxes = Counter(
+                {
+                    (*a, (first, last), *b): number
+                    for (a, last, b), (first, number) in joined.items()
+                }
+            )
         for box, number in sorted(boxes.items()):
             words = [
                 f"{name} {scale.text(*span)}" if len(names) > 1 else scale.text(*span)
@@ -162,11 +185,16 @@ class PolicyDifference:
             yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(number, 'state')}"
 
 
-def compare_decisions(states: States, one: Decide, other: Decide, no_proof: tuple[str, ...]) -> PolicyDifference:
+def compare_decisions(
+    states: States, one: Decide, other: Decide, no_proof: tuple[str, ...]
+) -> PolicyDifference:
     """Compare what two knowledge bases decide in all of some states; see PolicyDifference."""
     decided, reported = [], 0
     for situation, before, after in compare(one, other, map(Situation, states)):
-        if any(before.choice(each.function) != after.choice(each.function) for each in situation.state.objectives):
+        if any(
+            before.choice(each.function) != after.choice(each.function)
+            for each in situation.state.objectives
+        ):
             decided.append((situation.state, before, after))
         elif before.statuses != after.statuses:
             reported += states.reports[situation.state.components]
@@ -184,9 +212,9 @@ class MissionDifference(NamedTuple):
 
     Attributes:
         changed: run numbers of the missions in which any column of runs.csv differs.
-        metrics: search time, distance, and what else differs: each with its values with one (`a`) and with the other
-            (`b`), by run, where both are known; the mean of b - a, run by run, with its 95% interval (Student's t); and
-            the number of missions in which it differs.
+        metrics: search time, distance, and what else differs: each with its values with one (`a`)
+            and with the other (`b`), by run, where both are known; the mean of b - a, run by run,
+            with its 95% interval (Student's t); and the number of missions in which it differs.
     """
 
     missions: int
@@ -201,7 +229,9 @@ class MissionDifference(NamedTuple):
         ]
         for metric, pairs, found, changed in self.metrics:
             values = [*(f"{each:.2f}" for each in pairs.mean()), f"{found.value:+.2f}"]
-            rows.append((metric.brief, *values, found.text("+.2f"), f"{changed} of {self.missions}"))
+            rows.append(
+                (metric.brief, *values, found.text("+.2f"), f"{changed} of {self.missions}")
+            )
         return Table(("", "A", "B", "B - A", "95% interval", "different"), rows)
 
     def lines(self) -> Iterator[str]:
@@ -235,7 +265,9 @@ def compare_missions(
 
     frames = []
     for replacements in (one, other):
-        result = run_campaign(scenario, [_MANAGER], runs, seed, workers, on_progress=on_progress, **replacements)
+        result = run_campaign(
+            scenario, [_MANAGER], runs, seed, workers, on_progress=on_progress, **replacements
+        )
         frames.append(result.frame().set_index("run"))
     before, after = frames
     common = before.index.intersection(after.index)
@@ -248,7 +280,8 @@ def compare_missions(
 def firing_states(
     scenario: str, runs: int, one: Replacements, other: Replacements, *, seed: int, limit: TimeLimit
 ) -> tuple[int, int]:
-    """Count the states of missions with one knowledge base in which a rule fires that only one of the two has.
+    """Count the states of missions with one knowledge base in which a rule fires that only one of
+    the two has.
 
     Returns:
         how many states, and of how many.
@@ -258,7 +291,9 @@ def firing_states(
     loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
     bases = list(map(open_base, loaded))
     rules = [{rule.text: rule.body for rule in base.content.enabled_rules} for base in bases]
-    probes = Probes(bases[1], limit, [(rules[0] | rules[1])[text] for text in rules[0].keys() ^ rules[1].keys()])
+    probes = Probes(
+        bases[1], limit, [(rules[0] | rules[1])[text] for text in rules[0].keys() ^ rules[1].keys()]
+    )
     regions = regions_of(bases[1])
     missions = (run_mission(loaded[0], _MANAGER, run, seed) for run in range(1, runs + 1))
     states = Counter[Hashable]()
@@ -280,9 +315,13 @@ def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifferen
     differs = before.ne(after) & ~(before.isna() & after.isna())
     others = [str(name) for name in before.select_dtypes("number") if differs[name].any()]
     metrics = []
-    for name in dict.fromkeys((*METRICS, *(each for each in others if not each.startswith(_PLACES)))):
+    for name in dict.fromkeys(
+        (*METRICS, *(each for each in others if not each.startswith(_PLACES)))
+    ):
         pairs = pandas.DataFrame({"a": before[name], "b": after[name]}, dtype=float).dropna()
         metric = metric_of(name) or Metric(name, name.replace("_", " "))
         found = mean_interval((pairs["b"] - pairs["a"]).to_numpy())
         metrics.append((metric, pairs, found, int(differs[name].sum())))
-    return MissionDifference(len(before), tuple(int(run) for run in before.index[differs.any(axis=1)]), tuple(metrics))
+    return MissionDifference(
+        len(before), tuple(int(run) for run in before.index[differs.any(axis=1)]), tuple(metrics)
+    )

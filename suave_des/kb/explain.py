@@ -1,12 +1,13 @@
 """Explain why a fact follows, why a rule does not fire, and why a function design is chosen or not.
 
-All facts in a derivation are Pellet's, and so is what its built-ins say of their values. Where a fact follows in
-several ways, the first one is shown, by the rule's name and then by the bindings. Pellet's own tracing picks another
-one each time, and is asked only where neither a rule nor a single fact suffices.
+All facts in a derivation are Pellet's, and so is what its built-ins say of their values. Where a
+fact follows in several ways, the first one is shown, by the rule's name and then by the bindings.
+Pellet's own tracing picks another one each time, and is asked only where neither a rule nor a
+single fact suffices.
 
-Of a rule that does not fire, what makes it useless in every state comes first: it is switched off, or is dropped by
-Pellet. Else the answer is the first atom that fails, for the binding that comes nearest, with the value found and the
-value needed.
+Of a rule that does not fire, what makes it useless in every state comes first: it is switched off,
+or is dropped by Pellet. Else the answer is the first atom that fails, for the binding that comes
+nearest, with the value found and the value needed.
 """
 
 from __future__ import annotations
@@ -24,10 +25,24 @@ from suave_des.kb.matching import FACT_KINDS, Binding, Bound, Facts, bound, with
 from suave_des.kb.states import FactReader
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology
-from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed, one_at_a_time, trace_contradiction
+from suave_des.knowledge.pellet.in_process import (
+    InProcessPellet,
+    entailed,
+    one_at_a_time,
+    trace_contradiction,
+)
 from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.reasoner import performance
-from suave_des.knowledge.rules import COMPARISONS, IDENTITIES, Atom, AtomKind, Rule, Variable, write_atom, write_term
+from suave_des.knowledge.rules import (
+    COMPARISONS,
+    IDENTITIES,
+    Atom,
+    AtomKind,
+    Rule,
+    Variable,
+    write_atom,
+    write_term,
+)
 from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import (
     ContradictionError,
@@ -47,7 +62,8 @@ class Derivation:
     """How a fact follows.
 
     Attributes:
-        source: "state" or "ontology" where it is asserted, "rule", or "axioms" where it follows from the schema.
+        source: "state" or "ontology" where it is asserted, "rule", or "axioms" where it follows
+            from the schema.
         bindings: value of each of the rule's variables, by variable.
         axioms: the axioms of the schema that were used.
         premises: the facts of the rule's body, instantiated.
@@ -67,7 +83,9 @@ class Derivation:
         """The fact and how it follows, and below it, indented, the facts that it follows from."""
         how = {
             "rule": f"by rule {self.rule}{with_bindings(self.bindings)}",
-            "axioms": f"by the schema: {'; '.join(self.axioms)}" if self.axioms else "by the schema",
+            "axioms": f"by the schema: {'; '.join(self.axioms)}"
+            if self.axioms
+            else "by the schema",
             "state": "given in the state",
             "ontology": "asserted in the ontology",
         }[self.source]
@@ -108,13 +126,23 @@ class Tracer:
             KnowledgeError: the state contradicts itself.
         """
         given = self.base.assertions(self.state)
-        asks = any(atom.predicate in IDENTITIES for rule in self.base.content.enabled_rules for atom in rule.atoms)
-        return self.pellet.infer(given).union(self.asserted, self.pellet.identities(given) if asks else ())
+        asks = any(
+            atom.predicate in IDENTITIES
+            for rule in self.base.content.enabled_rules
+            for atom in rule.atoms
+        )
+        return self.pellet.infer(given).union(
+            self.asserted, self.pellet.identities(given) if asks else ()
+        )
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
         """All that follows and that rules mention, in canonical form and in a fixed order."""
-        return tuple(sorted({canonical_triple(triple) for triple in self.entailed if _is_told(triple)}, key=str))
+        return tuple(
+            sorted(
+                {canonical_triple(triple) for triple in self.entailed if _is_told(triple)}, key=str
+            )
+        )
 
     @cached_property
     def _facts(self) -> Facts:
@@ -130,7 +158,9 @@ class Tracer:
     def _schema(self) -> Content:
         """The ontologies without facts about individuals; all rules keep their numbers."""
         content = self.base.content
-        return replace(content, triples=tuple(each for each in content.triples if not rdf.is_fact(each)))
+        return replace(
+            content, triples=tuple(each for each in content.triples if not rdf.is_fact(each))
+        )
 
     def derive(self, triple: Triple) -> Derivation:
         """Derive a triple that is entailed."""
@@ -142,20 +172,30 @@ class Tracer:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
         with one_at_a_time:
             for binding in matching.matches(rule, self._facts):
-                concluded = [triple for atom in rule.head if (triple := matching.stated(atom, binding)) is not None]
+                concluded = [
+                    triple
+                    for atom in rule.head
+                    if (triple := matching.stated(atom, binding)) is not None
+                ]
                 # What is the same, Pellet knows.
                 if all(canonical_triple(triple) in self._facts for triple in concluded):
                     facts = tuple(map(self._fact, sorted(concluded, key=str)))
                     yield matching.shown_bindings(binding, self.base.names), facts
 
     def _derive(self, triple: Triple, above: frozenset[Triple]) -> Derivation | None:
-        """The first tree for a triple that does not depend on itself or on what is above it; None if there is none."""
+        """The first tree for a triple that does not depend on itself or on what is above it; None
+        if there is none.
+        """
         if triple in self._leaves:
             is_of_state = self._leaves[triple] in self.base.assertions(self.state)
-            return Derivation(self._fact(self._leaves[triple]), "state" if is_of_state else "ontology")
+            return Derivation(
+                self._fact(self._leaves[triple]), "state" if is_of_state else "ontology"
+            )
         if triple not in self._found:
             inside = above | {triple}
-            derivation = next(self._by_rules(triple, inside), None) or next(self._by_schema(triple, inside), None)
+            derivation = next(self._by_rules(triple, inside), None) or next(
+                self._by_schema(triple, inside), None
+            )
             if derivation is None:
                 return None
             self._found[triple] = derivation
@@ -163,16 +203,28 @@ class Tracer:
 
     def _by_rules(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         for rule in self.base.content.enabled_rules:
-            starts = (matching.matched(atom, each, {}) for atom in rule.head for each in _both_ways(triple))
+            starts = (
+                matching.matched(atom, each, {})
+                for atom in rule.head
+                for each in _both_ways(triple)
+            )
             for start in (each for each in starts if each is not None):
                 for binding in matching.matches(rule, self._facts, start):
                     said = (matching.stated(atom, binding) for atom in rule.body)
-                    body = dict.fromkeys(canonical_triple(each) for each in said if each is not None)
+                    body = dict.fromkeys(
+                        canonical_triple(each) for each in said if each is not None
+                    )
                     if above.isdisjoint(body):
-                        premises = tuple(found for each in body if (found := self._derive(each, above)) is not None)
+                        premises = tuple(
+                            found
+                            for each in body
+                            if (found := self._derive(each, above)) is not None
+                        )
                         if len(premises) == len(body):
                             bindings = matching.shown_bindings(binding, self.base.names)
-                            yield Derivation(self._fact(triple), "rule", rule.name, bindings, premises=premises)
+                            yield Derivation(
+                                self._fact(triple), "rule", rule.name, bindings, premises=premises
+                            )
 
     def _by_all(self, triple: Triple) -> Derivation:
         """The axioms that Pellet says that a triple follows from, without the steps between."""
@@ -180,11 +232,19 @@ class Tracer:
         return Derivation(self._fact(triple), "axioms", axioms=axioms)
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
-        """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
+        """What follows from one other fact about the same thing: a class by a domain, an inverse, a
+        sub-property.
+        """
         if triple[1] in IDENTITIES:  # they follow from all that is asserted
             yield self._by_all(triple)
             return
-        kind: AtomKind = "class" if triple[1] == rdf.RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
+        kind: AtomKind = (
+            "class"
+            if triple[1] == rdf.RDF_TYPE
+            else "data"
+            if isinstance(triple[2], Lit)
+            else "object"
+        )
         asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
         for other in self.known:
             about_same = {triple[0], triple[2]} & {other[0], other[2]}
@@ -192,25 +252,41 @@ class Tracer:
                 premise = self._derive(other, above)
                 if premise is not None:
                     axioms = self._axioms(triple, [other])
-                    yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
+                    yield Derivation(
+                        self._fact(triple), "axioms", premises=(premise,), axioms=axioms
+                    )
 
     def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
-        """What Pellet says of the property or class of an atom, from a fact and the schema alone."""
+        """What Pellet says of the property or class of an atom, from a fact and the schema
+        alone.
+        """
         key = fact, asked
         if key not in self._steps:
-            self._steps[key] = frozenset(map(canonical_triple, entailed(self._text([fact], ()), [asked])))
+            self._steps[key] = frozenset(
+                map(canonical_triple, entailed(self._text([fact], ()), [asked]))
+            )
         return self._steps[key]
 
     def _text(self, facts: Iterable[Triple], rules: Sequence[Rule]) -> str:
         content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
         return content.n_triples(rules)
 
-    def _axioms(self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()) -> tuple[str, ...]:
-        """The axioms of the schema by which a triple follows from facts: domains, subclasses and the like."""
+    def _axioms(
+        self, triple: Triple, facts: Iterable[Triple], rules: Sequence[Rule] = ()
+    ) -> tuple[str, ...]:
+        """The axioms of the schema by which a triple follows from facts: domains, subclasses and
+        the like.
+        """
         _, used = trace_contradiction(self._text(facts, rules) + _denial(triple))
         denied = f"({triple[0]},{triple[2]})"  # what is the same or different, by _denial
-        schema = (each for each in used if not each.startswith(("rule(", "prop(", "type(")) and denied not in each)
-        return tuple(_IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema)
+        schema = (
+            each
+            for each in used
+            if not each.startswith(("rule(", "prop(", "type(")) and denied not in each
+        )
+        return tuple(
+            _IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema
+        )
 
     def _fact(self, triple: Triple) -> Fact:
         return rdf.fact_of(triple, self.base.names)
@@ -236,7 +312,9 @@ def _denial(triple: Triple) -> str:
     """Say in OWL that a triple does not hold, as N-Triples."""
     subject, predicate, value = triple
     if predicate in IDENTITIES:
-        return rdf.n_triple((subject, next(each for each in IDENTITIES if each != predicate), value))
+        return rdf.n_triple(
+            (subject, next(each for each in IDENTITIES if each != predicate), value)
+        )
     denied, restriction = "urn:denied", "urn:restriction"
     triples: list[Triple] = [
         (denied, rdf.OWL + "complementOf", value if predicate == rdf.RDF_TYPE else restriction),
@@ -269,9 +347,9 @@ _GIVEN_BY_STATES: Final[Mapping[str, str]] = {
     rdf.TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
 }
 #: All that states assert.
-_IN_STATES: Final = rdf.terms(rdf.TOMASYS, "QAvalue hasValue isQAtype typeF o_status o_always_improve").union(
-    _GIVEN_BY_STATES
-)
+_IN_STATES: Final = rdf.terms(
+    rdf.TOMASYS, "QAvalue hasValue isQAtype typeF o_status o_always_improve"
+).union(_GIVEN_BY_STATES)
 
 
 class WhyNot(NamedTuple):
@@ -317,8 +395,12 @@ class RuleQuestions:
             raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, known))
         return next((each for each in answers if each.fires), answers[0])
 
-    def of(self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})) -> WhyNot:
-        """Say why a rule, which may share its name, does not fire where variables stand for what `start` says."""
+    def of(
+        self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})
+    ) -> WhyNot:
+        """Say why a rule, which may share its name, does not fire where variables stand for what
+        `start` says.
+        """
         if not rule.enabled:
             answer = f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
             return WhyNot(rule.name, answer)
@@ -334,7 +416,9 @@ class RuleQuestions:
             said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
             return WhyNot(rule.name, f"it fires{bindings}, and concludes {said}", fires=True)
         # What no state can bring comes first.
-        first = rule.body[min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))]
+        first = rule.body[
+            min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))
+        ]
         reason = describe_failure(self._usable, first, binding, facts)
         others = len(failing) - 1
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
@@ -350,19 +434,26 @@ class RuleQuestions:
             start = next((each for each in starts if each is not None), None)
             if start is not None:
                 found.append(self.of(rule, state, start))
-        return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
+        return sorted(
+            (each for each in found if not each.fires), key=lambda each: (each.failing, each.rule)
+        )
 
     def _is_fixed(self, atom: Atom) -> bool:
         """Whether what an atom asks for is neither in states nor concluded by a rule."""
         content = self._usable.content
         of_states = {triple[1] for own in self._usable.model.own.values() for triple in own}
-        return atom.kind in FACT_KINDS and atom.predicate not in _IN_STATES | content.concluded | of_states
+        return (
+            atom.kind in FACT_KINDS
+            and atom.predicate not in _IN_STATES | content.concluded | of_states
+        )
 
     @cached_property
     def _usable(self) -> Ontology:
         """The knowledge base without the rules that Pellet would drop."""
         known = self.base.vocabulary
-        return self.base.with_rules(one for one in self.base.rules if not (one.enabled and fatal_problems(one, known)))
+        return self.base.with_rules(
+            one for one in self.base.rules if not (one.enabled and fatal_problems(one, known))
+        )
 
     def _known(self, state: KnowledgeState) -> Facts | str:
         """All that follows in a state, or what contradicts what in it."""
@@ -393,8 +484,12 @@ class RuleQuestions:
                 if failing:
                     first = other.body[failing[0]]
                     reason = describe_failure(self._usable, first, nearest_one, facts)
-                    found.append((len(failing), other.name, f"its {write_atom(first)} fails: {reason}"))
-        return "".join(f"; {name} would conclude it, but {why}" for _, name, why in sorted(found)[:1])
+                    found.append(
+                        (len(failing), other.name, f"its {write_atom(first)} fails: {reason}")
+                    )
+        return "".join(
+            f"; {name} would conclude it, but {why}" for _, name, why in sorted(found)[:1]
+        )
 
 
 def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
@@ -405,10 +500,15 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
         return "these individuals are not known to be the same"
     if atom.kind in FACT_KINDS:
         subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
-        who, name = base.names.short(subject) if isinstance(subject, str) else "", local_name(atom.predicate)
+        who, name = (
+            base.names.short(subject) if isinstance(subject, str) else "",
+            local_name(atom.predicate),
+        )
         given = _GIVEN_BY_STATES.get(atom.predicate, "")
         if atom.kind == "class":
-            return f"{who} is not known to be a {name}{given}" if who else f"there is no {name}{given}"
+            return (
+                f"{who} is not known to be a {name}{given}" if who else f"there is no {name}{given}"
+            )
         values = facts.values(subject, atom.predicate)
         if not values:
             return f"{f'{who} has no' if who else 'nothing has a'} {name}{given}"
@@ -420,7 +520,9 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
         return f"no {name} connects what the other atoms need"
     if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
         return _compared(base, atom, binding)
-    texts = [f"?{name} = {_show(base, binding[name])}" for name in atom.variables() if name in binding]
+    texts = [
+        f"?{name} = {_show(base, binding[name])}" for name in atom.variables() if name in binding
+    ]
     return f"it is false for {', '.join(texts) or 'these values'}"
 
 
@@ -436,7 +538,9 @@ def _compared(base: Ontology, atom: Atom, binding: Binding) -> str:
     if len(kinds) == 2 and numbers[0] != numbers[1]:
         text = texts[numbers.index(False)]
         number = texts[numbers.index(True)]
-        return f"{text} is text, and never compares with the number {number}; write it without quotes"
+        return (
+            f"{text} is text, and never compares with the number {number}; write it without quotes"
+        )
     return f"found {texts[0]}, needed {words} {texts[1]}"
 
 
@@ -446,7 +550,9 @@ def _unequal(values: list[str | Lit], wanted: str | Lit) -> str:
         if isinstance(value, Lit) and isinstance(wanted, Lit):
             if value.datatype != wanted.datatype:
                 kinds = f"{local_name(value.datatype)} and {local_name(wanted.datatype)}"
-                return f"; {kinds} never match, even where they look alike: write {write_term(value)}"
+                return (
+                    f"; {kinds} never match, even where they look alike: write {write_term(value)}"
+                )
             if value.text.strip().lower() == wanted.text.strip().lower():
                 return "; they differ in case or spaces"
     return ""
@@ -456,29 +562,33 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Lit):
-        is_plain_number = value.datatype in rdf.NUMERIC and str(rdf.value_of(value, base.names)) == value.text
+        is_plain_number = (
+            value.datatype in rdf.NUMERIC and str(rdf.value_of(value, base.names)) == value.text
+        )
         return value.text if is_plain_number else write_term(value)
     return base.names.short(value)
 
 
 def _list(base: Ontology, values: list[str | Lit]) -> str:
     texts = sorted({_show(base, value) for value in values})
-    return ", ".join(texts[:_MOST]) + (f" and {len(texts) - _MOST} more" if len(texts) > _MOST else "")
+    return ", ".join(texts[:_MOST]) + (
+        f" and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+    )
 
 
 #: How many rules are named for a fact that does not follow, and values where another one is needed.
 _MOST: Final = 3
 _WHY: Final = re.compile(r"why\s+(?:not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
-_FORMS: Final = (
-    'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
-)
+_FORMS: Final = 'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
 
 
 CHOSEN, LEFT_OUT, NOT_BEST = "chosen", "left out", "not the best"
 
 
 class Candidate(NamedTuple):
-    """The planner's verdict on a function design: "chosen", "left out" or "not the best"; and why."""
+    """The planner's verdict on a function design: "chosen", "left out" or "not the best"; and
+    why.
+    """
 
     design: str
     verdict: str
@@ -497,10 +607,14 @@ def verdicts(base: Ontology, reasoning: Reasoning, decision: Decision) -> Iterat
         elif design in rejected:
             yield Candidate(design, LEFT_OUT, rejected[design])
         else:
-            own, best = (performance(reasoning.inference, each) for each in (design, str(decision.design)))
+            own, best = (
+                performance(reasoning.inference, each) for each in (design, str(decision.design))
+            )
             tie = f"performance {own}, as {decision.design}, which is first by name"
             yield Candidate(
-                design, NOT_BEST, tie if own == best else f"performance {own} < {best} of {decision.design}"
+                design,
+                NOT_BEST,
+                tie if own == best else f"performance {own} < {best} of {decision.design}",
             )
 
 
@@ -541,10 +655,13 @@ class Explainer:
         self.base, self.reasoning = base, reasoning
         self.tracer = tracer = Tracer(base, reasoning.inference.state, pellet)
         self.triples: dict[Fact, Triple] = {}
-        for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
+        for triple in sorted(
+            tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))
+        ):
             for fact in rdf.facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
-        # Where several rules ask for what is the same or different, Pellet's inferences are not the same each time.
+        # Where several rules ask for what is the same or different, Pellet's inferences are not the
+        # same each time.
         self.facts = sorted(reasoning.inference.facts & self.triples.keys(), key=str)
 
     def answer(self, question: str) -> Explanation:
@@ -557,7 +674,8 @@ class Explainer:
         if question:
             return Explanation((self.fact(question),))
         return Explanation(
-            tuple(map(self.derive, self.facts)), tuple(map(self.decision, self.reasoning.plan.decisions))
+            tuple(map(self.derive, self.facts)),
+            tuple(map(self.decision, self.reasoning.plan.decisions)),
         )
 
     def derive(self, fact: Fact) -> Derivation:
@@ -581,10 +699,14 @@ class Explainer:
 
     def design(self, design: str) -> tuple[str, ...]:
         """Why a design is chosen or not."""
-        function = next((name for name in self.base.functions if design in self.base.designs(name)), None)
+        function = next(
+            (name for name in self.base.functions if design in self.base.designs(name)), None
+        )
         if function is None:
             known = [each for name in self.base.functions for each in self.base.designs(name)]
-            raise InputError(f"there is no function design {shown(design)}", remedy=did_you_mean(design, known))
+            raise InputError(
+                f"there is no function design {shown(design)}", remedy=did_you_mean(design, known)
+            )
         for decision in self.reasoning.plan.decisions:
             if decision.function == function:
                 return self.decision(decision, design)
@@ -595,7 +717,9 @@ class Explainer:
         return (f"{function}: nothing is decided: {answer}",)
 
     def decision(self, decision: Decision, asked: str | None = None) -> tuple[str, ...]:
-        """Why a decision is made: the answer, which begins with the design that was asked about, and the reasons."""
+        """Why a decision is made: the answer, which begins with the design that was asked about,
+        and the reasons.
+        """
         function, objective = decision.function, objective_name(decision.function)
         answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
         lines: list[str] = []
@@ -604,7 +728,10 @@ class Explainer:
                 lines += ["  adapted because", *self.derive(fact).lines("    ")]
         for each in verdicts(self.base, self.reasoning, decision):
             lines.append(f"  {each}")
-            for fact in (Fact(each.design, "fd_realisability", False), Fact(each.design, "fd_error_log", objective)):
+            for fact in (
+                Fact(each.design, "fd_realisability", False),
+                Fact(each.design, "fd_error_log", objective),
+            ):
                 if each.verdict == LEFT_OUT and fact in self.triples:
                     lines += self.derive(fact).lines("    ")
             if each.design == asked:

@@ -1,4 +1,6 @@
-"""The knowledge base: ontologies, rules and a reasoner that answer questions, those in SPARQL too."""
+"""The knowledge base: ontologies, rules and a reasoner that answer questions, those in SPARQL
+too.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ from suave_des.scenario_knowledge import open_base
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
 _MODEL_NAME: Final = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
-_PREFIXES: Final = {name: PREFIXES[name] for name in ("suave", "tomasys", "mros", "rdf", "rdfs", "owl", "xsd", "swrl")}
+_PREFIXES: Final = {
+    name: PREFIXES[name]
+    for name in ("suave", "tomasys", "mros", "rdf", "rdfs", "owl", "xsd", "swrl")
+}
 
 
 @dataclass(frozen=True)
@@ -39,9 +44,12 @@ class QueryResult:
     """A table of answers.
 
     Attributes:
-        columns: names of the variables; "answer" for ASK; subject, predicate, object for CONSTRUCT and DESCRIBE.
-        rows: texts, sorted unless the query orders them; known namespaces as prefixes; None for an unbound variable.
-        unknown: names in the query that the knowledge base does not have, each with the nearest one in parentheses.
+        columns: names of the variables; "answer" for ASK; subject, predicate, object for CONSTRUCT
+            and DESCRIBE.
+        rows: texts, sorted unless the query orders them; known namespaces as prefixes; None for an
+            unbound variable.
+        unknown: names in the query that the knowledge base does not have, each with the nearest one
+            in parentheses.
     """
 
     columns: tuple[str, ...]
@@ -55,7 +63,8 @@ def _several(given: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:
 
 @dataclass(frozen=True, eq=False)
 class KnowledgeBase:
-    """Ontologies and rules with a reasoner, and the settings of the managing subsystem that uses them.
+    """Ontologies and rules with a reasoner, and the settings of the managing subsystem that uses
+    them.
 
     Attributes:
         base: the ontologies and rules.
@@ -92,8 +101,8 @@ class KnowledgeBase:
 
         Args:
             ontologies: files, or one; without any, those of the scenario.
-            scenario: a scenario file, or the name of a shipped one: its ontologies, overridden values, measured
-                attributes, and the behaviour of its revision.
+            scenario: a scenario file, or the name of a shipped one: its ontologies, overridden
+                values, measured attributes, and the behaviour of its revision.
             reasoner: in place of the scenario's.
             rules: files of rules as text, in addition to the scenario's.
             disabled_rules: names of rules to disable.
@@ -117,14 +126,17 @@ class KnowledgeBase:
         return cls.of(open_base(loaded), ManagingSettings.of(loaded.scenario), reasoner, limit)
 
     @classmethod
-    def of(cls, base: Ontology, settings: ManagingSettings, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
+    def of(
+        cls, base: Ontology, settings: ManagingSettings, reasoner: str, limit: TimeLimit
+    ) -> KnowledgeBase:
         """Start a reasoner on ontologies that are loaded already."""
         made = cls(base, settings, reasoner, limit)
         _ = made._reasoner  # what cannot be reasoned with is reported here
         return made
 
     def changed(self, base: Ontology) -> KnowledgeBase:
-        """Return the same with ontologies or rules changed in this process: the cache on disk knows files only.
+        """Return the same with ontologies or rules changed in this process: the cache on disk knows
+        files only.
 
         Raises:
             KnowledgeError: Pellet cannot use them.
@@ -144,15 +156,18 @@ class KnowledgeBase:
         return InProcessPellet(self.base, self.base.content.all_terms())
 
     def decide(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Reasoning:
-        """Decide as a mission does: infer the terms on which decisions depend and those that rules assert, and plan.
+        """Decide as a mission does: infer the terms on which decisions depend and those that rules
+        assert, and plan.
 
         The facts are assertions in addition to those of the state.
 
         Raises:
-            KnowledgeError: the state contradicts the ontologies, planning needs what they do not say, or the reasoner
-                takes too long.
+            KnowledgeError: the state contradicts the ontologies, planning needs what they do not
+                say, or the reasoner takes too long.
         """
-        return self._reasoner.analyze_and_plan(state, facts, improve_exceeded=self.settings.improves_exceeded)
+        return self._reasoner.analyze_and_plan(
+            state, facts, improve_exceeded=self.settings.improves_exceeded
+        )
 
     def outcome(self, situation: Situation) -> Outcome:
         """Decide as `decide` does, in a situation that may contradict itself."""
@@ -173,13 +188,14 @@ class KnowledgeBase:
         """Build a state, with its names checked.
 
         Args:
-            file: YAML with any of objectives, groundings, components, measurements; the other arguments replace what
-                it says.
+            file: YAML with any of objectives, groundings, components, measurements; the other
+                arguments replace what it says.
             measurements: measured value by quality attribute type.
             components: c_status by component.
             groundings: function design by function.
-            objectives: functions, or o_status by function; None: UNGROUNDED without a grounding, else no status.
-                Without objectives, the state has those of the groundings, else those of the search task.
+            objectives: functions, or o_status by function; None: UNGROUNDED without a grounding,
+                else no status. Without objectives, the state has those of the groundings, else
+                those of the search task.
 
         Raises:
             InputError: a name is unknown, or a value makes no sense.
@@ -206,17 +222,20 @@ class KnowledgeBase:
         Raises:
             KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
         """
-        return self._with_all_terms.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
+        return self._with_all_terms.analyze_and_plan(
+            state, improve_exceeded=self.settings.improves_exceeded
+        )
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Explain why a fact or a decision follows in a state.
 
         Args:
-            question: a fact such as "fg_status(fg_spiral_high, IN_ERROR_NFR)", "why fd_spiral_low?" or "why not
-                fd_spiral_high?"; empty: all that is inferred and decided.
+            question: a fact such as "fg_status(fg_spiral_high, IN_ERROR_NFR)", "why fd_spiral_low?"
+                or "why not fd_spiral_high?"; empty: all that is inferred and decided.
 
         Raises:
-            InputError: the question is none of these, or names what the knowledge base does not have.
+            InputError: the question is none of these, or names what the knowledge base does not
+                have.
             KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
         """
         reasoning = self.infer(state)
@@ -226,12 +245,16 @@ class KnowledgeBase:
         )
 
     def policy(
-        self, max_failed: int = 2, on_count: OnCount = lambda done, total: None, space: PolicySpace | None = None
+        self,
+        max_failed: int = 2,
+        on_count: OnCount = lambda done, total: None,
+        space: PolicySpace | None = None,
     ) -> Policy:
         """Decide every state, with at most `max_failed` components that report a status.
 
         Args:
-            on_count: called with how many kinds of states have been inferred, first 0, and how many have to be.
+            on_count: called with how many kinds of states have been inferred, first 0, and how many
+                have to be.
             space: what to tell apart; None: what can have an effect.
 
         Raises:
@@ -248,9 +271,13 @@ class KnowledgeBase:
         return PolicySpace.of(self.base, self.settings)
 
     def diff(
-        self, other: KnowledgeBase, max_failed: int = 2, on_count: OnCount = lambda done, total: None
+        self,
+        other: KnowledgeBase,
+        max_failed: int = 2,
+        on_count: OnCount = lambda done, total: None,
     ) -> PolicyDifference:
-        """Find the states that another knowledge base decides differently, over all states that either distinguishes.
+        """Find the states that another knowledge base decides differently, over all states that
+        either distinguishes.
 
         `on_count` is called as by `policy`, for this one and then for the other.
 
@@ -262,15 +289,19 @@ class KnowledgeBase:
         one, two = (States.of(each.base, each.settings, max_failed, space) for each in both)
         states = one.shared(two)
         before, after = (decide_all(each.base, states, each.outcome, on_count) for each in both)
-        no_proof = dict.fromkeys(reason for each in both for reason in regions_of(each.base).reasons)
+        no_proof = dict.fromkeys(
+            reason for each in both for reason in regions_of(each.base).reasons
+        )
         return compare_decisions(states, before, after, tuple(no_proof))
 
-    def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
+    def query(
+        self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False
+    ) -> QueryResult:
         """Answer a query in SPARQL.
 
         Args:
-            text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs, owl, xsd and swrl
-                need no declaration.
+            text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs,
+                owl, xsd and swrl need no declaration.
             state: adds what it asserts; None: the ontologies alone.
             inferred: adds what Pellet infers.
 
@@ -278,15 +309,23 @@ class KnowledgeBase:
             InputError: it is not a query, or would read something else than the knowledge base.
             KnowledgeError: the state contradicts itself, or it takes too long.
         """
-        graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query")
+        graph = self.limit.run(
+            lambda: graph_of(self.base, state, inferred=inferred), "answering the query"
+        )
         return answer(graph, text)
 
 
 def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) -> rdflib.Graph:
-    """Return the graph that queries are answered from, with labels and comments; see KnowledgeBase.query."""
+    """Return the graph that queries are answered from, with labels and comments; see
+    KnowledgeBase.query.
+    """
     situation = () if state is None else base.assertions(state)
-    more: Iterable[Triple] = InProcessPellet(base, base.content.all_terms()).infer(situation) if inferred else ()
-    graph = rdflib.Graph("SimpleMemory")  # in the order in which they came: an answer with LIMIT is always the same
+    more: Iterable[Triple] = (
+        InProcessPellet(base, base.content.all_terms()).infer(situation) if inferred else ()
+    )
+    graph = rdflib.Graph(
+        "SimpleMemory"
+    )  # in the order in which they came: an answer with LIMIT is always the same
     lines = base.content.n_triples(base.content.rules) + "".join(map(n_triple, (*situation, *more)))
     names = {name: rdflib.BNode(name) for name in _UNNAMED.findall(lines)}
     graph.parse(data=lines, format="nt", bnode_context=names)
@@ -324,9 +363,13 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
                 columns.sort()
             rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
             ordered = "OrderBy" in str(query.algebra)
-            return QueryResult(tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)), unknown)
+            return QueryResult(
+                tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)), unknown
+            )
         triples = [tuple(_text(graph, term) for term in triple) for triple in result.graph or ()]
-        return QueryResult(("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)), unknown)
+        return QueryResult(
+            ("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)), unknown
+        )
     except InputError:
         raise
     except Exception as error:  # evaluation raises whatever the functions of the query raise
@@ -334,7 +377,9 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
 
 
 def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:
-    """Yield the names of the models' namespaces in a query that no triple has, with the nearest one that some has."""
+    """Yield the names of the models' namespaces in a query that no triple has, with the nearest one
+    that some has.
+    """
     known = {str(_text(graph, each)) for each in (*graph.all_nodes(), *graph.predicates())}
     for name in sorted({*_MODEL_NAME.findall(text)} - known):
         near = nearest(name, known)

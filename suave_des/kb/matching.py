@@ -1,7 +1,8 @@
 """Match the atoms of a rule's body with facts.
 
-Atoms about facts are matched with what follows in a state. What a built-in says of given values, or computes from
-them, is left to Pellet; the nearest match asks for it with a rule that has this one atom.
+Atoms about facts are matched with what follows in a state. What a built-in says of given values, or
+computes from them, is left to Pellet; the nearest match asks for it with a rule that has this one
+atom.
 """
 
 from __future__ import annotations
@@ -44,16 +45,22 @@ def bound(term: Term, binding: Binding) -> str | Lit | None:
 
 
 def instance(atom: Atom, binding: Binding) -> Atom:
-    """An atom with the values of those variables that have one, and with literals in canonical form."""
+    """An atom with the values of those variables that have one, and with literals in canonical
+    form.
+    """
 
     def value(term: Term) -> Term:
         found = bound(term, binding)
-        return term if found is None else canonical(found) if isinstance(found, Lit) else Named(found)
+        return (
+            term if found is None else canonical(found) if isinstance(found, Lit) else Named(found)
+        )
 
     return replace(atom, arguments=tuple(map(value, atom.arguments)), places=())
 
 
-def unified(terms: Sequence[Term], values: Iterable[str | Lit | None], binding: Binding) -> Binding | None:
+def unified(
+    terms: Sequence[Term], values: Iterable[str | Lit | None], binding: Binding
+) -> Binding | None:
     """Extend a binding so that terms have given values, None for any; None if they cannot."""
     found = dict(binding)
     for term, value in zip(terms, values, strict=False):
@@ -69,7 +76,9 @@ def unified(terms: Sequence[Term], values: Iterable[str | Lit | None], binding: 
 
 
 def shown_bindings(binding: Binding, names: Names) -> Bound:
-    """Return the values of variables as people write them, by the names of the variables in their order."""
+    """Return the values of variables as people write them, by the names of the variables in their
+    order.
+    """
     return tuple((name, value_of(binding[name], names)) for name in sorted(binding))
 
 
@@ -90,12 +99,18 @@ def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
 
 
 def stated(atom: Atom, binding: Binding) -> Triple | None:
-    """The triple that an atom says with the values of its variables; None where one has none, or for another atom."""
+    """The triple that an atom says with the values of its variables; None where one has none, or
+    for another atom.
+    """
     terms = [bound(term, binding) for term in atom.arguments]
     if atom.kind not in FACT_KINDS or None in terms:
         return None
     subject, value = str(terms[0]), terms[-1] or ""
-    return (subject, RDF_TYPE, atom.predicate) if atom.kind == "class" else (subject, atom.predicate, value)
+    return (
+        (subject, RDF_TYPE, atom.predicate)
+        if atom.kind == "class"
+        else (subject, atom.predicate, value)
+    )
 
 
 class Facts:
@@ -128,17 +143,22 @@ class Facts:
 
 
 def matches(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> list[Binding]:
-    """All bindings with which the whole body of a rule holds, and which extend one, in a fixed order."""
+    """All bindings with which the whole body of a rule holds, and which extend one, in a fixed
+    order.
+    """
     body = _canonical_body(rule)
     ways = _ways(body, testable_order(body), facts, start, iter(range(MOST_WAYS)))
     return sorted((binding for binding, _ in ways), key=str)
 
 
-def nearest_match(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> tuple[Binding, tuple[int, ...]]:
-    """Find the extended binding with the fewest atoms of a rule's body that fail, and their numbers.
+def nearest_match(
+    rule: Rule, facts: Facts, start: Binding = MappingProxyType({})
+) -> tuple[Binding, tuple[int, ...]]:
+    """Find the extended binding with the fewest atoms of a rule's body that fail, and their
+    numbers.
 
-    Of several, one where a comparison fails comes before one where a value differs, and that before one where
-    nothing is known. Atoms of which there is no fact at all fail in any case.
+    Of several, one where a comparison fails comes before one where a value differs, and that before
+    one where nothing is known. Atoms of which there is no fact at all fail in any case.
     """
     body = _canonical_body(rule)
 
@@ -162,9 +182,16 @@ def nearest_match(rule: Rule, facts: Facts, start: Binding = MappingProxyType({}
 
 
 def _ways(
-    body: Sequence[Atom], order: Sequence[int], facts: Facts, binding: Binding, tries: Iterator[int], allowed: int = 0
+    body: Sequence[Atom],
+    order: Sequence[int],
+    facts: Facts,
+    binding: Binding,
+    tries: Iterator[int],
+    allowed: int = 0,
 ) -> Iterator[tuple[Binding, tuple[int, ...]]]:
-    """Ways to match atoms, in an order, of which some may fail: binding, and numbers of those; as many as `tries`."""
+    """Ways to match atoms, in an order, of which some may fail: binding, and numbers of those; as
+    many as `tries`.
+    """
     if next(tries, None) is None:
         return
     if not order:
@@ -202,7 +229,13 @@ def _distance(atom: Atom, facts: Facts, binding: Binding) -> int:
     if atom.kind not in FACT_KINDS:
         return 0
     subject = bound(atom.arguments[0], binding)
-    return 3 if atom.kind == "class" else 1 if isinstance(subject, str) and facts.of(atom.predicate, subject) else 2
+    return (
+        3
+        if atom.kind == "class"
+        else 1
+        if isinstance(subject, str) and facts.of(atom.predicate, subject)
+        else 2
+    )
 
 
 def _canonical_body(rule: Rule) -> list[Atom]:
@@ -210,12 +243,18 @@ def _canonical_body(rule: Rule) -> list[Atom]:
 
 
 def testable_order(body: Sequence[Atom]) -> list[int]:
-    """Order atoms as the rule does, but those that test or compute after all that bind their variables."""
+    """Order atoms as the rule does, but those that test or compute after all that bind their
+    variables.
+    """
     waiting = list(range(len(body)))
     known: set[str] = set()
     order: list[int] = []
     while waiting:
-        ready = (number for number in waiting if body[number].kind in _BINDING or _inputs(body[number]) <= known)
+        ready = (
+            number
+            for number in waiting
+            if body[number].kind in _BINDING or _inputs(body[number]) <= known
+        )
         number = next(ready, waiting[0])
         waiting.remove(number)
         order.append(number)
@@ -224,8 +263,12 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
 
 
 def _inputs(atom: Atom) -> set[str]:
-    """Variables that must have values before an atom can be tested, or its first argument computed."""
-    return {term.name for term in atom.arguments[int(atom.computes) :] if isinstance(term, Variable)}
+    """Variables that must have values before an atom can be tested, or its first argument
+    computed.
+    """
+    return {
+        term.name for term in atom.arguments[int(atom.computes) :] if isinstance(term, Variable)
+    }
 
 
 @lru_cache(maxsize=4096)
@@ -242,8 +285,8 @@ def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
 class Probes:
     """Asks Pellet which conjunctions of atoms hold.
 
-    Each is the body of a separate rule, whose head has an individual and a property that nothing else mentions, so that
-    it changes nothing.
+    Each is the body of a separate rule, whose head has an individual and a property that nothing
+    else mentions, so that it changes nothing.
 
     Args:
         limit: of Pellet's time for one situation.
@@ -255,7 +298,10 @@ class Probes:
 
     def __init__(self, base: Ontology, limit: TimeLimit, bodies: Iterable[Body]) -> None:
         self._base, self._limit, self._bodies = base, limit, tuple(dict.fromkeys(bodies))
-        rules = (Rule(f"probe {number}", body, (_head(number),)) for number, body in enumerate(self._bodies))
+        rules = (
+            Rule(f"probe {number}", body, (_head(number),))
+            for number, body in enumerate(self._bodies)
+        )
         probed = base.with_rules((*base.rules, *rules))
         self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
 
@@ -267,10 +313,14 @@ class Probes:
         """
         asserted = (*self._base.assertions(situation.state), *situation.facts)
         try:
-            found = self._limit.run(lambda: self._pellet.infer(asserted), reasoning_on(situation.state))
+            found = self._limit.run(
+                lambda: self._pellet.infer(asserted), reasoning_on(situation.state)
+            )
         except ContradictionError:
             return None
-        numbers = (value.text for _, name, value in found if name == _HOLDS and isinstance(value, Lit))
+        numbers = (
+            value.text for _, name, value in found if name == _HOLDS and isinstance(value, Lit)
+        )
         return frozenset(self._bodies[int(number)] for number in numbers)
 
 

@@ -1,4 +1,6 @@
-"""The policy: the decision in every state, over places of measured values, component reports and groundings."""
+"""The policy: the decision in every state, over places of measured values, component reports and
+groundings.
+"""
 
 from __future__ import annotations
 
@@ -41,14 +43,16 @@ class Policy:
 
     Attributes:
         space: what it tells apart.
-        cases: a row for each kind of state: the place of each attribute's value on the space's scale; the `components`
-            that report; how many `states` it stands for; of each function the grounding `_now` and what happens to it
-            `_then`, empty where the function has no objective; inferred `statuses`; `marks`, which are any of
-            "inconsistent", "none left" and "flip-flop"; the `problem` of an inconsistent state; and as objects one
-            such `state`, its `reports` in words and the functions that are `flipping`.
+        cases: a row for each kind of state: the place of each attribute's value on the space's
+            scale; the `components` that report; how many `states` it stands for; of each function
+            the grounding `_now` and what happens to it `_then`, empty where the function has no
+            objective; inferred `statuses`; `marks`, which are any of "inconsistent", "none left"
+            and "flip-flop"; the `problem` of an inconsistent state; and as objects one such
+            `state`, its `reports` in words and the functions that are `flipping`.
         functions: that have an objective in a state.
         without_effect: measured attributes that no rule and no design refers to.
-        no_proof: why rules may do more than compare; if there are any reasons, the ranges are samples only.
+        no_proof: why rules may do more than compare; if there are any reasons, the ranges are
+            samples only.
         max_failed: maximum number of components that report a status.
     """
 
@@ -61,7 +65,9 @@ class Policy:
 
     @property
     def states(self) -> int:
-        """Number of states covered; interchangeable components count one by one, each range once."""
+        """Number of states covered; interchangeable components count one by one, each range
+        once.
+        """
         return int(self.cases["states"].sum())
 
     def marked(self, mark: str) -> pandas.DataFrame:
@@ -84,7 +90,9 @@ class Policy:
             if len(group) > 1:
                 yield f"interchangeable (only their number matters): {', '.join(group)}"
         yield from (f"without any effect: measured {name}" for name in self.without_effect)
-        yield from (f"{reason}: each range was tried with one value only" for reason in self.no_proof)
+        yield from (
+            f"{reason}: each range was tried with one value only" for reason in self.no_proof
+        )
         for mark in (INCONSISTENT, NONE_LEFT, FLIP_FLOP):
             cases = self.marked(mark)
             yield f"{mark}: {number_of(int(cases['states'].sum()), 'state')}"
@@ -96,7 +104,12 @@ class Policy:
 
 
 def make_policy(
-    base: Ontology, settings: ManagingSettings, states: States, max_failed: int, decided: Decide, decide: Decide
+    base: Ontology,
+    settings: ManagingSettings,
+    states: States,
+    max_failed: int,
+    decided: Decide,
+    decide: Decide,
 ) -> Policy:
     """Tabulate what is decided in states.
 
@@ -109,7 +122,9 @@ def make_policy(
     outcomes = [decided(Situation(state)) for state in every]
     cases = states.frame(every)
     add_decisions(cases, states, outcomes)
-    here = range(0, len(every), len(states.tasks))  # states that differ in their task only follow one another
+    here = range(
+        0, len(every), len(states.tasks)
+    )  # states that differ in their task only follow one another
     groups = (slice(first, first + len(states.tasks)) for first in here)
     flipping = [each for group in groups for each in _flipping(every[group], outcomes[group])]
     cases["marks"] = list(map(_marks, outcomes, flipping))
@@ -120,23 +135,43 @@ def make_policy(
     words = {reports: _in_words(reports, states.space) for reports in states.reports}
     cases["state"], cases["reports"] = every, [words[state.components] for state in every]
     cases["flipping"] = flipping
-    ineffective = (name for name in measured_attributes(base, settings) if name not in states.space.attributes)
-    return Policy(states.space, cases, states.functions, tuple(ineffective), regions_of(base).reasons, max_failed)
+    ineffective = (
+        name for name in measured_attributes(base, settings) if name not in states.space.attributes
+    )
+    return Policy(
+        states.space,
+        cases,
+        states.functions,
+        tuple(ineffective),
+        regions_of(base).reasons,
+        max_failed,
+    )
 
 
 def _marks(outcome: Outcome, flipping: Sequence[str]) -> str:
     if outcome.reasoning is None:
         return INCONSISTENT
-    return "; ".join([NONE_LEFT] * bool(outcome.reasoning.plan.without_design) + [FLIP_FLOP] * bool(flipping))
+    return "; ".join(
+        [NONE_LEFT] * bool(outcome.reasoning.plan.without_design) + [FLIP_FLOP] * bool(flipping)
+    )
 
 
-def _flipping(states: Sequence[KnowledgeState], outcomes: Sequence[Outcome]) -> Iterator[tuple[str, ...]]:
-    """Functions of each state whose decisions lead through other groundings back to its own, all else being equal."""
+def _flipping(
+    states: Sequence[KnowledgeState], outcomes: Sequence[Outcome]
+) -> Iterator[tuple[str, ...]]:
+    """Functions of each state whose decisions lead through other groundings back to its own, all
+    else being equal.
+    """
     after: dict[_Task, _Task] = {}
     for state, outcome in zip(states, outcomes, strict=True):
         asked = tuple(each.function for each in state.objectives)
-        chosen = {function: design for function, design in outcome.changes.items() if design != NONE_LEFT}
-        after[asked, state.groundings] = asked, tuple(sorted({**dict(state.groundings), **chosen}.items()))
+        chosen = {
+            function: design for function, design in outcome.changes.items() if design != NONE_LEFT
+        }
+        after[asked, state.groundings] = (
+            asked,
+            tuple(sorted({**dict(state.groundings), **chosen}.items())),
+        )
     for start in after:
         way = [start]
         while (following := after[way[-1]]) in after and following not in way:
@@ -150,7 +185,13 @@ def _in_words(reports: Reports, space: PolicySpace) -> str:
     counted: Counter[tuple[str, str]] = Counter()
     for component, status in reports:
         kind = next(each for each in space.alike if component in each)
-        label = component if len(kind) == 1 else "" if len(space.alike) == 1 else f" of {kind[0]} and alike"
+        label = (
+            component
+            if len(kind) == 1
+            else ""
+            if len(space.alike) == 1
+            else f" of {kind[0]} and alike"
+        )
         counted[label, status] += 1
     parts = (
         f"{label} {status}" if label and not label.startswith(" ") else f"{number} {status}{label}"
@@ -159,12 +200,14 @@ def _in_words(reports: Reports, space: PolicySpace) -> str:
     return " + ".join(parts) or "no report"
 
 
-#: A table; the number of its columns that say what the case is; the measured attribute that goes across, or "".
+#: A table; the number of its columns that say what the case is; the measured attribute that goes
+# across, or "".
 FunctionTable = tuple[Table, int, str]
 
 
 def function_table(policy: Policy, function: str) -> FunctionTable:
-    """Tabulate what happens to one function's grounding, without the dimensions on which it does not depend.
+    """Tabulate what happens to one function's grounding, without the dimensions on which it does
+    not depend.
 
     The last measured attribute goes across, all else down.
     """
@@ -186,16 +229,28 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
         one = list(dict.fromkeys(outcomes))
         text = one[0] if len(one) == 1 else f"{' or '.join(one)}, by the order of the values"
         found.setdefault(at[: len(down)], {})[at[len(down) :]] = text
-    spans = {name: _spans(number, len(policy.space.scale), found.values()) for number, name in enumerate(attributes)}
-    ranges = [[(first, policy.space.scale.text(first, last)) for first, last in each] for each in spans.values()]
+    spans = {
+        name: _spans(number, len(policy.space.scale), found.values())
+        for number, name in enumerate(attributes)
+    }
+    ranges = [
+        [(first, policy.space.scale.text(first, last)) for first, last in each]
+        for each in spans.values()
+    ]
     *over, across = ranges or [[]]
     others = [name for name in groundings if name in kept and name != own]
     merged: dict[Any, list[str]] = {}  # what components report, of each different row
     for names, row in found.items():
         known = dict(zip(down, names, strict=True))
         for at in itertools.product(*over):
-            cells = tuple(row[(*(first for first, _ in at), last)] for last, _ in across) or (row[()],)
-            label = tuple(map(known.__getitem__, [own, *others])), tuple(words for _, words in at), cells
+            cells = tuple(row[(*(first for first, _ in at), last)] for last, _ in across) or (
+                row[()],
+            )
+            label = (
+                tuple(map(known.__getitem__, [own, *others])),
+                tuple(words for _, words in at),
+                cells,
+            )
             merged.setdefault(label, []).append(known.get("reports", ""))
     reported = ["components"] * ("reports" in kept)
     headings = ["now", *(name.removesuffix("_now") for name in others), *reported, *attributes[:-1]]
@@ -205,19 +260,27 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
     ]
     what = f", by measured {', '.join(attributes)}" if attributes else ""
     outcomes = [words for _, words in across] or ["then"]
-    table = Table([*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes)))
+    table = Table(
+        [*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes))
+    )
     return table, len(headings), attributes[-1] if attributes else ""
 
 
-def _spans(number: int, places: int, rows: Iterable[dict[tuple[int, ...], str]]) -> list[tuple[int, int]]:
-    """First and last place of each range of an attribute, given by its number, in which all outcomes are equal."""
+def _spans(
+    number: int, places: int, rows: Iterable[dict[tuple[int, ...], str]]
+) -> list[tuple[int, int]]:
+    """First and last place of each range of an attribute, given by its number, in which all
+    outcomes are equal.
+    """
     by_place: list[dict[Hashable, str]] = [{} for _ in range(places)]
     for row_number, row in enumerate(rows):
         for at, outcome in row.items():
             by_place[at[number]][row_number, at[:number], at[number + 1 :]] = outcome
     spans: list[tuple[int, int]] = []
     for place, outcomes in enumerate(by_place):
-        if len(spans) > 1 and by_place[spans[-1][0]] == outcomes:  # nothing is joined to "not measured"
+        if (
+            len(spans) > 1 and by_place[spans[-1][0]] == outcomes
+        ):  # nothing is joined to "not measured"
             spans[-1] = spans[-1][0], place
         else:
             spans.append((place, place))

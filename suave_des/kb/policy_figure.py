@@ -18,7 +18,12 @@ from suave_des.tables import Table
 
 #: Units of measured values; those of a user's own attributes are not known.
 _UNITS: Final = {"water_visibility": "m", "battery_level": "share of a full battery"}
-_FIXED: Final = {**MODE_COLOURS, INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", NO_GROUNDING: "#FFFFFF"}
+_FIXED: Final = {
+    **MODE_COLOURS,
+    INCONSISTENT: "#B00020",
+    NONE_LEFT: "#D9D9D9",
+    NO_GROUNDING: "#FFFFFF",
+}
 _LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
 _ROW_IN: Final = 0.26
 _MOST_ROWS: Final = 60
@@ -26,26 +31,38 @@ _LABEL_LETTERS: Final = 52
 
 
 def draw_policy(policy: Policy, path: Path) -> None:
-    """Draw the table of each function that has a choice, with a colour for the design that is in use afterwards.
+    """Draw the table of each function that has a choice, with a colour for the design that is in
+    use afterwards.
 
     Raises:
-        InputError: there is no choice to draw, or there are too many rows; or the file is not a .png, .pdf or .svg that
-            can be written.
+        InputError: there is no choice to draw, or there are too many rows; or the file is not a
+            .png, .pdf or .svg that can be written.
     """
     check_picture(path)
     found = {name: function_table(policy, name) for name in policy.functions}
-    outcomes = {name: {*chain(*(row[down:] for row in table.rows))} for name, (table, down, _) in found.items()}
+    outcomes = {
+        name: {*chain(*(row[down:] for row in table.rows))}
+        for name, (table, down, _) in found.items()
+    }
     drawn = {name: each for name, each in found.items() if len(outcomes[name] - {STAYS}) > 1}
     if not drawn:
         raise InputError("no function has a choice to draw")
     rows = [len(table.rows) for table, _, _ in drawn.values()]
     if sum(rows) > _MOST_ROWS:
-        raise InputError(f"there are more than {_MOST_ROWS} rows to draw", remedy="lower --max-failed, or use --csv")
+        raise InputError(
+            f"there are more than {_MOST_ROWS} rows to draw",
+            remedy="lower --max-failed, or use --csv",
+        )
     import matplotlib.pyplot as plt
     from matplotlib.patches import Patch
 
     with publication():
-        names = {_then(row[0], each) for table, down, _ in drawn.values() for row in table.rows for each in row[down:]}
+        names = {
+            _then(row[0], each)
+            for table, down, _ in drawn.values()
+            for row in table.rows
+            for each in row[down:]
+        }
         colours, heights = _colours(names), [number + 4.0 for number in rows]
         size = WIDTH_IN, _ROW_IN * sum(heights) + 0.6
         figure, grid = plt.subplots(
@@ -55,11 +72,15 @@ def draw_policy(policy: Policy, path: Path) -> None:
             _draw(axes, *each, colours)
             axes.set_title(name, loc="left")
         handles = [
-            Patch(facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name))
+            Patch(
+                facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name)
+            )
             for name, colour in colours.items()
         ]
         title = "in use afterwards (rows: in use now, and what else matters)"
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)), title=title)
+        figure.legend(
+            handles=handles, loc="outside lower center", ncols=min(4, len(handles)), title=title
+        )
         try:
             write_picture(figure, path, bbox_inches="tight")
         finally:
@@ -82,7 +103,9 @@ def _draw(axes: Any, table: Table, down: int, across: str, colours: dict[str, st
     flips = np.array([[FLIP_FLOP in cell for cell in row[down:]] for row in rows])
     if flips.any():
         axes.pcolor(np.ma.masked_where(~flips, numbers), hatch="////", alpha=0.0)
-    axes.set_yticks(np.arange(len(rows)) + 0.5, _labels(table.headings[1:down], [row[:down] for row in rows]))
+    axes.set_yticks(
+        np.arange(len(rows)) + 0.5, _labels(table.headings[1:down], [row[:down] for row in rows])
+    )
     axes.set_xticks([])
     if across:
         axes.set_xticks(np.arange(numbers.shape[1]) + 0.5, map(_range, table.headings[down:]))
@@ -106,7 +129,11 @@ def _labels(headings: Sequence[str], rows: list[Sequence[str]]) -> list[str]:
             else text
             for heading, text in zip(headings, others, strict=True)
         ]
-        labels.append("\n".join(textwrap.shorten(text, _LABEL_LETTERS) for text in (now, "; ".join(words)) if text))
+        labels.append(
+            "\n".join(
+                textwrap.shorten(text, _LABEL_LETTERS) for text in (now, "; ".join(words)) if text
+            )
+        )
     return labels
 
 
@@ -115,7 +142,9 @@ def _range(words: str) -> str:
 
 
 def _low_to_high(design: str) -> tuple[int, str]:
-    """Order designs as their colours are: none, the shipped ones from low to high, then others by name."""
+    """Order designs as their colours are: none, the shipped ones from low to high, then others by
+    name.
+    """
     known = [NO_GROUNDING, *MODE_COLOURS]
     return known.index(design) if design in known else len(known), design
 
@@ -125,4 +154,7 @@ def _colours(names: set[str]) -> dict[str, str]:
     from matplotlib.colors import to_hex
 
     others = cycle(dict.fromkeys((*OTHER_MODES, *map(to_hex, map(colormaps["Set2"], range(8))))))
-    return {name: _FIXED[name] if name in _FIXED else next(others) for name in sorted(names, key=_low_to_high)}
+    return {
+        name: _FIXED[name] if name in _FIXED else next(others)
+        for name in sorted(names, key=_low_to_high)
+    }

@@ -1,4 +1,6 @@
-"""Replay recorded missions with rules added or disabled: what would have been inferred and decided."""
+"""Replay recorded missions with rules added or disabled: what would have been inferred and
+decided.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +34,9 @@ class MissionReplay(NamedTuple):
         folder: the mission's output folder, or its campaign's.
         mission: which of the campaign's; empty for a mission with a folder of its own.
         states: number of recorded states.
-        found: in order of mission time, in s: the time; "fires", with the conclusions and the individuals, without
-            numbers, which differ each time; or "decides", with a decision that would have been different; or
-            "contradicts", with what contradicts what in a state.
+        found: in order of mission time, in s: the time; "fires", with the conclusions and the
+            individuals, without numbers, which differ each time; or "decides", with a decision that
+            would have been different; or "contradicts", with what contradicts what in a state.
     """
 
     folder: Path
@@ -67,13 +69,16 @@ class MissionReplay(NamedTuple):
 
 
 def summary(missions: Sequence[MissionReplay]) -> Iterator[str]:
-    """Several replays as `kb try` prints them: those in which something happens, and how many they are."""
+    """Several replays as `kb try` prints them: those in which something happens, and how many they
+    are.
+    """
     for mission in missions:
         if mission.found or len(missions) == 1:
             yield from mission.lines()
     if len(missions) > 1:
         firing, changed, contradictions = (
-            [len(mission.times(kind)) for mission in missions] for kind in (FIRES, DECIDES, CONTRADICTS)
+            [len(mission.times(kind)) for mission in missions]
+            for kind in (FIRES, DECIDES, CONTRADICTS)
         )
         yield (
             f"{len(missions)} missions: fires in {sum(map(bool, firing))}, different decisions in "
@@ -84,18 +89,26 @@ def summary(missions: Sequence[MissionReplay]) -> Iterator[str]:
 
 def _span(times: Sequence[float]) -> str:
     first, last = times[0], times[-1]
-    return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(times)} states"
+    return (
+        f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(times)} states"
+    )
 
 
 def try_rules(
-    folder: Path, rule: str | None = None, *, disabled: str | None = None, limit_s: float = TIME_LIMIT_S
+    folder: Path,
+    rule: str | None = None,
+    *,
+    disabled: str | None = None,
+    limit_s: float = TIME_LIMIT_S,
 ) -> Iterator[MissionReplay]:
     """Try adding or disabling rules on recorded missions, one after the other.
 
-    Only the recorded states are evaluated: the consequences of different decisions are not simulated.
+    Only the recorded states are evaluated: the consequences of different decisions are not
+    simulated.
 
     Args:
-        folder: output folder of a mission or of a campaign that recorded its knowledge, or a folder of such folders.
+        folder: output folder of a mission or of a campaign that recorded its knowledge, or a folder
+            of such folders.
         rule: a rule as text, or a file of rules; they replace those of the same name.
         disabled: alternatively, the name of a rule to disable.
         limit_s: of the reasoner, for one state.
@@ -111,7 +124,9 @@ def try_rules(
     for where, mission in recorded_missions(folder):
         if trial is None or trial.scenario != mission.scenario:
             trial = _Trial(mission.scenario, rule, disabled, limit)
-        found = tuple((record.t_s, *each) for record in mission.records for each in trial.replay(record.state))
+        found = tuple(
+            (record.t_s, *each) for record in mission.records for each in trial.replay(record.state)
+        )
         point = f", point {mission.point}" if mission.point else ""
         which = f"{mission.manager}, run {mission.run}{point}" if mission.run else ""
         yield MissionReplay(where, which, len(mission.records), found)
@@ -120,7 +135,9 @@ def try_rules(
 class _Trial:
     """The knowledge base of a scenario, without the change and with it."""
 
-    def __init__(self, scenario: Scenario, rule: str | None, disabled: str | None, limit: TimeLimit) -> None:
+    def __init__(
+        self, scenario: Scenario, rule: str | None, disabled: str | None, limit: TimeLimit
+    ) -> None:
         self.scenario = scenario
         base, settings = read_base(scenario), ManagingSettings.of(scenario)
         self.before = KnowledgeBase.of(base, settings, scenario.knowledge.reasoner, limit)
@@ -148,5 +165,7 @@ class _Trial:
                 yield DECIDES, f"{name}: {other} instead of {one}"
         tracer = Tracer(self.with_rule, state, self.pellet)
         for bindings, facts in (firing for rule in self.rules for firing in tracer.firings(rule)):
-            bound = with_bindings(tuple(each for each in bindings if not isinstance(each[1], Decimal)))
+            bound = with_bindings(
+                tuple(each for each in bindings if not isinstance(each[1], Decimal))
+            )
             yield FIRES, f"{', '.join(map(str, facts))}{bound or ' with nothing bound'}"

@@ -1,8 +1,9 @@
 """Edit the rules of an OWL file in place: what is not edited stays as it is, to the byte.
 
-The elements of a new rule go before the end of the file, and declare all that they need themselves. expat gives the
-places of elements in the file, so that those of a rule can be changed or cut out. Before the result replaces the file
-it is read back, and must have the intended rules, and no other change.
+The elements of a new rule go before the end of the file, and declare all that they need themselves.
+expat gives the places of elements in the file, so that those of a rule can be changed or cut out.
+Before the result replaces the file it is read back, and must have the intended rules, and no other
+change.
 """
 
 from __future__ import annotations
@@ -22,7 +23,18 @@ from suave_des.files import write_files
 from suave_des.kb.states import read_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
-from suave_des.knowledge.rdf import RDF, RDF_TYPE, RDFS, SWRL, SWRLA, XSD, Lit, Triple, local_name, namespace
+from suave_des.knowledge.rdf import (
+    RDF,
+    RDF_TYPE,
+    RDFS,
+    SWRL,
+    SWRLA,
+    XSD,
+    Lit,
+    Triple,
+    local_name,
+    namespace,
+)
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
@@ -41,7 +53,8 @@ def add_rules(path: Path, given: str) -> list[Rule]:
 
     Raises:
         InputError: the file cannot be edited.
-        KnowledgeError: the file cannot be read or has a rule of that name already, or a rule is wrong.
+        KnowledgeError: the file cannot be read or has a rule of that name already, or a rule is
+            wrong.
     """
     rules = list(read_rules(given, Ontology.load([path]).vocabulary))
     file = _read(path)
@@ -96,7 +109,11 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
             mark = start_tag.encode() + word + b"</swrla:isRuleEnabled>"
             changed = changed[: tag.end()] + mark + changed[tag.end() :]
         content = content[:start] + changed + content[end:]
-    _replace(file, content, lambda rules: [replace(r, enabled=enabled) if r.name == name else r for r in rules])
+    _replace(
+        file,
+        content,
+        lambda rules: [replace(r, enabled=enabled) if r.name == name else r for r in rules],
+    )
     return True
 
 
@@ -110,7 +127,9 @@ def _read(path: Path) -> OntologyFile:
 
 
 def _spans_of(file: OntologyFile, name: str, *, with_parts: bool = False) -> list[_Span]:
-    """Places of the elements of rules; with those elsewhere in the file that hold their lists and atoms, if wanted."""
+    """Places of the elements of rules; with those elsewhere in the file that hold their lists and
+    atoms, if wanted.
+    """
     names = [rule.name for rule in rules_of(file)]
     if name not in names:
         remedy = nearest(name, names) or f"its rules: {', '.join(names) or 'none'}"
@@ -143,7 +162,9 @@ def _spans(content: bytes) -> list[_Span]:
     def end(_name: str) -> None:
         nonlocal depth
         if depth == 2:
-            tag = _TAG.match(content, parser.CurrentByteIndex)  # the end tag; of an empty element, its only tag
+            tag = _TAG.match(
+                content, parser.CurrentByteIndex
+            )  # the end tag; of an empty element, its only tag
             ends.append(tag.end() if tag else parser.CurrentByteIndex)
         depth -= 1
 
@@ -165,17 +186,24 @@ def _name(element: etree._Element) -> str | None:
 
 
 def _rule_xml(rule: Rule) -> str:
-    """The element of a rule. Its variables and built-ins are declared where it uses them, so that they go with it."""
+    """The element of a rule. Its variables and built-ins are declared where it uses them, so that
+    they go with it.
+    """
     triples = triples_of(rule)
     start = triples[0][0]
-    builtins = [(atom.predicate, RDF_TYPE, _BUILTIN) for atom in rule.body if atom.kind == "builtin"]
+    builtins = [
+        (atom.predicate, RDF_TYPE, _BUILTIN) for atom in rule.body if atom.kind == "builtin"
+    ]
     mark = [] if rule.enabled else [(start, ENABLED, Lit("false", XSD + "boolean"))]
     of: dict[str, list[Triple]] = {}
     for triple in dict.fromkeys((*mark, *triples, *builtins)):
         of.setdefault(triple[0], []).append(triple)
     root = etree.Element(_DESCRIPTION, nsmap=_PREFIXES)
     waiting = [(root, start)]
-    for element, node in waiting:  # a list nests as deep as it is long, which is too deep for a recursion
+    for (
+        element,
+        node,
+    ) in waiting:  # a list nests as deep as it is long, which is too deep for a recursion
         for _, predicate, value in of[node]:
             inside = etree.SubElement(element, f"{{{namespace(predicate)}}}{local_name(predicate)}")
             if isinstance(value, Lit):
@@ -190,19 +218,27 @@ def _rule_xml(rule: Rule) -> str:
             else:
                 inside.set(f"{{{RDF}}}resource", value)
     text = etree.tostring(root, encoding="unicode")
-    lines = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", text)
+    lines = re.sub(
+        r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", text
+    )
     return f"    {lines.removesuffix(_END)}\n    {_END}\n"
 
 
-def _replace(file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]) -> None:
-    """Replace the file, if its new content says what was intended; the old file is kept beside it."""
+def _replace(
+    file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]
+) -> None:
+    """Replace the file, if its new content says what was intended; the old file is kept beside
+    it.
+    """
     try:
         result = read_ontology(file.path, content)
     except KnowledgeError as error:
         raise _cannot(file.path) from error
     before, after = rules_of(file), rules_of(result)
     intended = map(_statement, change(list(before)))
-    if sorted(map(_statement, after), key=str) != sorted(intended, key=str) or _others(file) != _others(result):
+    if sorted(map(_statement, after), key=str) != sorted(intended, key=str) or _others(
+        file
+    ) != _others(result):
         raise _cannot(file.path)
     path = file.path.resolve()
     mode = stat.S_IMODE(path.stat().st_mode)
@@ -218,9 +254,13 @@ def _statement(rule: Rule) -> tuple[object, ...]:
 def _others(file: OntologyFile) -> int:
     """Number of statements besides rules and the declarations of variables and built-ins."""
     inside = {triple for rule in rules_of(file) for triple in rule.triples}
-    return sum(triple not in inside and triple[2] not in (_VARIABLE, _BUILTIN) for triple in file.triples)
+    return sum(
+        triple not in inside and triple[2] not in (_VARIABLE, _BUILTIN) for triple in file.triples
+    )
 
 
 def _cannot(path: Path) -> KnowledgeError:
     problem = "the rule is written in a way that cannot be edited in place; nothing was changed"
-    return KnowledgeError(problem, file=path, remedy="open the file in Protégé and save it, then try again")
+    return KnowledgeError(
+        problem, file=path, remedy="open the file in Protégé and save it, then try again"
+    )

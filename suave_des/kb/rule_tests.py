@@ -33,7 +33,9 @@ from suave_des.scenario.yamlfile import Layer, read_yaml, validated
 
 #: What XML 1.0 has no place for.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
-_Texts = Annotated[list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)]
+_Texts = Annotated[
+    list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)
+]
 #: The arguments of KnowledgeBase.load that say which knowledge base tests are about.
 Tested = Mapping[str, Any]
 
@@ -128,7 +130,9 @@ class TestFile:
                 try:
                     yield find(name, "ontology", beside=folder)
                 except InputError as error:
-                    raise self.document.error(f"{name}: {error.problem}", (key, at), error.remedy) from None
+                    raise self.document.error(
+                        f"{name}: {error.problem}", (key, at), error.remedy
+                    ) from None
 
         beside = folder / content.scenario
         return {
@@ -139,9 +143,15 @@ class TestFile:
         }
 
     def tests(self, knowledge: KnowledgeBase) -> Iterator[RuleTest]:
-        """Look up all names of the tests in a knowledge base; one that it does not have is a test's problem."""
+        """Look up all names of the tests in a knowledge base; one that it does not have is a test's
+        problem.
+        """
         for number, content in enumerate(self.content.tests):
-            test = RuleTest(content.name.strip(), self.document.path, self.document.place(("tests", number)).line)
+            test = RuleTest(
+                content.name.strip(),
+                self.document.path,
+                self.document.place(("tests", number)).line,
+            )
             try:
                 yield replace(test, **_looked_up(content, knowledge, self.document.path.parent))
             except InputError as error:
@@ -159,7 +169,10 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
     reader.declare(test.given.facts)
     triples = tuple(map(reader.triple, test.given.facts))
     return {
-        "situations": tuple(Situation(each, triples, words) for each, words in _states(test.given, knowledge, folder)),
+        "situations": tuple(
+            Situation(each, triples, words)
+            for each, words in _states(test.given, knowledge, folder)
+        ),
         "follows": {reader.fact(text): reader.triple(text) for text in test.follows},
         "follows_not": tuple(map(reader.fact, test.follows_not)),
         "decides": {name: _choice(base, name, words) for name, words in test.decides.items()},
@@ -169,20 +182,28 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
 
 def _choice(base: Ontology, function: str, words: str) -> str:
     if function not in base.functions:
-        raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions))
+        raise InputError(
+            f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions)
+        )
     known, choice = (*base.designs(function), STAYS, NONE_LEFT), words.strip()
     if choice not in known:
-        raise InputError(f"{function} has no function design {shown(choice)}", remedy=did_you_mean(choice, known))
+        raise InputError(
+            f"{function} has no function design {shown(choice)}", remedy=did_you_mean(choice, known)
+        )
     return choice
 
 
-def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[tuple[KnowledgeState, str]]:
+def _states(
+    given: _Given, knowledge: KnowledgeBase, folder: Path
+) -> Iterator[tuple[KnowledgeState, str]]:
     """The states of a test, one for each region of measured values, with words for it."""
     builder = StateBuilder(knowledge.base, knowledge.settings)
     if given.mission is not None and given.at_s is not None:
         builder.add_state(recorded_state(folder / given.mission, given.at_s, given.run))
     elif given.mission is not None or given.at_s is not None:
-        raise InputError("mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7")
+        raise InputError(
+            "mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7"
+        )
     regions: dict[str, Region] = {}
     for kind, name, value, _ in given.parts():
         region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
@@ -202,7 +223,8 @@ class TestResult:
     """What came of a test, and how long it took, explanations included.
 
     Attributes:
-        failures: the lines of each expectation that does not hold: what is wrong, then in which state, and why.
+        failures: the lines of each expectation that does not hold: what is wrong, then in which
+            state, and why.
     """
 
     __test__ = False  # pytest takes it for a test otherwise
@@ -217,7 +239,8 @@ class TestResult:
 
 
 def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
-    """Run a test on a knowledge base, and explain what fails in the first situation in which something does.
+    """Run a test on a knowledge base, and explain what fails in the first situation in which
+    something does.
 
     Raises:
         ReasonerTimeoutError: the reasoner takes too long.
@@ -239,8 +262,12 @@ def passes(test: RuleTest, outcome: Decide) -> bool:
     return not any(True for situation in test.situations for _ in _unmet(test, situation, outcome))
 
 
-def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide) -> Iterator[tuple[str, Fact | str | None]]:
-    """Each expectation that does not hold in a situation, in words, and the fact or function that it is about."""
+def _unmet(
+    test: RuleTest, situation: Situation, outcome_of: Decide
+) -> Iterator[tuple[str, Fact | str | None]]:
+    """Each expectation that does not hold in a situation, in words, and the fact or function that
+    it is about.
+    """
     try:
         outcome = outcome_of(situation)
     except ReasonerTimeoutError:
@@ -254,7 +281,9 @@ def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide) -> Iterator
         return
     if test.contradicts:
         yield "the situation does not contradict itself", None
-    yield from ((f"{fact} does not follow", fact) for fact in test.follows if fact not in outcome.known)
+    yield from (
+        (f"{fact} does not follow", fact) for fact in test.follows if fact not in outcome.known
+    )
     yield from ((f"{fact} follows", fact) for fact in test.follows_not if fact in outcome.known)
     for function, wanted in test.decides.items():
         chosen, present = outcome.choice(function), situation.state.grounded(function)
@@ -263,7 +292,9 @@ def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide) -> Iterator
             yield f"{function}: {happens}, not {wanted}", function
 
 
-def _because(knowledge: KnowledgeBase, test: RuleTest, situation: Situation, about: Fact | str | None) -> Iterator[str]:
+def _because(
+    knowledge: KnowledgeBase, test: RuleTest, situation: Situation, about: Fact | str | None
+) -> Iterator[str]:
     """Why a fact follows or does not, or a function is decided as it is."""
     state = situation.state
     try:
@@ -280,7 +311,9 @@ def _because(knowledge: KnowledgeBase, test: RuleTest, situation: Situation, abo
         elif about is not None:
             reasoning = knowledge.infer(state)
             decisions = [each for each in reasoning.plan.decisions if each.function == about]
-            yield from (str(each) for one in decisions for each in verdicts(knowledge.base, reasoning, one))
+            yield from (
+                str(each) for one in decisions for each in verdicts(knowledge.base, reasoning, one)
+            )
             if not decisions:
                 yield f"the objective of {about} requires no adaptation"
     except InputError as error:
@@ -292,7 +325,12 @@ def junit_xml(results: Sequence[TestResult]) -> bytes:
     root = etree.Element("testsuites", name="suave-des kb test")
     for file in dict.fromkeys(result.test.file for result in results):
         own = [result for result in results if result.test.file == file]
-        counts = {"tests": len(own), "failures": sum(not each.passed for each in own), "errors": 0, "skipped": 0}
+        counts = {
+            "tests": len(own),
+            "failures": sum(not each.passed for each in own),
+            "errors": 0,
+            "skipped": 0,
+        }
         time_s = f"{sum(result.duration_s for result in own):.3f}"
         suite = etree.SubElement(root, "testsuite", name=str(file), time=time_s)
         suite.attrib.update({name: str(count) for name, count in counts.items()})
@@ -312,7 +350,10 @@ def _clean(text: str) -> str:
 
 
 def tests_text(
-    about: Tested, knowledge: KnowledgeBase, states: Iterable[tuple[str, KnowledgeState]], comment: str
+    about: Tested,
+    knowledge: KnowledgeBase,
+    states: Iterable[tuple[str, KnowledgeState]],
+    comment: str,
 ) -> str:
     """Write tests that expect what follows in states now.
 
@@ -324,13 +365,21 @@ def tests_text(
         KnowledgeError: the reasoner takes too long.
     """
     content: dict[str, Any] = {
-        key: value if isinstance(value, str) else list(map(str, value)) for key, value in about.items() if value
+        key: value if isinstance(value, str) else list(map(str, value))
+        for key, value in about.items()
+        if value
     }
     content["tests"] = [
-        {"name": name, "given": _given(state), **_expected(state, knowledge.outcome(Situation(state)))}
+        {
+            "name": name,
+            "given": _given(state),
+            **_expected(state, knowledge.outcome(Situation(state))),
+        }
         for name, state in states
     ]
-    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=10**6)
+    text = yaml.safe_dump(
+        content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=10**6
+    )
     return f"# {comment}\n{text}"
 
 
@@ -346,14 +395,24 @@ def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, Any]:
     if outcome.reasoning is None:
         return {"contradiction": True}
     follows = {"follows": sorted(map(str, outcome.inferred))} if outcome.inferred else {}
-    return {**follows, "decides": {each.function: outcome.choice(each.function) for each in state.objectives}}
+    return {
+        **follows,
+        "decides": {each.function: outcome.choice(each.function) for each in state.objectives},
+    }
 
 
-def mission_states(mission: RecordedMission, base: Ontology) -> Iterator[tuple[float, KnowledgeState]]:
-    """The states of a recorded mission, each with its time in s, one for each kind that the rules can tell apart."""
+def mission_states(
+    mission: RecordedMission, base: Ontology
+) -> Iterator[tuple[float, KnowledgeState]]:
+    """The states of a recorded mission, each with its time in s, one for each kind that the rules
+    can tell apart.
+    """
     regions = regions_of(base)
     kinds = {regions.key(record.state): record for record in reversed(mission.records)}
-    return ((record.t_s, record.state) for record in sorted(kinds.values(), key=lambda record: record.t_s))
+    return (
+        (record.t_s, record.state)
+        for record in sorted(kinds.values(), key=lambda record: record.t_s)
+    )
 
 
 def mission_knowledge(mission: RecordedMission) -> Tested:
@@ -367,7 +426,9 @@ def mission_knowledge(mission: RecordedMission) -> Tested:
     files = [find(each, "ontology").absolute() for each in knowledge.ontologies]
     return {
         "scenario": name,
-        "ontologies": [] if all(file.parent == shipped_folder("ontology") for file in files) else files,
+        "ontologies": []
+        if all(file.parent == shipped_folder("ontology") for file in files)
+        else files,
         "rules": [find(each, "ontology").absolute() for each in knowledge.rules],
         "disabled_rules": list(knowledge.disabled_rules),
     }

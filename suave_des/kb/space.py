@@ -1,13 +1,16 @@
-"""Situations in which a knowledge base decides: all kinds that a policy tells apart, and what is decided in one.
+"""Situations in which a knowledge base decides: all kinds that a policy tells apart, and what is
+decided in one.
 
-States are places of measured values, reports of components and groundings. Only the number of components with a status
-counts where ontologies and rules treat components alike. Quality attributes are independent of one another where every
-comparison in a rule is between values of one of them: then a measured value counts by its place among the numbers of
-its own attribute, and not at all for functions whose designs expect no value of it. Where the schema or a rule has more
-to say, every value counts, as it is.
+States are places of measured values, reports of components and groundings. Only the number of
+components with a status counts where ontologies and rules treat components alike. Quality
+attributes are independent of one another where every comparison in a rule is between values of one
+of them: then a measured value counts by its place among the numbers of its own attribute, and not
+at all for functions whose designs expect no value of it. Where the schema or a rule has more to
+say, every value counts, as it is.
 
-A rule that only compares numbers cannot tell two values apart that compare alike with every number in the knowledge
-base. So one value stands for each range between two numbers; equality with a number is a range of its own.
+A rule that only compares numbers cannot tell two values apart that compare alike with every number
+in the knowledge base. So one value stands for each range between two numbers; equality with a
+number is a range of its own.
 """
 
 from __future__ import annotations
@@ -28,7 +31,17 @@ from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology
 from suave_des.knowledge.rdf import Lit, Triple
 from suave_des.knowledge.reasoner import Regions, regions_of
-from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, mirrored, texts_of
+from suave_des.knowledge.rules import (
+    COMPARISONS,
+    SAME,
+    Atom,
+    Named,
+    Rule,
+    Term,
+    Variable,
+    mirrored,
+    texts_of,
+)
 from suave_des.knowledge.state import NO_GROUNDING, STAYS, Fact, KnowledgeState, Reasoning, exact
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 
@@ -69,7 +82,11 @@ class Outcome:
     @property
     def known(self) -> frozenset[Fact]:
         """What was asserted or inferred; nothing where the situation contradicts itself."""
-        return self.inferred if self.reasoning is None else self.inferred | self.reasoning.inference.asserted
+        return (
+            self.inferred
+            if self.reasoning is None
+            else self.inferred | self.reasoning.inference.asserted
+        )
 
     @property
     def changes(self) -> dict[str, str]:
@@ -82,7 +99,9 @@ class Outcome:
         return () if self.reasoning is None else tuple(sorted(self.reasoning.inference.statuses))
 
     def choice(self, function: str) -> str:
-        """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
+        """What happens to a function's grounding: a design, "stays", "none left" or
+        "inconsistent".
+        """
         return INCONSISTENT if self.reasoning is None else self.changes.get(function, STAYS)
 
 
@@ -91,36 +110,49 @@ OnCount = Callable[[int, int], object]
 
 
 def differing_decisions(one: Outcome, other: Outcome) -> Iterator[tuple[str, str, str]]:
-    """Function, and what happens to its grounding in one outcome and in another, where that differs."""
+    """Function, and what happens to its grounding in one outcome and in another, where that
+    differs.
+    """
     for name in sorted({*one.changes, *other.changes}):
         if one.choice(name) != other.choice(name):
             yield name, one.choice(name), other.choice(name)
 
 
 def difference(one: Outcome, other: Outcome) -> str:
-    """Tell the first difference in what follows and is decided, in words about the second; empty: none."""
+    """Tell the first difference in what follows and is decided, in words about the second; empty:
+    none.
+    """
     if (one.reasoning is None) != (other.reasoning is None):
-        return "it contradicts itself" if other.reasoning is None else "it no longer contradicts itself"
+        return (
+            "it contradicts itself"
+            if other.reasoning is None
+            else "it no longer contradicts itself"
+        )
     for name, before, after in differing_decisions(one, other):
         return f"{name}: {after}, not {before}"
     for missing in sorted(map(str, one.inferred - other.inferred)):
         return f"{missing} does not follow"
     for more in sorted(map(str, other.inferred - one.inferred)):
         return f"{more} follows"
-    return "" if one.statuses == other.statuses else f"statuses: {'; '.join(other.statuses) or 'none'}"
+    return (
+        "" if one.statuses == other.statuses else f"statuses: {'; '.join(other.statuses) or 'none'}"
+    )
 
 
 def compare(
     one: Decide, other: Decide, situations: Iterable[Situation]
 ) -> Iterator[tuple[Situation, Outcome, Outcome]]:
-    """Find the situations in which two knowledge bases conclude or decide differently, with both outcomes."""
+    """Find the situations in which two knowledge bases conclude or decide differently, with both
+    outcomes.
+    """
     for situation in situations:
         before, after = one(situation), other(situation)
         if before is not after and difference(before, after):
             yield situation, before, after
 
 
-#: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would take ten minutes.
+#: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would
+# take ten minutes.
 LARGEST: Final = 400_000
 _SIGN: Final = re.compile("([<>]=?)")
 _MISSING: Final = "not measured"
@@ -128,7 +160,8 @@ _MISSING: Final = "not measured"
 
 @dataclass(frozen=True)
 class Scale:
-    """The places that a measured value can have among numbers: 0 is no measurement, then ranges and numbers take turns.
+    """The places that a measured value can have among numbers: 0 is no measurement, then ranges and
+    numbers take turns.
 
     >>> Scale((Decimal("1.25"), Decimal("2.25"))).text(2, 3)  # the numbers are ascending
     '1.25 <= . < 2.25'
@@ -151,7 +184,9 @@ class Scale:
         return self.numbers[(place - 1) // 2] if 0 < place < len(self) - 1 else None
 
     def text(self, first: int, last: int | None = None) -> str:
-        """Neighbouring places in words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . < 2.25"."""
+        """Neighbouring places in words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . <
+        2.25".
+        """
         last = first if last is None else last
         if first == 0:
             return _MISSING if last == 0 else f"{_MISSING} or {self.text(1, last)}"
@@ -161,10 +196,16 @@ class Scale:
         below = "" if high is None else f"{'<' if last % 2 else '<='} {high}"
         if low is None:
             return below or "any"
-        return f"{low} {'<' if first % 2 else '<='} . {below}" if below else f"{'>' if first % 2 else '>='} {low}"
+        return (
+            f"{low} {'<' if first % 2 else '<='} . {below}"
+            if below
+            else f"{'>' if first % 2 else '>='} {low}"
+        )
 
     def value(self, place: int, rank: int = 0, ranks: int = 1) -> Decimal | None:
-        """A value there, above 0 if there is one; in a range the `rank`-th of `ranks` ascending ones."""
+        """A value there, above 0 if there is one; in a range the `rank`-th of `ranks` ascending
+        ones.
+        """
         low, high = self.low(place), self._high(place)
         if place % 2 == 0:
             return low
@@ -176,9 +217,14 @@ class Scale:
     def values(self, places: Sequence[int]) -> Iterator[tuple[Decimal | None, ...]]:
         """Values of several attributes at given places, for every order that the values can have.
 
-        Values at different places are ordered by these; those in the same range can be in any order, and equal.
+        Values at different places are ordered by these; those in the same range can be in any
+        order, and equal.
         """
-        groups = [[n for n, each in enumerate(places) if each == place] for place in dict.fromkeys(places) if place % 2]
+        groups = [
+            [n for n, each in enumerate(places) if each == place]
+            for place in dict.fromkeys(places)
+            if place % 2
+        ]
         for ranks in itertools.product(*(_weak_orders(len(group)) for group in groups)):
             values = list(map(self.value, places))
             for group, order in zip(groups, ranks, strict=True):
@@ -193,7 +239,8 @@ def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
     return (each for each in ranks if set(each) == set(range(max(each) + 1)))
 
 
-#: Measured values that a test is about: all that compare as given with numbers; empty: no measurement.
+#: Measured values that a test is about: all that compare as given with numbers; empty: no
+# measurement.
 Region = tuple[tuple[str, Decimal], ...]
 
 
@@ -205,7 +252,8 @@ def is_in(region: Region, value: Decimal | None) -> bool:
 
 
 def parse_region(text: str) -> Region | None:
-    """Read a region as `kb policy` writes it, such as "1.25 <= . < 2.25"; None for what is none, such as a number.
+    """Read a region as `kb policy` writes it, such as "1.25 <= . < 2.25"; None for what is none,
+    such as a number.
 
     Raises:
         InputError: there is no number in it.
@@ -220,7 +268,8 @@ def parse_region(text: str) -> Region | None:
     remedy = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
     try:
         region = tuple(
-            (sign, exact(right)) if left == "." else (mirrored(sign), exact(left)) for left, sign, right in sides
+            (sign, exact(right)) if left == "." else (mirrored(sign), exact(left))
+            for left, sign, right in sides
         )
     except KnowledgeError:
         raise InputError(f"{shown(text)} is not a region", remedy=remedy) from None
@@ -231,37 +280,55 @@ def parse_region(text: str) -> Region | None:
     return region
 
 
-def measurements_in(base: Ontology, regions: Mapping[str, Region]) -> Iterator[tuple[dict[str, Decimal | None], str]]:
-    """Measured values in the regions of attributes, one for each kind that comparing rules tell apart, with words."""
+def measurements_in(
+    base: Ontology, regions: Mapping[str, Region]
+) -> Iterator[tuple[dict[str, Decimal | None], str]]:
+    """Measured values in the regions of attributes, one for each kind that comparing rules tell
+    apart, with words.
+    """
     ends = {number for region in regions.values() for _, number in region}
     scale = Scale(tuple(sorted({*regions_of(base).thresholds, *ends})))
-    inside = ([at for at in range(len(scale)) if is_in(region, scale.value(at))] for region in regions.values())
+    inside = (
+        [at for at in range(len(scale)) if is_in(region, scale.value(at))]
+        for region in regions.values()
+    )
     for places in itertools.product(*inside):
-        words = ", ".join(f"{name} {scale.text(at)}" for name, at in zip(regions, places, strict=True))
+        words = ", ".join(
+            f"{name} {scale.text(at)}" for name, at in zip(regions, places, strict=True)
+        )
         for values in scale.values(places):
             yield dict(zip(regions, values, strict=True)), words
 
 
 _CARRIED: Final = frozenset({rdf.IS_QA_TYPE, rdf.HAS_VALUE})
 _OF_VALUES: Final = _CARRIED | {rdf.HAS_QA_VALUE, rdf.TOMASYS + "hasQAestimation"}
-#: What a schema may say of these properties without relating values of one attribute to those of another.
-_HARMLESS: Final = {(rdf.RDF_TYPE, kind) for kind in rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty")} | {
-    (name, None) for name in rdf.terms(rdf.RDFS, "domain range")
-}
-_FUNCTIONAL: Final = frozenset((name, rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty") for name in _CARRIED)
+#: What a schema may say of these properties without relating values of one attribute to those of
+# another.
+_HARMLESS: Final = {
+    (rdf.RDF_TYPE, kind) for kind in rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty")
+} | {(name, None) for name in rdf.terms(rdf.RDFS, "domain range")}
+_FUNCTIONAL: Final = frozenset(
+    (name, rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty") for name in _CARRIED
+)
 
 
 def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None = None) -> bool:
-    """Whether a measured value of a quality attribute can have any effect, on decisions for some functions or for any.
+    """Whether a measured value of a quality attribute can have any effect, on decisions for some
+    functions or for any.
 
-    It has none if none of their designs expects one, and no rule can match the individual that carries it: what is
-    known of that is its class, isQAtype and hasValue. Where the schema has more to say (class expressions, properties
-    related to these), the attribute counts as one with an effect.
+    It has none if none of their designs expects one, and no rule can match the individual that
+    carries it: what is known of that is its class, isQAtype and hasValue. Where the schema has more
+    to say (class expressions, properties related to these), the attribute counts as one with an
+    effect.
     """
     iri = base.model.attributes[attribute]
     measured = base.model.measurements[attribute]
     triples = base.content.triples
-    designs = base.model.estimated if functions is None else itertools.chain(*map(base.designs, functions))
+    designs = (
+        base.model.estimated
+        if functions is None
+        else itertools.chain(*map(base.designs, functions))
+    )
     is_expected = any(attribute in base.model.estimated[name] for name in designs)
     if is_expected or base.model.own[measured] or has_expressions(base):
         return True
@@ -274,25 +341,39 @@ def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None =
         return True
     # The classes of the individual: QAvalue, what the domains of its properties say, and all above.
     domains = {str(o) for s, p, o in triples if p == rdf.RDFS + "domain" and s in _CARRIED}
-    above = ((s, str(o)) for s, p, o in triples if p in (rdf.RDFS + "subClassOf", rdf.OWL + "equivalentClass"))
+    above = (
+        (s, str(o))
+        for s, p, o in triples
+        if p in (rdf.RDFS + "subClassOf", rdf.OWL + "equivalentClass")
+    )
     classes = rdf.reached({rdf.TOMASYS + "QAvalue", rdf.OWL + "Thing", *domains}, above)
     return any(_can_match(rule, iri, measured, classes) for rule in base.content.enabled_rules)
 
 
 def has_expressions(base: Ontology) -> bool:
     """Whether the ontologies have class expressions."""
-    return any(f"<{rdf.OWL}{kind}>" in line for kind in ("Class", "Restriction") for line in base.content.structure)
+    return any(
+        f"<{rdf.OWL}{kind}>" in line
+        for kind in ("Class", "Restriction")
+        for line in base.content.structure
+    )
 
 
 def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> bool:
-    """Whether a variable of a rule, or a name in it, can stand for the individual of a measured value."""
+    """Whether a variable of a rule, or a name in it, can stand for the individual of a measured
+    value.
+    """
 
     def could_hold(atom: Atom, term: Variable) -> bool:
         if atom.arguments[0] != term:
             return False
         if atom.predicate == rdf.IS_QA_TYPE:
-            return isinstance(atom.arguments[-1], Variable) or atom.arguments[-1] == Named(attribute)
-        return atom.predicate in classes if atom.kind == "class" else atom.predicate == rdf.HAS_VALUE
+            return isinstance(atom.arguments[-1], Variable) or atom.arguments[-1] == Named(
+                attribute
+            )
+        return (
+            atom.predicate in classes if atom.kind == "class" else atom.predicate == rdf.HAS_VALUE
+        )
 
     terms = {term for atom in rule.atoms for term in atom.arguments}
     if Named(measured) in terms or any(atom.kind in ("same", "different") for atom in rule.atoms):
@@ -306,7 +387,9 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
 
 
 def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
-    """Group the components that can be exchanged: doing so maps ontologies and rules onto themselves."""
+    """Group the components that can be exchanged: doing so maps ontologies and rules onto
+    themselves.
+    """
     groups: dict[str, list[str]] = {}
     for name in base.model.components:
         first = next((each for each in groups if _exchangeable(base, each, name)), name)
@@ -317,24 +400,35 @@ def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
 def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     model, content = base.model, base.content
     a, b = model.components[one], model.components[other]
-    rules = (Named(iri) in atom.arguments for iri in (a, b) for rule in content.enabled_rules for atom in rule.atoms)
+    rules = (
+        Named(iri) in atom.arguments
+        for iri in (a, b)
+        for rule in content.enabled_rules
+        for atom in rule.atoms
+    )
     if any(rules) or any(f"<{iri}>" in line for iri in (a, b) for line in content.structure):
         return False
     swap: dict[str | Lit, str] = {a: b, b: a}
     known = (*content.triples, *model.own[a], *model.own[b])
     own = {triple for triple in known if triple[0] in swap or triple[2] in swap}
-    return own == {(swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own}
+    return own == {
+        (swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own
+    }
 
 
 #: (component, c_status) of those that report.
 Reports = tuple[tuple[str, str], ...]
 
 
-def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int) -> dict[Reports, int]:
-    """All that at most so many components can report, up to an exchange in their group, fewest reports first.
+def component_reports(
+    groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int
+) -> dict[Reports, int]:
+    """All that at most so many components can report, up to an exchange in their group, fewest
+    reports first.
 
     Returns:
-        reports of the first ones of each group of interchangeable components, with the number for which they stand.
+        reports of the first ones of each group of interchangeable components, with the number for
+        which they stand.
     """
     ways = (
         [
@@ -348,9 +442,15 @@ def component_reports(groups: Sequence[Sequence[str]], statuses: Sequence[str], 
     for chosen in itertools.product(*ways):
         if sum(map(len, chosen)) <= most:
             both = list(zip(groups, chosen, strict=True))
-            components = sorted(pair for group, named in both for pair in zip(group, named, strict=False))
-            alike = prod(factorial(number) for named in chosen for number in Counter(named).values())
-            found[tuple(components)] = prod(perm(len(group), len(named)) for group, named in both) // alike
+            components = sorted(
+                pair for group, named in both for pair in zip(group, named, strict=False)
+            )
+            alike = prod(
+                factorial(number) for named in chosen for number in Counter(named).values()
+            )
+            found[tuple(components)] = (
+                prod(perm(len(group), len(named)) for group, named in both) // alike
+            )
     return found
 
 
@@ -363,7 +463,8 @@ class PolicySpace:
         numbers: ends of the ranges, ascending.
         alike: groups of interchangeable components.
         statuses: that components can report.
-        functions: that have a design, if only in one of two knowledge bases; without one there is nothing to ask for.
+        functions: that have a design, if only in one of two knowledge bases; without one there is
+            nothing to ask for.
     """
 
     attributes: tuple[str, ...]
@@ -375,12 +476,22 @@ class PolicySpace:
     @classmethod
     def of(cls, base: Ontology, settings: ManagingSettings) -> PolicySpace:
         """What can have an effect in these ontologies."""
-        attributes = tuple(name for name in measured_attributes(base, settings) if has_effect(base, name))
+        attributes = tuple(
+            name for name in measured_attributes(base, settings) if has_effect(base, name)
+        )
         functions = tuple(name for name in base.functions if base.designs(name))
         # What the thruster monitor reports, and what enabled rules ask for.
-        asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), rdf.C_STATUS)
+        asked = texts_of(
+            (atom for rule in base.content.enabled_rules for atom in rule.body), rdf.C_STATUS
+        )
         statuses = tuple(sorted({*asked, FAILED, RECOVERED}))
-        return cls(attributes, regions_of(base).thresholds, interchangeable_components(base), statuses, functions)
+        return cls(
+            attributes,
+            regions_of(base).thresholds,
+            interchangeable_components(base),
+            statuses,
+            functions,
+        )
 
     @property
     def scale(self) -> Scale:
@@ -388,10 +499,15 @@ class PolicySpace:
         return Scale(self.numbers)
 
     def common(self, other: PolicySpace) -> PolicySpace:
-        """What has an effect in either; components are alike only if they are so in both that have them."""
+        """What has an effect in either; components are alike only if they are so in both that have
+        them.
+        """
         groups: dict[tuple[int, ...], list[str]] = {}
         for name in dict.fromkeys(name for group in (*self.alike, *other.alike) for name in group):
-            places = (next((n for n, group in enumerate(s.alike) if name in group), -1) for s in (self, other))
+            places = (
+                next((n for n, group in enumerate(s.alike) if name in group), -1)
+                for s in (self, other)
+            )
             groups.setdefault(tuple(places), []).append(name)
         return PolicySpace(
             tuple(sorted({*self.attributes, *other.attributes})),
@@ -407,13 +523,16 @@ def measured_attributes(base: Ontology, settings: ManagingSettings) -> list[str]
     return sorted(name for name in settings.measured if name in base.model.attributes)
 
 
-#: One side of a comparison: IRIs of quality attributes whose values it can be, and numbers; _ANY: of any attribute.
+#: One side of a comparison: IRIs of quality attributes whose values it can be, and numbers; _ANY:
+# of any attribute.
 _Side = frozenset[str | Decimal]
 _ANY: Final = ""
 
 
 def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] | None:
-    """The regions of each attribute's values, where rules compare them with numbers of that attribute only."""
+    """The regions of each attribute's values, where rules compare them with numbers of that
+    attribute only.
+    """
     known = base.model.attributes
     if not known.keys() >= {*attributes} or not regions_of(base).is_sound or not _is_plain(base):
         return None
@@ -423,27 +542,41 @@ def _regions(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] 
         for one, other in _compared(rule):
             concerned = measured & (one | other)
             if _ANY in one | other:
-                if not any(all(isinstance(each, Decimal) for each in side) for side in (one, other)):
+                if not any(
+                    all(isinstance(each, Decimal) for each in side) for side in (one, other)
+                ):
                     return None
                 concerned = measured
             elif len(concerned) > 1:
                 return None
             for attribute in concerned:
                 for each in one | other:
-                    numbers[attribute] |= {each} if isinstance(each, Decimal) else _values(base, each)
+                    numbers[attribute] |= (
+                        {each} if isinstance(each, Decimal) else _values(base, each)
+                    )
     return {name: Regions(tuple(sorted(numbers[known[name]])), ()) for name in attributes}
 
 
 def _values(base: Ontology, attribute: str) -> set[Decimal]:
     """The numbers that the ontologies give of a quality attribute."""
     triples = base.content.triples
-    typed = {subject for subject, predicate, value in triples if predicate == rdf.IS_QA_TYPE and value == attribute}
-    values = (value for subject, predicate, value in triples if predicate == rdf.HAS_VALUE and subject in typed)
+    typed = {
+        subject
+        for subject, predicate, value in triples
+        if predicate == rdf.IS_QA_TYPE and value == attribute
+    }
+    values = (
+        value
+        for subject, predicate, value in triples
+        if predicate == rdf.HAS_VALUE and subject in typed
+    )
     return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
 
 
 def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
-    """Both sides of each comparison of values in a rule; a variable that is read twice compares what it reads."""
+    """Both sides of each comparison of values in a rule; a variable that is read twice compares
+    what it reads.
+    """
     types = {
         atom.arguments[0]: atom.arguments[1].iri
         for atom in rule.body
@@ -458,7 +591,10 @@ def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
         yield from itertools.combinations([*sides, *_number(term)], 2)
     for atom in rule.body:
         if atom.predicate in COMPARISONS:
-            sides = [frozenset[str | Decimal]().union(*read.get(term, ()), *_number(term)) for term in atom.arguments]
+            sides = [
+                frozenset[str | Decimal]().union(*read.get(term, ()), *_number(term))
+                for term in atom.arguments
+            ]
             yield from itertools.combinations(sides, 2)
 
 
@@ -471,10 +607,14 @@ def _number(term: Term) -> list[_Side]:
 
 
 def _is_plain(base: Ontology) -> bool:
-    """Whether nothing but rules that compare can relate a value to others: no axiom, and no rule that asserts one."""
+    """Whether nothing but rules that compare can relate a value to others: no axiom, and no rule
+    that asserts one.
+    """
     triples = base.content.triples
     schema = {(s, p, o) for s, p, o in triples if s in _OF_VALUES or o in _OF_VALUES} - _FUNCTIONAL
-    functional = {s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"}
+    functional = {
+        s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"
+    }
     own = [(s, p) for s, p, o in triples if p in functional and isinstance(o, str)]
     atoms = [atom for rule in base.content.enabled_rules for atom in rule.atoms]
     heads = [atom for rule in base.content.enabled_rules for atom in rule.head]
@@ -486,14 +626,16 @@ def _is_plain(base: Ontology) -> bool:
         or any(base.model.own[measurement] for measurement in base.model.measurements.values())
         or any(atom.kind in ("same", "different") for atom in atoms)
         or any(
-            atom.predicate in _OF_VALUES or (atom.kind == "object" and atom.predicate in functional) for atom in heads
+            atom.predicate in _OF_VALUES or (atom.kind == "object" and atom.predicate in functional)
+            for atom in heads
         )
     )
 
 
 @dataclass(frozen=True)
 class States:
-    """Every kind of state that a space tells apart: any measured values, with any reports and any task.
+    """Every kind of state that a space tells apart: any measured values, with any reports and any
+    task.
 
     Attributes:
         measured: (attribute, value) of those attributes that are measured.
@@ -507,8 +649,11 @@ class States:
     tasks: tuple[KnowledgeState, ...]
 
     @classmethod
-    def of(cls, base: Ontology, settings: ManagingSettings, max_failed: int, space: PolicySpace) -> States:
-        """Find the kinds of states of a knowledge base in which at most `max_failed` components report a status.
+    def of(
+        cls, base: Ontology, settings: ManagingSettings, max_failed: int, space: PolicySpace
+    ) -> States:
+        """Find the kinds of states of a knowledge base in which at most `max_failed` components
+        report a status.
 
         Raises:
             InputError: max_failed is negative, or there would be too many states.
@@ -519,16 +664,24 @@ class States:
         tasks = tuple(_tasks(base, settings, space))
         scale, attributes = space.scale, space.attributes
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
-        if total <= LARGEST:  # else so many already that it does not matter how many values a range has
+        if (
+            total <= LARGEST
+        ):  # else so many already that it does not matter how many values a range has
             measured = tuple(
-                tuple((name, each) for name, each in zip(attributes, values, strict=True) if each is not None)
+                tuple(
+                    (name, each)
+                    for name, each in zip(attributes, values, strict=True)
+                    if each is not None
+                )
                 for places in itertools.product(range(len(scale)), repeat=len(attributes))
                 for values in scale.values(places)
             )
             total = len(measured) * len(reports) * len(tasks)
         if total > LARGEST:
             remedy = f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes"
-            raise InputError(f"the policy has {total:,} kinds of states, which is too many", remedy=remedy)
+            raise InputError(
+                f"the policy has {total:,} kinds of states, which is too many", remedy=remedy
+            )
         return cls(space, measured, reports, tasks)
 
     def __len__(self) -> int:
@@ -548,21 +701,27 @@ class States:
         """Describe some of the states, one in each row.
 
         Returns:
-            a data frame: the place of each attribute's value on the scale; the `components` that report; how many
-            `states` it stands for, as interchangeable components count one by one; and of each function with an
-            objective the grounding `_now`, else empty.
+            a data frame: the place of each attribute's value on the scale; the `components` that
+            report; how many `states` it stands for, as interchangeable components count one by one;
+            and of each function with an objective the grounding `_now`, else empty.
         """
         import pandas  # an inference alone needs none, the larger part of its start
 
         columns: dict[str, list[Any]] = {}
         for name in self.space.attributes:
-            columns[name] = [self.space.scale.place(dict(state.measurements).get(name)) for state in states]
-        columns["components"] = ["; ".join(f"{name}={status}" for name, status in each.components) for each in states]
+            columns[name] = [
+                self.space.scale.place(dict(state.measurements).get(name)) for state in states
+            ]
+        columns["components"] = [
+            "; ".join(f"{name}={status}" for name, status in each.components) for each in states
+        ]
         columns["states"] = [self.reports[state.components] for state in states]
         for name in self.functions:
             asked = (any(each.function == name for each in state.objectives) for state in states)
             now = (state.grounded(name) or NO_GROUNDING for state in states)
-            columns[f"{name}_now"] = [design if is_asked else "" for design, is_asked in zip(now, asked, strict=True)]
+            columns[f"{name}_now"] = [
+                design if is_asked else "" for design, is_asked in zip(now, asked, strict=True)
+            ]
         return pandas.DataFrame(columns)
 
     def shared(self, other: States) -> States:
@@ -570,8 +729,12 @@ class States:
         return replace(self, tasks=tuple(task for task in self.tasks if task in other.tasks))
 
 
-def add_decisions(cases: Any, states: States, outcomes: Sequence[Outcome], suffix: str = "") -> None:
-    """Add to a frame of states the inferred `statuses`, and what happens to the grounding of each function, `_then`."""
+def add_decisions(
+    cases: Any, states: States, outcomes: Sequence[Outcome], suffix: str = ""
+) -> None:
+    """Add to a frame of states the inferred `statuses`, and what happens to the grounding of each
+    function, `_then`.
+    """
     cases[f"statuses{suffix}"] = ["; ".join(outcome.statuses) for outcome in outcomes]
     for name in states.functions:
         then = map(Outcome.choice, outcomes, itertools.repeat(name))
@@ -580,25 +743,39 @@ def add_decisions(cases: Any, states: States, outcomes: Sequence[Outcome], suffi
         ]
 
 
-def _tasks(base: Ontology, settings: ManagingSettings, space: PolicySpace) -> Iterator[KnowledgeState]:
+def _tasks(
+    base: Ontology, settings: ManagingSettings, space: PolicySpace
+) -> Iterator[KnowledgeState]:
     solvable = [name for name in base.functions if base.designs(name) or name in space.functions]
     lasting = [name for name in LASTING if name in solvable]
     for asked in [(*lasting, name) for name in solvable if name not in lasting] or [tuple(lasting)]:
         for designs in itertools.product(*((None, *base.designs(name)) for name in asked)):
-            groundings = {name: design for name, design in zip(asked, designs, strict=True) if design is not None}
+            groundings = {
+                name: design
+                for name, design in zip(asked, designs, strict=True)
+                if design is not None
+            }
             yield settings.state(dict.fromkeys(asked), groundings)
 
 
 def kind_of(base: Ontology, space: PolicySpace) -> Callable[[KnowledgeState], Hashable]:
-    """Make a function that returns what the decision in a state can depend on: the same for all decided alike."""
+    """Make a function that returns what the decision in a state can depend on: the same for all
+    decided alike.
+    """
     functions = {*base.functions, *space.functions}
-    effects = {each: [name for name in space.attributes if has_effect(base, name, [each])] for each in functions}
+    effects = {
+        each: [name for name in space.attributes if has_effect(base, name, [each])]
+        for each in functions
+    }
     regions = _regions(base, space.attributes)
 
     def kind(state: KnowledgeState) -> Hashable:
         relevant = {name for each in state.objectives for name in effects[each.function]}
         known = ((name, value) for name, value in state.measurements if name in relevant)
-        seen = tuple((name, value if regions is None else regions[name].region(value)) for name, value in known)
+        seen = tuple(
+            (name, value if regions is None else regions[name].region(value))
+            for name, value in known
+        )
         return state.objectives, state.groundings, state.components, seen
 
     return kind
@@ -611,10 +788,12 @@ def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount
         base: the ontologies and rules.
         states: to decide.
         decide: concludes what follows and is decided in a situation.
-        on_count: called with how many kinds of states have been inferred, first 0, and how many have to be.
+        on_count: called with how many kinds of states have been inferred, first 0, and how many
+            have to be.
 
     Returns:
-        what is decided in each of the states; a contradiction is told with the values of another one of its kind.
+        what is decided in each of the states; a contradiction is told with the values of another
+        one of its kind.
 
     Raises:
         KnowledgeError: there is nothing to decide, or the reasoner takes too long.
@@ -623,7 +802,11 @@ def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount
         problem = "no function has a function design, so there is nothing to decide"
         remedy = "give an ontology that uses TOMASys as suave.owl does"
         raise KnowledgeError(problem, file=", ".join(map(str, base.files)), remedy=remedy)
-    kind, different, decided = kind_of(base, states.space), dict[Hashable, KnowledgeState](), dict[Hashable, Outcome]()
+    kind, different, decided = (
+        kind_of(base, states.space),
+        dict[Hashable, KnowledgeState](),
+        dict[Hashable, Outcome](),
+    )
     for state in states:
         different.setdefault(kind(state), state)
     on_count(0, len(different))

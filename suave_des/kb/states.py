@@ -1,4 +1,6 @@
-"""States, facts and rules as people write them: in YAML files, on the command line, or as a recorded mission's time."""
+"""States, facts and rules as people write them: in YAML files, on the command line, or as a
+recorded mission's time.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,13 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
 from suave_des.knowledge.reasoner import triggers_adaptation
 from suave_des.knowledge.rules import Atom, Named, Rule, RuleError, Term, Variable, texts_of
-from suave_des.knowledge.rules.files import RulesFile, Vocabulary, check_rule, fatal_problems, looked_up
+from suave_des.knowledge.rules.files import (
+    RulesFile,
+    Vocabulary,
+    check_rule,
+    fatal_problems,
+    looked_up,
+)
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, ObjectiveState
 from suave_des.records.mission_folder import (
@@ -37,10 +45,11 @@ NEW_INDIVIDUAL: Final = "urn:suave-des:test#"
 
 @dataclass
 class FactReader:
-    """Reads facts that are written as atoms of rules, such as fg_status(fg_spiral_high, IN_ERROR_NFR).
+    """Reads facts that are written as atoms of rules, such as fg_status(fg_spiral_high,
+    IN_ERROR_NFR).
 
-    Text needs no quotes. A name that the ontologies do not have becomes a new individual where it first occurs as a
-    member of a class: Binding(b1).
+    Text needs no quotes. A name that the ontologies do not have becomes a new individual where it
+    first occurs as a member of a class: Binding(b1).
 
     Attributes:
         new: IRIs of the new individuals, by name.
@@ -67,10 +76,21 @@ class FactReader:
         atom = _parsed(text)
         if not 1 <= len(atom.arguments) <= 2 or any(atom.variables()):
             remedy = "name the individuals, as in Component(c_thruster_1) or fg_status(fg_spiral_high, IN_ERROR_NFR)"
-            raise InputError(f"{shown(text)} has a variable or too many arguments for a fact", remedy=remedy)
+            raise InputError(
+                f"{shown(text)} has a variable or too many arguments for a fact", remedy=remedy
+            )
         kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
-        iris = (atom.predicate,) if ":" in atom.predicate else self.base.vocabulary.candidates(atom.predicate)
-        declared = ((iri, kind) for iri in iris for kind in kinds if kind in self.base.vocabulary.kinds.get(iri, ()))
+        iris = (
+            (atom.predicate,)
+            if ":" in atom.predicate
+            else self.base.vocabulary.candidates(atom.predicate)
+        )
+        declared = (
+            (iri, kind)
+            for iri in iris
+            for kind in kinds
+            if kind in self.base.vocabulary.kinds.get(iri, ())
+        )
         predicate, kind = next(declared, ("", ""))
         if not predicate:
             problem = f"there is no {kinds[0].split()[-1]} {shown(local_name(atom.predicate))}"
@@ -90,7 +110,8 @@ class FactReader:
         """Read one fact, in the form in which inferences have it.
 
         Raises:
-            InputError: it is not a fact, a name in it is unknown, or it can never follow, for its value.
+            InputError: it is not a fact, a name in it is unknown, or it can never follow, for its
+                value.
         """
         subject, predicate, value = self.triple(text)
         if isinstance(value, Lit):
@@ -103,7 +124,11 @@ class FactReader:
 
     def _individuals(self, name: str) -> tuple[str, ...]:
         vocabulary = self.base.vocabulary
-        return tuple(iri for iri in vocabulary.candidates(name) if "individual" in vocabulary.kinds.get(iri, ()))
+        return tuple(
+            iri
+            for iri in vocabulary.candidates(name)
+            if "individual" in vocabulary.kinds.get(iri, ())
+        )
 
     def _individual(self, term: Term) -> str:
         if not isinstance(term, Named):
@@ -114,12 +139,16 @@ class FactReader:
             if found is not None:
                 return found
         known = [each for each in self.base.vocabulary.by_name if self._individuals(each)]
-        remedy = nearest(term.iri, (*known, *self.new)) or f"introduce it under facts, as Class({term.iri})"
+        remedy = (
+            nearest(term.iri, (*known, *self.new))
+            or f"introduce it under facts, as Class({term.iri})"
+        )
         raise InputError(f"there is no individual {shown(term.iri)}", remedy=remedy)
 
 
 def read_rules(given: str, vocabulary: Vocabulary) -> tuple[Rule, ...]:
-    """Read a rule that is given as "name: body -> head", or the rules of a file with the extension .swrl.
+    """Read a rule that is given as "name: body -> head", or the rules of a file with the extension
+    .swrl.
 
     Raises:
         InputError: there is no such file.
@@ -177,8 +206,8 @@ class ManagingSettings:
     """Behaviour of the managing subsystem that is not in the rules.
 
     Attributes:
-        improves_exceeded: whether an objective is also adapted when a measured value exceeds what its current design
-            expects (revision 2023).
+        improves_exceeded: whether an objective is also adapted when a measured value exceeds what
+            its current design expects (revision 2023).
         always_improved: functions whose objective has o_always_improve (revision 1.5).
         measured: quality attribute types that the scenario measures.
     """
@@ -198,17 +227,25 @@ class ManagingSettings:
         )
 
     def state(
-        self, objectives: Mapping[str, str | None], groundings: Mapping[str, str], **more: Mapping[str, Any]
+        self,
+        objectives: Mapping[str, str | None],
+        groundings: Mapping[str, str],
+        **more: Mapping[str, Any],
     ) -> KnowledgeState:
         """Make a state.
 
         Args:
-            objectives: o_status of each, by function; None: UNGROUNDED without a grounding, else no status.
+            objectives: o_status of each, by function; None: UNGROUNDED without a grounding, else no
+                status.
             groundings: function design by function.
             more: components and measurements, as KnowledgeState.of takes them.
         """
         asked = [
-            ObjectiveState(name, status or (None if name in groundings else UNGROUNDED), name in self.always_improved)
+            ObjectiveState(
+                name,
+                status or (None if name in groundings else UNGROUNDED),
+                name in self.always_improved,
+            )
             for name, status in objectives.items()
         ]
         return KnowledgeState.of(asked, groundings=groundings, **more)
@@ -229,10 +266,14 @@ class StateBuilder:
             InputError: the knowledge base has no such name, or the value makes no sense.
         """
         if name not in (known := self._known(kind)):
-            raise InputError(f"there is no {_NOUNS[kind]} {shown(name)}", remedy=did_you_mean(name, known))
+            raise InputError(
+                f"there is no {_NOUNS[kind]} {shown(name)}", remedy=did_you_mean(name, known)
+            )
         if kind == "measurements":
             if isinstance(value, bool) or not isinstance(value, int | float | str | Decimal):
-                raise InputError(f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8")
+                raise InputError(
+                    f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8"
+                )
             KnowledgeState.of(measurements={name: value})  # raises if it is not a number
         elif isinstance(value, bool):  # YAML reads a bare FALSE as one
             value = str(value).upper()
@@ -247,14 +288,26 @@ class StateBuilder:
         """Names that parts of a kind can have."""
         base = self.base
         model = base.model
-        return tuple({"components": model.components, "measurements": model.attributes}.get(kind, model.functions))
+        return tuple(
+            {"components": model.components, "measurements": model.attributes}.get(
+                kind, model.functions
+            )
+        )
 
     def _check_status(self, property_name: str, value: str) -> None:
-        """Reject a status that resembles one that a rule mentions, because nothing would follow from it."""
-        known = texts_of((atom for rule in self.base.rules for atom in rule.atoms), TOMASYS + property_name)
+        """Reject a status that resembles one that a rule mentions, because nothing would follow
+        from it.
+        """
+        known = texts_of(
+            (atom for rule in self.base.rules for atom in rule.atoms), TOMASYS + property_name
+        )
         if property_name == "o_status":
             known.add(UNGROUNDED)
-        if value not in known and not triggers_adaptation(value) and nearest(value.upper(), known) is not None:
+        if (
+            value not in known
+            and not triggers_adaptation(value)
+            and nearest(value.upper(), known) is not None
+        ):
             remedy = did_you_mean(value.upper(), sorted(known))
             raise InputError(f"no rule mentions the {property_name} {shown(value)}", remedy=remedy)
 
@@ -275,9 +328,10 @@ class StateBuilder:
         """Add parts of a state as they are written on the command line.
 
         Args:
-            words: each NAME=VALUE (a quality attribute with its measured value, a component with its status, or a
-                function with its design or the status of its objective), the name of a function that has an objective,
-                a YAML file of a state, or FOLDER@TIME for the last state that a mission recorded up to a time in s.
+            words: each NAME=VALUE (a quality attribute with its measured value, a component with
+                its status, or a function with its design or the status of its objective), the name
+                of a function that has an objective, a YAML file of a state, or FOLDER@TIME for the
+                last state that a mission recorded up to a time in s.
 
         Raises:
             InputError: it is none of these, or names what the knowledge base does not have.
@@ -297,7 +351,10 @@ class StateBuilder:
             except InputError as error:
                 if error.file is not None:
                     raise
-                remedy = error.remedy or "NAME=VALUE, a YAML file, or FOLDER@SECONDS of a recorded mission"
+                remedy = (
+                    error.remedy
+                    or "NAME=VALUE, a YAML file, or FOLDER@SECONDS of a recorded mission"
+                )
                 raise InputError(error.problem, place="--at", remedy=remedy) from None
 
     def _add_value(self, name: str, value: str) -> None:
@@ -310,7 +367,8 @@ class StateBuilder:
         self.add("objectives" if is_status else kind, name, value)
 
     def add_state(self, state: KnowledgeState) -> None:
-        """Add all parts of a state; reports about things that the ontologies do not have are ignored.
+        """Add all parts of a state; reports about things that the ontologies do not have are
+        ignored.
 
         Raises:
             InputError: the knowledge base lacks a function or a design.
@@ -321,7 +379,9 @@ class StateBuilder:
                     self.add(kind, name, value)
 
     def state(self) -> KnowledgeState:
-        """Build the state. Without objectives, it has those of the groundings, else those of the search task."""
+        """Build the state. Without objectives, it has those of the groundings, else those of the
+        search task.
+        """
         search = [name for name in (*LASTING, GENERATE_SEARCH_PATH) if name in self.base.functions]
         asked = self.parts["objectives"] or dict.fromkeys(self.parts["groundings"] or search)
         return self.settings.state(**self.parts | {"objectives": asked})
@@ -338,7 +398,8 @@ def state_dict(state: KnowledgeState) -> dict[str, Any]:
 
 
 def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
-    """Read the missions that recorded their states, with their folders; the run of a mission of its own is 0.
+    """Read the missions that recorded their states, with their folders; the run of a mission of its
+    own is 0.
 
     The folder is the output of a mission or of a campaign, or has such folders in it.
 
@@ -346,7 +407,9 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
         InputError: there is none, or a file cannot be read.
     """
     if not folder.is_dir():
-        raise InputError("no such folder", file=folder, remedy="give the folder that suave-des run --out wrote")
+        raise InputError(
+            "no such folder", file=folder, remedy="give the folder that suave-des run --out wrote"
+        )
     is_any_found = False
     for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
         if (each / KNOWLEDGE_FILE).is_file():
@@ -355,7 +418,9 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
             yield each, RecordedMission("", 0, 0, scenario, read_knowledge(each / KNOWLEDGE_FILE))
         if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
             is_any_found = True
-            yield from ((each, mission) for mission in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE))
+            yield from (
+                (each, mission) for mission in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE)
+            )
     if not is_any_found:
         problem = f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it"
         remedy = "record with run --manager metacontrol --out, or campaign --record-knowledge"
@@ -366,7 +431,9 @@ def _scenario(path: Path) -> Scenario:
     try:
         return Scenario.model_validate(read_json(path)["scenario"])
     except (ValueError, KeyError, TypeError):
-        raise InputError("is not a mission's record", file=path, remedy="run the mission again") from None
+        raise InputError(
+            "is not a mission's record", file=path, remedy="run the mission again"
+        ) from None
 
 
 def recorded_state(folder: Path, time: str | float, run: int = 0) -> KnowledgeState:
@@ -377,13 +444,18 @@ def recorded_state(folder: Path, time: str | float, run: int = 0) -> KnowledgeSt
         run: of the campaign whose folder it is; 0: the folder is the mission's own.
 
     Raises:
-        InputError: there is no such mission, the first state was recorded later, or the time is no number.
+        InputError: there is no such mission, the first state was recorded later, or the time is no
+            number.
     """
-    records = next((mission.records for _, mission in recorded_missions(folder) if mission.run == run), ())
+    records = next(
+        (mission.records for _, mission in recorded_missions(folder) if mission.run == run), ()
+    )
     try:
         before = [record.state for record in records if record.t_s <= float(time)]
     except ValueError:
-        raise InputError(f"{shown(time)} is not a time in seconds", remedy="such as flown@53.7") from None
+        raise InputError(
+            f"{shown(time)} is not a time in seconds", remedy="such as flown@53.7"
+        ) from None
     if not before:
         of = f" of run {run}" if run else ""
         remedy = "give a later time, or a run of the campaign"

@@ -1,7 +1,8 @@
 """Checks of a knowledge base that need no reasoner.
 
-A check is a function that yields findings. It is in CHECKS, at the end. Which rules cannot fire is an upper bound of
-what can hold in any state. `kb check` adds the shapes of the model (SHACL), and what Pellet says.
+A check is a function that yields findings. It is in CHECKS, at the end. Which rules cannot fire is
+an upper bound of what can hold in any state. `kb check` adds the shapes of the model (SHACL), and
+what Pellet says.
 """
 
 from __future__ import annotations
@@ -24,8 +25,23 @@ from suave_des.knowledge.ontology import OPERATORS, Content, Model, Ontology, wr
 from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import Lit, local_name
-from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term, Variable, write_atom
-from suave_des.knowledge.rules.files import WITHOUT_NAME, RulesFile, about_rule, fatal_problems, looked_up
+from suave_des.knowledge.rules import (
+    Atom,
+    Named,
+    Place,
+    Rule,
+    RuleError,
+    Term,
+    Variable,
+    write_atom,
+)
+from suave_des.knowledge.rules.files import (
+    WITHOUT_NAME,
+    RulesFile,
+    about_rule,
+    fatal_problems,
+    looked_up,
+)
 
 
 @dataclass(frozen=True)
@@ -39,11 +55,13 @@ class Subject:
         values: replaces the hasValue of named QAvalue individuals.
         modes: names of the modes by function; None skips the checks against them.
         needed: functions that the mission cannot do without.
-        operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
+        operators: qa_comparison_operator that the revision assumes of quality attribute types that
+            have none, by name.
         revision: the scenario's, for messages.
         reported: the statuses that the simulation reports, by component; None: that is not checked.
         measured: the quality attributes that the scenario measures; None: that is not checked.
-        reaction_thresholds_m: visibilities by which the mean reaction time is judged; None: that is not checked.
+        reaction_thresholds_m: visibilities by which the mean reaction time is judged; None: that is
+            not checked.
         time_limit_s: for Pellet.
     """
 
@@ -63,7 +81,9 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """What checks look at: the subject, and its ontologies and rules with the operators that the revision assumes."""
+    """What checks look at: the subject, and its ontologies and rules with the operators that the
+    revision assumes.
+    """
 
     subject: Subject
     base: Ontology
@@ -71,7 +91,10 @@ class Material:
     @cached_property
     def content(self) -> Content:
         """All that the files state, that which only holds in states, too."""
-        return replace(self.base.content, triples=tuple(dict.fromkeys((*self.base.content.triples, *self.base.stated))))
+        return replace(
+            self.base.content,
+            triples=tuple(dict.fromkeys((*self.base.content.triples, *self.base.stated))),
+        )
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -80,24 +103,35 @@ class Material:
 
     @cached_property
     def dead(self) -> list[tuple[Rule, Atom]]:
-        """The enabled rules that fire in no state, each with an atom of its body that can never hold.
+        """The enabled rules that fire in no state, each with an atom of its body that can never
+        hold.
 
-        An atom cannot hold if no ontology asserts its class or property, no state adds it and no rule that can fire
-        concludes it. Individuals and values are not distinguished. So every rule that is returned is dead, but not
-        every dead rule is returned.
+        An atom cannot hold if no ontology asserts its class or property, no state adds it and no
+        rule that can fire concludes it. Individuals and values are not distinguished. So every rule
+        that is returned is dead, but not every dead rule is returned.
         """
         content, model = self.content, self.base.model
         leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
         both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
         related = [(one, name, str(other)) for one, name, other in content.triples]
         steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
-        steps += [(other, one) for one, name, other in related if name in (*both_ways, rdf.RDFS + "subPropertyOf")]
+        steps += [
+            (other, one)
+            for one, name, other in related
+            if name in (*both_ways, rdf.RDFS + "subPropertyOf")
+        ]
         held = {rdf.OWL + "Thing", swrl.EXPRESSION}
         held |= rdf.terms(
-            rdf.TOMASYS, "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status"
+            rdf.TOMASYS,
+            "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status",
         )
-        held |= {*(name for _, name in rdf.memberships(content.triples)), *(name for _, name, _ in content.triples)}
-        held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
+        held |= {
+            *(name for _, name in rdf.memberships(content.triples)),
+            *(name for _, name, _ in content.triples),
+        }
+        held |= (
+            {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
+        )
         held |= {rdf.HAS_QA_VALUE} if any(model.estimated.values()) else set()
         structure = "".join(content.structure)
         waiting, possible = list(content.enabled_rules), rdf.reached(held, steps)
@@ -115,13 +149,24 @@ class Material:
 
     @cached_property
     def for_other_models(self) -> list[Rule]:
-        """The rules of TOMASys and mros, which have rules for any model, that need what this model does not have."""
-        known, rules = self.base.vocabulary.kinds, [rule for rule, _ in self.dead if self.is_of_metamodel(rule)]
-        return [rule for rule in rules if all(each.kind == "builtin" or each.predicate in known for each in rule.atoms)]
+        """The rules of TOMASys and mros, which have rules for any model, that need what this model
+        does not have.
+        """
+        known, rules = (
+            self.base.vocabulary.kinds,
+            [rule for rule, _ in self.dead if self.is_of_metamodel(rule)],
+        )
+        return [
+            rule
+            for rule in rules
+            if all(each.kind == "builtin" or each.predicate in known for each in rule.atoms)
+        ]
 
     def is_of_metamodel(self, rule: Rule) -> bool:
         """Whether a rule is one of TOMASys or mros."""
-        return any(source.path == rule.file and is_metamodel(source) for source in self.base.sources)
+        return any(
+            source.path == rule.file and is_metamodel(source) for source in self.base.sources
+        )
 
     def is_own(self, rule: Rule) -> bool:
         """Whether a rule is in a file that the user gave, and not one of TOMASys."""
@@ -134,7 +179,9 @@ class Material:
         file, line = place_of(name, self.base.sources)
         return Finding(level, message, str(file), line, remedy=remedy)
 
-    def suspicious(self, rule: Rule, place: Place | None, message: str, remedy: str | None = None) -> Finding:
+    def suspicious(
+        self, rule: Rule, place: Place | None, message: str, remedy: str | None = None
+    ) -> Finding:
         """Make a finding about a rule; of one in an imported ontology it is a note."""
         level = Level.WARN if self.is_own(rule) else Level.NOTE
         return about_rule(rule, message, place, remedy, level)
@@ -146,7 +193,8 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
     The sources are the subject's ontologies and their imports.
 
     Raises:
-        InputError: a file of rules cannot be read at all; the scenario names a value or a rule that is not there.
+        InputError: a file of rules cannot be read at all; the scenario names a value or a rule that
+            is not there.
     """
     files = [RulesFile.read(path) for path in subject.rules]
     try:
@@ -157,7 +205,9 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[F
     for file in files:
         findings += map(Finding.of, file.errors)
         if not file.parsed and not file.errors:
-            findings.append(Finding(Level.NOTE, "there is no rule in this file", file=str(file.path)))
+            findings.append(
+                Finding(Level.NOTE, "there is no rule in this file", file=str(file.path))
+            )
         groups.append(group := list[Rule]())
         for rule in file.parsed:
             try:
@@ -186,75 +236,127 @@ _PROPERTIES: Final = ("object property", "data property", "annotation property")
 def values(material: Material) -> Iterator[Finding]:
     """Find the values that no state can be compared with, or that contradict one another."""
     for subject, problem, remedy in wrong_values(material.base.stated):
-        yield material.about(Level.ERROR, local_name(subject), f"{local_name(subject)}: {problem}", remedy)
+        yield material.about(
+            Level.ERROR, local_name(subject), f"{local_name(subject)}: {problem}", remedy
+        )
 
 
 def undefined_names(material: Material) -> Iterator[Finding]:
-    """Find the classes, properties and individuals that are used and defined nowhere: most are misspelt.
+    """Find the classes, properties and individuals that are used and defined nowhere: most are
+    misspelt.
 
-    Only those of the ontologies' own namespaces: names of other vocabularies may be defined elsewhere.
+    Only those of the ontologies' own namespaces: names of other vocabularies may be defined
+    elsewhere.
     """
-    model, kinds, triples = material.base.model, material.base.vocabulary.kinds, material.content.triples
+    model, kinds, triples = (
+        material.base.model,
+        material.base.vocabulary.kinds,
+        material.content.triples,
+    )
     described = {subject for subject, _, _ in triples} | model.in_states
     namespaces = {rdf.namespace(iri) for iri in described}
     assumed = {(model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed}
     for subject, predicate, value in triples:
-        used: tuple[str, str, Collection[str]] | None = None  # words, what is used, what it should be
+        used: tuple[str, str, Collection[str]] | None = (
+            None  # words, what is used, what it should be
+        )
         is_term = isinstance(value, str) and not value.startswith(rdf.LANGUAGE_NAMESPACES)
         if predicate == rdf.RDF_TYPE or predicate in _ABOUT_CLASSES:
             wanted = ("class", "datatype") if predicate == rdf.RDFS + "range" else ("class",)
             if is_term and kinds.get(str(value), frozenset()).isdisjoint(wanted):
-                used = "class" if predicate == rdf.RDF_TYPE else local_name(predicate), str(value), ("class",)
-        elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES) and (subject, predicate) not in assumed:
+                used = (
+                    "class" if predicate == rdf.RDF_TYPE else local_name(predicate),
+                    str(value),
+                    ("class",),
+                )
+        elif (
+            not predicate.startswith(rdf.LANGUAGE_NAMESPACES)
+            and (subject, predicate) not in assumed
+        ):
             if predicate not in described:
                 used = "property", predicate, _PROPERTIES
-            elif is_term and value not in described and "object property" in kinds.get(predicate, ()):
+            elif (
+                is_term and value not in described and "object property" in kinds.get(predicate, ())
+            ):
                 used = local_name(predicate), str(value), ("individual",)
         if used is not None and rdf.namespace(used[1]) in namespaces:
             words, name, meant = used
-            known = [iri for iri in described - model.in_states - {subject} if kinds.get(iri, frozenset()) & {*meant}]
+            known = [
+                iri
+                for iri in described - model.in_states - {subject}
+                if kinds.get(iri, frozenset()) & {*meant}
+            ]
             same = sorted(iri for iri in known if local_name(iri) == local_name(name))
-            remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
+            remedy = (
+                f"did you mean {' or '.join(same)}?"
+                if same
+                else nearest(local_name(name), map(local_name, known))
+            )
             problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
             is_attribute = predicate == rdf.IS_QA_TYPE and meant == ("individual",)
-            declare = "a QualityAttributeType of this name" if is_attribute else "it, or correct the name"
-            yield material.about(Level.ERROR, local_name(subject), problem, remedy or f"declare {declare}")
+            declare = (
+                "a QualityAttributeType of this name" if is_attribute else "it, or correct the name"
+            )
+            yield material.about(
+                Level.ERROR, local_name(subject), problem, remedy or f"declare {declare}"
+            )
 
 
 def functions_without_design(material: Material) -> Iterator[Finding]:
     """Find the functions that have no design, or that the mission needs and that are not there."""
     needed = {*material.subject.needed}
-    for level, names in ((Level.ERROR, needed), (Level.WARN, material.base.model.functions.keys() - needed)):
+    for level, names in (
+        (Level.ERROR, needed),
+        (Level.WARN, material.base.model.functions.keys() - needed),
+    ):
         for name, problem, remedy in material.base.unsolved(names):
             yield material.about(level, name, problem, remedy)
 
 
 def designs_and_modes(material: Material) -> Iterator[Finding]:
-    """Find the function designs that no mode has the name of, and the modes that metacontrol never chooses."""
+    """Find the function designs that no mode has the name of, and the modes that metacontrol never
+    chooses.
+    """
     otherwise = "add a mode of this name to the System Modes file, or remove the design"
-    for function in sorted(material.base.model.functions if material.subject.modes is not None else ()):
+    for function in sorted(
+        material.base.model.functions if material.subject.modes is not None else ()
+    ):
         designs = {*material.base.designs(function)}
         modes = {*(material.subject.modes or {}).get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
         for design in sorted(designs - modes):
             problem = f"function design {design} has no mode of the same name for {function}"
-            yield material.about(Level.ERROR, design, problem, nearest(design, modes - designs) or otherwise)
+            yield material.about(
+                Level.ERROR, design, problem, nearest(design, modes - designs) or otherwise
+            )
         if spare := ", ".join(sorted(modes - designs)):
             problem = f"modes of {function} without function design, which metacontrol never chooses: {spare}"
             yield material.about(Level.NOTE, function, problem)
 
 
 def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
-    """Find quality attributes that missions measure and ontologies lack, or compare with nothing."""
+    """Find quality attributes that missions measure and ontologies lack, or compare with
+    nothing.
+    """
     model, measured = material.base.model, material.subject.measured
     for name in sorted({*(measured or ())} - model.attributes.keys()):
-        problem = f"missions measure {name}, but no ontology has a quality attribute type of this name"
+        problem = (
+            f"missions measure {name}, but no ontology has a quality attribute type of this name"
+        )
         remedy = nearest(name, model.attributes) or "declare a QualityAttributeType of this name"
         yield material.about(Level.WARN, name, problem, remedy)
-    for name in () if rules_of_2023(material.base) else without_operator(material.base, measured or ()):
-        designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
+    for name in (
+        () if rules_of_2023(material.base) else without_operator(material.base, measured or ())
+    ):
+        designs = ", ".join(
+            sorted(design for design, names in model.estimated.items() if name in names)
+        )
         problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
-        yield material.about(Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <")
-    valued = {subject for subject, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE}
+        yield material.about(
+            Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <"
+        )
+    valued = {
+        subject for subject, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE
+    }
     for name, iri in model.measurements.items():
         if measured is not None and iri in valued and name not in measured:
             problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
@@ -262,7 +364,9 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
 
 
 def attributes_declared_twice(material: Material) -> Iterator[Finding]:
-    """Find the quality attribute types that several files declare: what each of them says of one holds."""
+    """Find the quality attribute types that several files declare: what each of them says of one
+    holds.
+    """
     for name, iri in material.base.model.attributes.items():
         declared = iri, rdf.RDF_TYPE, rdf.TOMASYS + "QualityAttributeType"
         files = [each for each in material.base.sources if declared in each.about(iri)]
@@ -273,7 +377,9 @@ def attributes_declared_twice(material: Material) -> Iterator[Finding]:
 
 
 def unknown_to_missions(material: Material) -> Iterator[Finding]:
-    """Note the components whose status nothing reports, and the attributes that designs expect and nothing measures."""
+    """Note the components whose status nothing reports, and the attributes that designs expect and
+    nothing measures.
+    """
     content, subject = material.content, material.subject
     asserted = {each for each, predicate, _ in content.triples if predicate == rdf.C_STATUS}
     if subject.reported is not None and rdf.C_STATUS not in content.concluded:
@@ -281,18 +387,30 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
             if name not in subject.reported and iri not in asserted:
                 nothing = f"nothing in the simulation reports the status of component {name}"
                 remedy = f"reported are {', '.join(subject.reported)}"
-                yield material.about(Level.NOTE, name, f"{nothing}, so it has none in missions", remedy)
+                yield material.about(
+                    Level.NOTE, name, f"{nothing}, so it has none in missions", remedy
+                )
     expected = _expected(material.base.model)
-    for name in sorted(expected.difference(expected if subject.measured is None else subject.measured)):
-        problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+    for name in sorted(
+        expected.difference(expected if subject.measured is None else subject.measured)
+    ):
+        problem = (
+            f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+        )
         yield material.about(Level.NOTE, name, problem)
 
 
 def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
-    """Return the quality attributes that missions measure and designs expect, and that cannot be compared."""
-    compared = {subject for subject, predicate, _ in base.content.triples if predicate == rdf.QA_OPERATOR}
+    """Return the quality attributes that missions measure and designs expect, and that cannot be
+    compared.
+    """
+    compared = {
+        subject for subject, predicate, _ in base.content.triples if predicate == rdf.QA_OPERATOR
+    }
     known = base.model.attributes
-    return sorted(name for name in _expected(base.model).intersection(measured) if known[name] not in compared)
+    return sorted(
+        name for name in _expected(base.model).intersection(measured) if known[name] not in compared
+    )
 
 
 def _expected(model: Model) -> frozenset[str]:
@@ -313,21 +431,29 @@ def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
 
 def assumed_operators(material: Material) -> Iterator[Finding]:
     """Note which comparison operators are assumed."""
-    return (material.about(Level.NOTE, name, words) for name, words in material.base.assumptions.items())
+    return (
+        material.about(Level.NOTE, name, words) for name, words in material.base.assumptions.items()
+    )
 
 
 def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
-    """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of 2023 do."""
+    """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of
+    2023 do.
+    """
     heads = [(rule, atom) for rule in base.content.enabled_rules for atom in rule.head]
     updatable = Lit("UPDATABLE", rdf.XSD + "string")
-    return [(rule, atom) for rule, atom in heads if atom.predicate == rdf.O_STATUS and updatable in atom.arguments]
+    return [
+        (rule, atom)
+        for rule, atom in heads
+        if atom.predicate == rdf.O_STATUS and updatable in atom.arguments
+    ]
 
 
 def check_revision(base: Ontology, measured: Collection[str], revision: str) -> None:
     """Check that ontologies of the exemplar's revision 2023 are used with that revision.
 
-    With a later one no design is ever ruled out, as its code assumes no operator, so that objectives stay in error;
-    the first thruster that recovers then contradicts that.
+    With a later one no design is ever ruled out, as its code assumes no operator, so that
+    objectives stay in error; the first thruster that recovers then contradicts that.
 
     Args:
         base: the ontologies with the operators that the revision assumes, and rules.
@@ -342,7 +468,9 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
         problem = f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
         problem += f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator"
         remedy = f'write revision: "2023" in the scenario, or use ontologies of revision {revision}'
-        raise KnowledgeError(problem, file=rule.file, place=f"line {rule.line}" if rule.line else None, remedy=remedy)
+        raise KnowledgeError(
+            problem, file=rule.file, place=f"line {rule.line}" if rule.line else None, remedy=remedy
+        )
 
 
 def another_revision(material: Material) -> Iterator[Finding]:
@@ -364,21 +492,33 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
 
 
 def shared_names(material: Material) -> Iterator[Finding]:
-    """Find rules of one name, other than those of TOMASys and mros, and those that replace another one."""
+    """Find rules of one name, other than those of TOMASys and mros, and those that replace another
+    one.
+    """
     rules = material.content.rules
     names = Counter(rule.name for rule in rules)
-    own = {rule.name for rule in rules if not material.is_of_metamodel(rule) and not rule.name.endswith(WITHOUT_NAME)}
+    own = {
+        rule.name
+        for rule in rules
+        if not material.is_of_metamodel(rule) and not rule.name.endswith(WITHOUT_NAME)
+    }
     for rule in rules:
         if names[rule.name] > 1 and rule.name in own:
-            yield material.suspicious(rule, None, f"{names[rule.name]} rules have this name", "rename one")
+            yield material.suspicious(
+                rule, None, f"{names[rule.name]} rules have this name", "rename one"
+            )
     for old, new in material.content.replaced:
         if (old.text, old.enabled) != (new.text, new.enabled):
             problem = f"replaces the rule of this name in {relative_path(old.file)}"
-            yield about_rule(new, problem, None, "give it a different name, unless this is intended", Level.WARN)
+            yield about_rule(
+                new, problem, None, "give it a different name, unless this is intended", Level.WARN
+            )
 
 
 def for_other_models(material: Material) -> Iterator[Finding]:
-    """Note the rules of TOMASys and mros that need what this model does not have, a file in one line."""
+    """Note the rules of TOMASys and mros that need what this model does not have, a file in one
+    line.
+    """
     by_file: dict[Path, list[str]] = defaultdict(list)
     for rule in material.for_other_models:
         by_file[rule.file].append(rule.name)
@@ -390,8 +530,8 @@ def for_other_models(material: Material) -> Iterator[Finding]:
 def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str | None]]:
     """Find the enabled rules that need a value of a quality attribute of which nothing has one.
 
-    A grounding has the measured values (hasQAvalue) of those attributes that its function design has an estimate of.
-    Other values are in the ontologies, or measured.
+    A grounding has the measured values (hasQAvalue) of those attributes that its function design
+    has an estimate of. Other values are in the ontologies, or measured.
 
     Yields:
         each rule with the atom that names the attribute, what is wrong, and what would be right.
@@ -400,45 +540,72 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
     stated = {predicate for _, predicate, _ in content.triples}
     elsewhere = rdf.HAS_QA_VALUE in content.concluded | stated
     estimated = frozenset().union(*model.estimated.values())
-    valued = {local_name(str(value)) for _, predicate, value in content.triples if predicate == rdf.IS_QA_TYPE}
+    valued = {
+        local_name(str(value))
+        for _, predicate, value in content.triples
+        if predicate == rdf.IS_QA_TYPE
+    }
     for rule in content.enabled_rules if rdf.IS_QA_TYPE not in content.concluded else ():
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
         for atom in rule.body:
-            if atom.predicate != rdf.IS_QA_TYPE or len(atom.arguments) != 2 or not isinstance(atom.arguments[1], Named):
+            if (
+                atom.predicate != rdf.IS_QA_TYPE
+                or len(atom.arguments) != 2
+                or not isinstance(atom.arguments[1], Named)
+            ):
                 continue
             name = local_name(atom.arguments[1].iri)
             is_measured = measured is None or name in measured
             if atom.arguments[0] not in held:
                 if not is_measured and name not in valued:
-                    yield rule, atom, f"missions do not measure {name}, and no ontology has a value of it", None
+                    yield (
+                        rule,
+                        atom,
+                        f"missions do not measure {name}, and no ontology has a value of it",
+                        None,
+                    )
             elif name in model.attributes and not elsewhere:
                 if name not in estimated:
                     problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
                     yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
                 elif not is_measured:
-                    yield rule, atom, f"missions do not measure {name}, so no grounding has a value of it", None
+                    yield (
+                        rule,
+                        atom,
+                        f"missions do not measure {name}, so no grounding has a value of it",
+                        None,
+                    )
 
 
 def never_fires(material: Material) -> Iterator[Finding]:
     """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
     told = list(material.for_other_models)
-    dead = [(rule, atom, f"{write_atom(atom)} holds in no state", None) for rule, atom in material.dead]
+    dead = [
+        (rule, atom, f"{write_atom(atom)} holds in no state", None) for rule, atom in material.dead
+    ]
     for rule, atom, problem, remedy in (*dead, *unmeasured_rules(material)):
         if rule not in told:
             told.append(rule)
             yield material.suspicious(rule, atom.place(), f"can never fire: {problem}", remedy)
 
 
-#: Axioms by which individuals are different: declared so, or members of disjoint classes or properties.
-_MAKE_DIFFERENT: Final = re.compile(rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
+#: Axioms by which individuals are different: declared so, or members of disjoint classes or
+# properties.
+_MAKE_DIFFERENT: Final = re.compile(
+    rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)"
+)
 
 
 def equal_individuals(material: Material) -> Iterator[Finding]:
-    """Find rules that ask for different individuals (differentFrom), where nothing makes any different.
+    """Find rules that ask for different individuals (differentFrom), where nothing makes any
+    different.
 
     Values of functional properties can, so such a rule is suspicious, not dead.
     """
-    terms = (*(predicate for _, predicate, _ in material.content.triples), *material.content.structure)
+    terms = (
+        *(predicate for _, predicate, _ in material.content.triples),
+        *material.content.structure,
+    )
     heads = (atom.kind for rule in material.rules for atom in rule.head)
     if any(map(_MAKE_DIFFERENT.search, terms)) or "different" in heads:
         return
@@ -446,7 +613,9 @@ def equal_individuals(material: Material) -> Iterator[Finding]:
     for rule in material.rules:
         for atom in rule.body:
             if atom.kind == "different":
-                needs = "needs individuals that are declared different; different names are not enough"
+                needs = (
+                    "needs individuals that are declared different; different names are not enough"
+                )
                 yield material.suspicious(rule, atom.place(), f"{write_atom(atom)} {needs}", remedy)
 
 
@@ -465,19 +634,26 @@ def misspelt_variables(material: Material) -> Iterator[Finding]:
                     places[term.name].append(atom.place(number))
         names = list(places)
         for name in (each for each in names if len(places[each]) == 1):
-            near = [other for other in names if values[other] & values[name] and are_near(name, other)]
+            near = [
+                other for other in names if values[other] & values[name] and are_near(name, other)
+            ]
             before = names[: names.index(name)]
-            meant = [other for other in near if len(places[other]) > 1] or [other for other in near if other in before]
+            meant = [other for other in near if len(places[other]) > 1] or [
+                other for other in near if other in before
+            ]
             if meant:
                 problem = f"?{name} occurs only here, and is another variable than ?{meant[0]}"
-                yield material.suspicious(rule, places[name][0], problem, f"did you mean ?{meant[0]}?")
+                yield material.suspicious(
+                    rule, places[name][0], problem, f"did you mean ?{meant[0]}?"
+                )
 
 
 def are_near(one: str, other: str) -> bool:
-    """Whether one name is probably a misspelling of the other: in its capitals, or in letters inside it.
+    """Whether one name is probably a misspelling of the other: in its capitals, or in letters
+    inside it.
 
-    Names that differ in a digit, in their first letter or in their last one are often meant: ?speed1 and ?speed2,
-    ?xpos and ?ypos, ?design and ?design_b.
+    Names that differ in a digit, in their first letter or in their last one are often meant:
+    ?speed1 and ?speed2, ?xpos and ?ypos, ?design and ?design_b.
     """
     if one.casefold() == other.casefold():
         return one != other
@@ -489,10 +665,17 @@ def are_near(one: str, other: str) -> bool:
 def two_values(material: Material) -> Iterator[Finding]:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
     kind = (rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty")
-    functional = {subject for subject, name, value in material.content.triples if (name, value) == kind}
+    functional = {
+        subject for subject, name, value in material.content.triples if (name, value) == kind
+    }
     for rule in material.rules:
         values: dict[tuple[str, Term], Term] = {}
-        equated = {term for atom in rule.body if swrl.COMPARISONS.get(atom.predicate) == "=" for term in atom.arguments}
+        equated = {
+            term
+            for atom in rule.body
+            if swrl.COMPARISONS.get(atom.predicate) == "="
+            for term in atom.arguments
+        }
         for atom in rule.atoms:
             if atom.predicate not in functional or len(atom.arguments) != 2:
                 continue
@@ -504,14 +687,20 @@ def two_values(material: Material) -> Iterator[Finding]:
                 continue
             if is_asked and not isinstance(before, Variable) and not isinstance(value, Variable):
                 problem = f"{words}: nothing has two values of {name}, so the rule never fires"
-                yield material.suspicious(rule, atom.place(), problem, "write a rule for each value")
+                yield material.suspicious(
+                    rule, atom.place(), problem, "write a rule for each value"
+                )
             elif not is_asked and before not in equated and atom.kind == "data":
                 problem = f"{words} contradicts {name} in the body, which holds as well"
-                yield material.suspicious(rule, atom.place(), problem, "rules add facts, and change none")
+                yield material.suspicious(
+                    rule, atom.place(), problem, "rules add facts, and change none"
+                )
 
 
 def _same(one: Term, other: Term) -> bool:
-    first, second = (rdf.canonical(each) if isinstance(each, Lit) else each for each in (one, other))
+    first, second = (
+        rdf.canonical(each) if isinstance(each, Lit) else each for each in (one, other)
+    )
     return first == second
 
 
@@ -532,27 +721,43 @@ def no_effect(material: Material) -> Iterator[Finding]:
 
 
 def misspelt_statuses(material: Material) -> Iterator[Finding]:
-    """Find the user's rules that ask for a component's status that is nearly one that the simulation reports.
+    """Find the user's rules that ask for a component's status that is nearly one that the
+    simulation reports.
 
     Statuses that an ontology asserts, or a rule concludes, are known as well.
     """
     reported = {*chain.from_iterable((material.subject.reported or {}).values())}
     by_capitals = {each.upper(): each for each in sorted(reported)}
-    asserted = [value for _, predicate, value in material.content.triples if predicate == rdf.C_STATUS]
-    heads = [atom.arguments[-1] for rule in material.rules for atom in rule.head if atom.predicate == rdf.C_STATUS]
+    asserted = [
+        value for _, predicate, value in material.content.triples if predicate == rdf.C_STATUS
+    ]
+    heads = [
+        atom.arguments[-1]
+        for rule in material.rules
+        for atom in rule.head
+        if atom.predicate == rdf.C_STATUS
+    ]
     known = {*reported, *(value.text for value in (*asserted, *heads) if isinstance(value, Lit))}
     for rule in filter(material.is_own, material.rules):
         asked = [(atom, atom.arguments[-1]) for atom in rule.body if atom.predicate == rdf.C_STATUS]
         statuses = {status for _, status in asked if isinstance(status, Variable)}
         for atom in rule.body:  # and in a comparison
-            if swrl.COMPARISONS.get(atom.predicate) in ("=", "!=") and not statuses.isdisjoint(atom.arguments):
+            if swrl.COMPARISONS.get(atom.predicate) in ("=", "!=") and not statuses.isdisjoint(
+                atom.arguments
+            ):
                 asked += [(atom, term) for term in atom.arguments]
         for atom, status in asked:
-            if isinstance(status, Lit) and status.datatype == rdf.XSD + "string" and status.text not in known:
+            if (
+                isinstance(status, Lit)
+                and status.datatype == rdf.XSD + "string"
+                and status.text not in known
+            ):
                 meant = similar(status.text.upper(), by_capitals)
                 if meant is not None:
                     problem = f'nothing in the simulation reports c_status "{status.text}"'
-                    yield material.suspicious(rule, atom.place(1), problem, f'did you mean "{by_capitals[meant]}"?')
+                    yield material.suspicious(
+                        rule, atom.place(1), problem, f'did you mean "{by_capitals[meant]}"?'
+                    )
 
 
 CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (

@@ -1,6 +1,8 @@
-"""An ontology with its imports and rules: merged and checked, ready to be reasoned with and planned on.
+"""An ontology with its imports and rules: merged and checked, ready to be reasoned with and planned
+on.
 
-Its model has the functions, designs, components and quality attributes, and the triples of a state in its terms.
+Its model has the functions, designs, components and quality attributes, and the triples of a state
+in its terms.
 """
 
 from __future__ import annotations
@@ -17,15 +19,34 @@ from typing import Final, Literal, NamedTuple, TypeGuard
 
 from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge import rdf
-from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts, place_of, supplies
+from suave_des.knowledge.ontology_file import (
+    OntologyFile,
+    collect,
+    enumerated_texts,
+    place_of,
+    supplies,
+)
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.rules import EXPRESSION, Rule
-from suave_des.knowledge.rules.files import RulesFile, Vocabulary, check_property_use, rules_of, triples_of
-from suave_des.knowledge.state import Fact, KnowledgeState, Value, grounding_name, measurement_name, objective_name
+from suave_des.knowledge.rules.files import (
+    RulesFile,
+    Vocabulary,
+    check_property_use,
+    rules_of,
+    triples_of,
+)
+from suave_des.knowledge.state import (
+    Fact,
+    KnowledgeState,
+    Value,
+    grounding_name,
+    measurement_name,
+    objective_name,
+)
 from suave_des.resources import shipped_folder
 
-# The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all libraries in use
-# write and read without loss.
+# The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all
+# libraries in use write and read without loss.
 
 _DECLARED: Final = rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty Class")
 _CLASSES: Final = frozenset((rdf.OWL + "Class", rdf.RDFS + "Class"))
@@ -43,7 +64,9 @@ _ANNOTATIONS: Final = rdf.terms(rdf.RDFS, "label comment seeAlso isDefinedBy") |
 
 
 class Terms(NamedTuple):
-    """The terms to read after an inference: properties for their values, classes for their members; sorted IRIs."""
+    """The terms to read after an inference: properties for their values, classes for their members;
+    sorted IRIs.
+    """
 
     properties: tuple[str, ...]
     classes: tuple[str, ...]
@@ -54,10 +77,12 @@ class Content:
     """The content of all ontology files.
 
     Attributes:
-        triples: about named things and with named things or literals as values, without those of rules.
+        triples: about named things and with named things or literals as values, without those of
+            rules.
         structure: all others, with blank nodes in them (class expressions), as N-Triples.
         rules: the rules of all files, disabled ones included.
-        replaced: rules that those of the same name in a later file of rules have replaced, each with its replacement.
+        replaced: rules that those of the same name in a later file of rules have replaced, each
+            with its replacement.
     """
 
     triples: tuple[rdf.Triple, ...]
@@ -76,30 +101,47 @@ class Content:
         return frozenset(name for name, _ in _concluded(self.enabled_rules))
 
     def decision_terms(self) -> Terms:
-        """Terms on which decisions depend, and terms that rules assert, with super-properties and inverses."""
+        """Terms on which decisions depend, and terms that rules assert, with super-properties and
+        inverses.
+        """
         both_ways = (rdf.OWL + "inverseOf", rdf.OWL + "equivalentProperty")
         related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
         edges = [(s, o) for s, p, o in related if p in (rdf.RDFS + "subPropertyOf", *both_ways)]
         edges += [(o, s) for s, p, o in related if p in both_ways]
         heads = sorted(_concluded(self.enabled_rules))
         wanted = {*rdf.DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
-        return Terms(_named(rdf.reached(wanted, edges)), tuple(name for name, kind in heads if kind == "Class"))
+        return Terms(
+            _named(rdf.reached(wanted, edges)),
+            tuple(name for name, kind in heads if kind == "Class"),
+        )
 
     def all_terms(self) -> Terms:
-        """Every property and class, for some axiom can conclude any of them, and those that rules ask for."""
+        """Every property and class, for some axiom can conclude any of them, and those that rules
+        ask for.
+        """
         kinds: dict[str, set[str]] = {}
         for subject, predicate, value in self.triples:
             if predicate == rdf.RDF_TYPE and isinstance(value, str):
                 kinds.setdefault(value, set()).add(subject)
         decisions = self.decision_terms()
-        properties = {*decisions.properties, *(name for _, name, _ in filter(rdf.is_fact, self.triples))}
+        properties = {
+            *decisions.properties,
+            *(name for _, name, _ in filter(rdf.is_fact, self.triples)),
+        }
         properties = properties.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
         classes = {*decisions.classes, *(name for _, name in rdf.memberships(self.triples))}
         classes = classes.union(*(kinds.get(kind, ()) for kind in _CLASSES))
-        asked = [atom for rule in self.enabled_rules for atom in rule.body if atom.predicate not in ("", EXPRESSION)]
+        asked = [
+            atom
+            for rule in self.enabled_rules
+            for atom in rule.body
+            if atom.predicate not in ("", EXPRESSION)
+        ]
         properties |= {atom.predicate for atom in asked if atom.kind in ("object", "data")}
         classes |= {atom.predicate for atom in asked if atom.kind == "class"}
-        return Terms(_named(properties - kinds.get(rdf.OWL + "AnnotationProperty", set())), _named(classes))
+        return Terms(
+            _named(properties - kinds.get(rdf.OWL + "AnnotationProperty", set())), _named(classes)
+        )
 
     def n_triples(self, rules: Sequence[Rule] | None = None) -> str:
         """Write all of it for a reasoner, with the enabled rules or those given."""
@@ -117,19 +159,30 @@ def _named(iris: Iterable[str]) -> tuple[str, ...]:
 
 
 def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Content:
-    """Merge the triples and rules of files, with the values of named QAvalue individuals replaced."""
+    """Merge the triples and rules of files, with the values of named QAvalue individuals
+    replaced.
+    """
     triples, structure, rules = dict[rdf.Triple, None](), list[str](), list[Rule]()
     shipped = shipped_folder("ontology")
-    # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology replaces them.
-    given_mros = (each for each in sources if each.path.parent != shipped and supplies(each, rdf.MROS))
+    # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology replaces
+    # them.
+    given_mros = (
+        each for each in sources if each.path.parent != shipped and supplies(each, rdf.MROS)
+    )
     replaced = {rule.name for source in given_mros for rule in rules_of(source)}
     for source in sorted(sources, key=lambda source: source.content):
         found = rules_of(source)
-        rules += [rule for rule in found if source.path.parent != shipped or rule.name not in replaced]
+        rules += [
+            rule for rule in found if source.path.parent != shipped or rule.name not in replaced
+        ]
         # Triples about the ontology itself (imports, versions) are no part of its content.
-        ontologies = {s for s, p, o in source.triples if p == rdf.RDF_TYPE and o == rdf.OWL + "Ontology"}
+        ontologies = {
+            s for s, p, o in source.triples if p == rdf.RDF_TYPE and o == rdf.OWL + "Ontology"
+        }
         inside = {triple for rule in found for triple in rule.triples}
-        for subject, predicate, value in (triple for triple in source.triples if triple not in inside):
+        for subject, predicate, value in (
+            triple for triple in source.triples if triple not in inside
+        ):
             # Protégé declares the built-ins, about which Pellet logs a warning.
             if predicate in _ANNOTATIONS or subject in ontologies or value == rdf.SWRL + "Builtin":
                 continue
@@ -149,10 +202,19 @@ def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
 def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[rdf.Triple]:
     """Declare properties and classes that occur only in the head of a rule.
 
-    Pellet accepts an undeclared term, but stock owlready2 drops what is inferred of it; declared, both agree.
+    Pellet accepts an undeclared term, but stock owlready2 drops what is inferred of it; declared,
+    both agree.
     """
-    declared = {subject for subject, predicate, value in triples if predicate == rdf.RDF_TYPE and value in _DECLARED}
-    return [(name, rdf.RDF_TYPE, rdf.OWL + kind) for name, kind in sorted(_concluded(rules)) if name not in declared]
+    declared = {
+        subject
+        for subject, predicate, value in triples
+        if predicate == rdf.RDF_TYPE and value in _DECLARED
+    }
+    return [
+        (name, rdf.RDF_TYPE, rdf.OWL + kind)
+        for name, kind in sorted(_concluded(rules))
+        if name not in declared
+    ]
 
 
 def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
@@ -187,9 +249,19 @@ _SOLVES_F: Final = rdf.TOMASYS + "solvesF"
 _SOLVES_O: Final = rdf.TOMASYS + "solvesO"
 _TYPE_F: Final = rdf.TOMASYS + "typeF"
 _TYPE_FD: Final = rdf.TOMASYS + "typeFD"
-#: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology asserts of it.
+#: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology
+# asserts of it.
 _STATE_PROPERTIES: Final = frozenset(
-    {_TYPE_F, _TYPE_FD, _SOLVES_O, rdf.O_STATUS, _ALWAYS, rdf.HAS_QA_VALUE, rdf.IS_QA_TYPE, rdf.HAS_VALUE}
+    {
+        _TYPE_F,
+        _TYPE_FD,
+        _SOLVES_O,
+        rdf.O_STATUS,
+        _ALWAYS,
+        rdf.HAS_QA_VALUE,
+        rdf.IS_QA_TYPE,
+        rdf.HAS_VALUE,
+    }
     | {rdf.TOMASYS + "fg_status", rdf.TOMASYS + "o_updatable"}
 )
 
@@ -203,10 +275,10 @@ class Model:
         objectives: the objective that a function may get, by the function's name.
         groundings: the grounding that a function design may get, by the design's name.
         measurements: the measured value that a quality attribute type may get, by the type's name.
-        own: what the ontologies assert of objectives (for example hasNFR), groundings, measurements and the status of
-            components, by IRI: it holds in states that have them.
-        estimated: by the design's name, the quality attribute types of which it has an expected value, sorted, each
-            with the smallest one; None where that is no number.
+        own: what the ontologies assert of objectives (for example hasNFR), groundings, measurements
+            and the status of components, by IRI: it holds in states that have them.
+        estimated: by the design's name, the quality attribute types of which it has an expected
+            value, sorted, each with the smallest one; None where that is no number.
     """
 
     functions: Mapping[str, str]
@@ -222,7 +294,9 @@ class Model:
     @cached_property
     def in_states(self) -> frozenset[str]:
         """The IRIs of all objectives, groundings and measurements that states may have."""
-        return frozenset((*self.objectives.values(), *self.groundings.values(), *self.measurements.values()))
+        return frozenset(
+            (*self.objectives.values(), *self.groundings.values(), *self.measurements.values())
+        )
 
     def triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
         """What a state asserts of its objectives, groundings, components and measurements."""
@@ -261,8 +335,8 @@ class Model:
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
     """Find the model, and return the content without the triples that only states assert.
 
-    Objectives, groundings and measurements that the ontologies describe already (an objective's hasNFR, a
-    grounding's requiresO) are taken out, and come with the states that have them.
+    Objectives, groundings and measurements that the ontologies describe already (an objective's
+    hasNFR, a grounding's requiresO) are taken out, and come with the states that have them.
 
     Raises:
         KnowledgeError: two functions, designs, components or quality attribute types share a name.
@@ -271,33 +345,55 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
 
     def linked(predicate: str, place: Literal[0, 2]) -> set[str]:
         """Subjects (0) or things as objects (2) of a property."""
-        return {str(each[place]) for each in triples if each[1] == predicate and isinstance(each[2], str)}
+        return {
+            str(each[place])
+            for each in triples
+            if each[1] == predicate and isinstance(each[2], str)
+        }
 
     def by_name(iris: Iterable[str], what: str) -> dict[str, str]:
-        """IRI by name; two of one kind must not share a name, since states are written with names."""
+        """IRI by name; two of one kind must not share a name, since states are written with
+        names.
+        """
         found: dict[str, str] = {}
         for iri in sorted(iris):
             other = found.setdefault(local_name(iri), iri)
             if other != iri:
-                raise _wrong_in(iri, sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
+                raise _wrong_in(
+                    iri,
+                    sources,
+                    f"two {what} have this name: {other} and {iri}",
+                    "rename one of them",
+                )
         return dict(sorted(found.items()))
 
     functions = by_name(_members(triples, "Function") | linked(_SOLVES_F, 2), "functions")
-    designs = by_name(_members(triples, "FunctionDesign") | linked(_SOLVES_F, 0), "function designs")
+    designs = by_name(
+        _members(triples, "FunctionDesign") | linked(_SOLVES_F, 0), "function designs"
+    )
     parts = _members(triples, "Component") | linked(rdf.MROS + "requiredBy", 0)
     components = by_name(parts | {s for s, p, _ in triples if p == rdf.C_STATUS}, "components")
     types = _members(triples, "QualityAttributeType") | linked(rdf.IS_QA_TYPE, 2)
     attributes = by_name(types, "quality attribute types")
-    existing = {local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)}
+    existing = {
+        local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)
+    }
     named = ((functions, objective_name), (designs, grounding_name), (attributes, measurement_name))
     objectives, groundings, measurements = (
-        {name: existing.get(rename(name), rdf.namespace(iri) + rename(name)) for name, iri in things.items()}
+        {
+            name: existing.get(rename(name), rdf.namespace(iri) + rename(name))
+            for name, iri in things.items()
+        }
         for things, rename in named
     )
     in_states = [*objectives.values(), *groundings.values(), *measurements.values()]
     if len(set(in_states)) < len(in_states):
-        problem = "two functions, function designs or quality attribute types differ in their prefix only"
-        raise KnowledgeError(problem, file=sources[0].path, remedy="rename one, for example f_search and search")
+        problem = (
+            "two functions, function designs or quality attribute types differ in their prefix only"
+        )
+        raise KnowledgeError(
+            problem, file=sources[0].path, remedy="rename one, for example f_search and search"
+        )
     own: dict[str, list[rdf.Triple]] = {iri: [] for iri in (*in_states, *components.values())}
     individuals, kept = {*in_states}, list[rdf.Triple]()
     for triple in triples:
@@ -309,13 +405,21 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
             kept.append(triple)
         elif predicate not in _STATE_PROPERTIES and rdf.is_fact(triple):
             own[holder].append(triple)
-    numbers = {s: Decimal(o.text.strip()) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o)}
-    type_of = {s: local_name(o) for s, p, o in triples if p == rdf.IS_QA_TYPE and isinstance(o, str)}
+    numbers = {
+        s: Decimal(o.text.strip()) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o)
+    }
+    type_of = {
+        s: local_name(o) for s, p, o in triples if p == rdf.IS_QA_TYPE and isinstance(o, str)
+    }
     estimated: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
-    for design, individual in ((s, str(o)) for s, p, o in triples if p == _HAS_QA_ESTIMATION and o in type_of):
+    for design, individual in (
+        (s, str(o)) for s, p, o in triples if p == _HAS_QA_ESTIMATION and o in type_of
+    ):
         if designs.get(name := local_name(design)) == design:
             values = (estimated[name].get(type_of[individual]), numbers.get(individual))
-            estimated[name][type_of[individual]] = min((each for each in values if each is not None), default=None)
+            estimated[name][type_of[individual]] = min(
+                (each for each in values if each is not None), default=None
+            )
     model = Model(
         *(functions, designs, components, attributes),
         *(objectives, groundings, measurements),
@@ -333,16 +437,19 @@ def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
 
 
 def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]]:
-    """Find numbers that are no decimals, unknown operators, and functional properties with several values.
+    """Find numbers that are no decimals, unknown operators, and functional properties with several
+    values.
 
-    A reasoner would not explain the first two. Of two values that an ontology asserts for one functional data
-    property Pellet silently keeps the one that it read last.
+    A reasoner would not explain the first two. Of two values that an ontology asserts for one
+    functional data property Pellet silently keeps the one that it read last.
 
     Yields:
         the IRI of the individual, what is wrong, and what would be right.
     """
     triples = tuple(triples)
-    functional = {s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"}
+    functional = {
+        s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"
+    }
     names = rdf.Names(triples)
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
@@ -351,13 +458,19 @@ def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]
             but = f" but an xsd:{local_name(datatype)}" if datatype not in (*rdf.EXACT, "") else ""
             yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
         if predicate == rdf.QA_OPERATOR and shown not in OPERATORS:
-            yield subject, f"qa_comparison_operator {shown!r} is unknown", f"one of {' '.join(OPERATORS)}"
+            yield (
+                subject,
+                f"qa_comparison_operator {shown!r} is unknown",
+                f"one of {' '.join(OPERATORS)}",
+            )
         if predicate in functional and isinstance(value, Lit):
             one = rdf.value_of(value, names)
             other = seen.setdefault((subject, predicate), one)
             if one is not other and one != other:
                 values = f"the values {other} and {one}"
-                problem = f"contradiction: the functional property {local_name(predicate)} has {values}"
+                problem = (
+                    f"contradiction: the functional property {local_name(predicate)} has {values}"
+                )
                 yield subject, problem, "keep one of them"
 
 
@@ -365,32 +478,40 @@ def _is_decimal(value: str | Lit) -> TypeGuard[Lit]:
     return isinstance(value, Lit) and value.datatype in rdf.EXACT and rdf.is_well_formed(value)
 
 
-def _wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
+def _wrong_in(
+    subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str
+) -> KnowledgeError:
     """Return an error on an individual, with the file and line where it is described."""
     name = local_name(subject)
     file, line = place_of(name, sources)
-    return KnowledgeError(f"{name}: {problem}", file=file, place=f"line {line}" if line else None, remedy=remedy)
+    return KnowledgeError(
+        f"{name}: {problem}", file=file, place=f"line {line}" if line else None, remedy=remedy
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Ontology:
-    """Ontology files and files of rules, merged and checked. It is immutable: only a KnowledgeState changes.
+    """Ontology files and files of rules, merged and checked. It is immutable: only a KnowledgeState
+    changes.
 
         ontology = Ontology.load(["suave.owl"], rules=["mine.swrl"])
-        ontology.designs("f_generate_search_path")  # ('fd_spiral_high', 'fd_spiral_low', 'fd_spiral_medium')
-        ontology.expected("fd_spiral_low")  # {'performance': Decimal('0.25'), 'water_visibility': Decimal('1.25')}
+        ontology.designs("f_generate_search_path")  # ('fd_spiral_high', 'fd_spiral_low',
+        'fd_spiral_medium') ontology.expected("fd_spiral_low")  # {'performance': Decimal('0.25'),
+        'water_visibility': Decimal('1.25')}
 
     Attributes:
-        files: the ontology files in use, imports included, sorted by path, and the files of rules as text.
-        content_hash: SHA-256 of all their content, of the overridden values and of the names of disabled rules,
-            whatever the order of ontologies.
+        files: the ontology files in use, imports included, sorted by path, and the files of rules
+            as text.
+        content_hash: SHA-256 of all their content, of the overridden values and of the names of
+            disabled rules, whatever the order of ontologies.
         content: all triples and rules for a reasoner.
         names: short names of IRIs, for facts.
         model: the functions, designs, components and quality attributes.
         vocabulary: the names that rules may use.
         sources: the ontology files with their graphs.
         stated: all triples of the files, those that only states assert among them.
-        assumed: the comparison operators that were added to the ontologies, by quality attribute type.
+        assumed: the comparison operators that were added to the ontologies, by quality attribute
+            type.
     """
 
     files: tuple[Path, ...]
@@ -417,20 +538,23 @@ class Ontology:
 
         Args:
             ontologies: files in RDF/XML.
-            values: replaces the hasValue of a named QAvalue individual, such as qa_water_visibility_low.
+            values: replaces the hasValue of a named QAvalue individual, such as
+                qa_water_visibility_low.
             rules: files of rules as text; each rule replaces earlier rules of the same name.
             disabled_rules: names of rules to disable.
             operators: qa_comparison_operator of quality attribute types that have none, by name.
 
         Raises:
-            KnowledgeError: a file or an import cannot be used, a value names no QAvalue, or there is no such rule to
-                disable.
+            KnowledgeError: a file or an import cannot be used, a value names no QAvalue, or there
+                is no such rule to disable.
             RuleError: a rule as text cannot be read or used.
         """
         sources = collect([Path(path) for path in ontologies])
         files = [RulesFile.read(Path(path)) for path in rules]
         base = cls.merged(sources, values or {}, operators or {})
-        base = base.with_files(files, [file.rules(base.vocabulary) for file in files], disabled_rules)
+        base = base.with_files(
+            files, [file.rules(base.vocabulary) for file in files], disabled_rules
+        )
         base.check_names(values or {}, disabled_rules)
         for subject, problem, remedy in wrong_values(base.stated):
             raise _wrong_in(subject, sources, problem, remedy)
@@ -439,21 +563,31 @@ class Ontology:
 
     @classmethod
     def merged(
-        cls, sources: Sequence[OntologyFile], values: Mapping[str, Decimal], operators: Mapping[str, str]
+        cls,
+        sources: Sequence[OntologyFile],
+        values: Mapping[str, Decimal],
+        operators: Mapping[str, str],
     ) -> Ontology:
-        """Merge ontologies that have been read with their imports, as `load` does; nothing else is checked.
+        """Merge ontologies that have been read with their imports, as `load` does; nothing else is
+        checked.
 
         Raises:
-            KnowledgeError: two functions, designs, components or quality attribute types share a name.
+            KnowledgeError: two functions, designs, components or quality attribute types share a
+                name.
         """
         contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources)
         merged = merge(sources, values)
         model, content = build_model(merged, sources)
-        present = {subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR}
+        present = {
+            subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR
+        }
         without = {name: iri for name, iri in model.attributes.items() if iri not in present}
         assumed = {name: sign for name, sign in sorted(operators.items()) if name in without}
         if assumed:
-            more = [(without[name], rdf.QA_OPERATOR, Lit(sign, rdf.XSD + "string")) for name, sign in assumed.items()]
+            more = [
+                (without[name], rdf.QA_OPERATOR, Lit(sign, rdf.XSD + "string"))
+                for name, sign in assumed.items()
+            ]
             content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
         numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
         return cls(
@@ -469,12 +603,15 @@ class Ontology:
         )
 
     def with_files(
-        self, files: Sequence[RulesFile], rules: Sequence[Sequence[Rule]], disabled_rules: Collection[str]
+        self,
+        files: Sequence[RulesFile],
+        rules: Sequence[Sequence[Rule]],
+        disabled_rules: Collection[str],
     ) -> Ontology:
         """Add files of rules as text, and disable rules.
 
-        A file's rules replace all rules of the same names that were read before, of ontologies or of files: so a rule
-        can be tried in another wording, or disabled by its mark.
+        A file's rules replace all rules of the same names that were read before, of ontologies or
+        of files: so a rule can be tried in another wording, or disabled by its mark.
 
         Args:
             files: in the order in which they are given.
@@ -485,11 +622,15 @@ class Ontology:
             new = {rule.name: rule for rule in group}
             replaced += [(rule, new[rule.name]) for rule in found if rule.name in new]
             found = [rule for rule in found if rule.name not in new] + list(group)
-        found = [replace(rule, enabled=False) if rule.name in disabled_rules else rule for rule in found]
+        found = [
+            replace(rule, enabled=False) if rule.name in disabled_rules else rule for rule in found
+        ]
         return replace(
             self,
             files=(*self.files, *(file.path for file in files)),
-            content_hash=_digest(self.content_hash, [file.text for file in files], sorted(set(disabled_rules))),
+            content_hash=_digest(
+                self.content_hash, [file.text for file in files], sorted(set(disabled_rules))
+            ),
             content=replace(self.content, rules=_in_order(found), replaced=tuple(replaced)),
         )
 
@@ -499,10 +640,19 @@ class Ontology:
         Raises:
             KnowledgeError: a value names no individual with a hasValue, or there is no such rule.
         """
-        valued = {local_name(subject) for subject, predicate, _ in self.stated if predicate == rdf.HAS_VALUE}
+        valued = {
+            local_name(subject)
+            for subject, predicate, _ in self.stated
+            if predicate == rdf.HAS_VALUE
+        }
         for key, names, known, problem in (
             ("values", values, valued, "the ontology has no individual {} with a hasValue"),
-            ("disabled_rules", disabled_rules, {rule.name for rule in self.rules}, "there is no rule {} to switch off"),
+            (
+                "disabled_rules",
+                disabled_rules,
+                {rule.name for rule in self.rules},
+                "there is no rule {} to switch off",
+            ),
         ):
             for name in sorted(set(names).difference(known)):
                 remedy = nearest(name, known) or f"known: {', '.join(sorted(known)) or 'none'}"
@@ -543,34 +693,46 @@ class Ontology:
 
     @cached_property
     def _designs(self) -> Mapping[str, tuple[str, ...]]:
-        solving = sorted((fact.subject, fact.value) for fact in self.facts if fact.property == "solvesF")
+        solving = sorted(
+            (fact.subject, fact.value) for fact in self.facts if fact.property == "solvesF"
+        )
         return {
-            name: tuple(one for one, solved in solving if solved == name and one in self.model.designs)
+            name: tuple(
+                one for one, solved in solving if solved == name and one in self.model.designs
+            )
             for name in self.functions
         }
 
     def expected(self, design: str) -> Mapping[str, Decimal]:
-        """Expected value of each quality attribute of a function design, its performance among them; of several, the
-        smallest."""
+        """Expected value of each quality attribute of a function design, its performance among
+        them; of several, the smallest."""
         known = self.model.estimated.get(design, {})
         return {name: value for name, value in known.items() if value is not None}
 
     def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
         """Return the triples that assert a state, for every reasoner in the same order.
 
-        A component or a quality attribute that the ontology does not have can match no rule, and is left out:
-        monitors may report more than an ontology describes.
+        A component or a quality attribute that the ontology does not have can match no rule, and is
+        left out: monitors may report more than an ontology describes.
 
         Raises:
             KnowledgeError: a function or a function design is not in the ontology.
         """
-        functions = {*(each.function for each in state.objectives), *(name for name, _ in state.groundings)}
+        functions = {
+            *(each.function for each in state.objectives),
+            *(name for name, _ in state.groundings),
+        }
         designs = {design for _, design in state.groundings}
         model = self.model
-        for what, names, known in (("", functions, model.functions), (" design", designs, model.designs)):
+        for what, names, known in (
+            ("", functions, model.functions),
+            (" design", designs, model.designs),
+        ):
             for name in sorted(names.difference(known)):
                 remedy = f"known: {', '.join(sorted(known)) or 'none'}"
-                raise KnowledgeError(f"the knowledge base has no function{what} {name}", remedy=remedy)
+                raise KnowledgeError(
+                    f"the knowledge base has no function{what} {name}", remedy=remedy
+                )
         triples = tuple(model.triples(state))
         absent = model.in_states.difference(subject for subject, _, _ in triples)
         return tuple(triple for triple in triples if triple[2] not in absent)
@@ -580,7 +742,9 @@ class Ontology:
         return self.facts.union(rdf.facts_of((*self.assertions(state), *facts), self.names))
 
     def unsolved(self, functions: Iterable[str]) -> Iterator[tuple[str, str, str]]:
-        """Yield those functions that are not there or have no design: name, what is wrong, what would be right."""
+        """Yield those functions that are not there or have no design: name, what is wrong, what
+        would be right.
+        """
         for name in sorted(functions):
             if name not in self.model.functions:
                 remedy = f"functions in the ontology: {', '.join(self.functions) or 'none'}"

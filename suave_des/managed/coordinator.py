@@ -1,6 +1,8 @@
-"""The mission coordinator: the two tasks, one after the other, the time limit, and the two metrics it records.
+"""The mission coordinator: the two tasks, one after the other, the time limit, and the two metrics
+it records.
 
-Source: the mission node of kas-lab/suave (its names are those of the paper), of 4 February 2023 and of 1.5.0.
+Source: the mission node of kas-lab/suave (its names are those of the paper), of 4 February 2023 and
+of 1.5.0.
 """
 
 from __future__ import annotations
@@ -23,16 +25,20 @@ from suave_des.scenario.models import Scenario
 
 @dataclass(eq=False)
 class MissionCoordinator:
-    """Requests search_pipeline, then, when the pipeline is detected, inspect_pipeline; after a leak, surface.
+    """Requests search_pipeline, then, when the pipeline is detected, inspect_pipeline; after a
+    leak, surface.
 
     Attributes:
-        scenario: has the time limit, the revision's timers, and the functions that tasks need besides the exemplar's.
+        scenario: has the time limit, the revision's timers, and the functions that tasks need
+            besides the exemplar's.
         draws: of the run: when the first task starts, and the phases of timers.
         surfaced: the event of the vehicle at the surface, where a leak is possible.
         ended: the event of the mission's end: the time limit, or the end of the path.
-        search_time_s: whole seconds until the pipeline was found, as the revision counts them; None before.
+        search_time_s: whole seconds until the pipeline was found, as the revision counts them; None
+            before.
         task: the current task; None between and after tasks.
-        mission_wide_functions: functions that are needed from launch to the end (or a leak), and belong to no task.
+        mission_wide_functions: functions that are needed from launch to the end (or a leak), and
+            belong to no task.
     """
 
     env: simpy.Environment
@@ -48,7 +54,10 @@ class MissionCoordinator:
 
     def __post_init__(self) -> None:
         self.ended: simpy.Event = self.env.event()
-        self.time_limit_s, further = self.scenario.mission.time_limit_s, self.scenario.mission.functions
+        self.time_limit_s, further = (
+            self.scenario.mission.time_limit_s,
+            self.scenario.mission.functions,
+        )
         self.revision = revision = self.scenario.revision.coordinator
         self._start_s = self.draws.value("latencies.task_start_s")
         self._poll_phase_s = self.draws.phase("coordinator", revision.poll_period_s)
@@ -56,8 +65,12 @@ class MissionCoordinator:
         per_task = revision.maintain_motion_per_task
         always, each_task = ((), (MAINTAIN_MOTION,)) if per_task else ((MAINTAIN_MOTION,), ())
         self.mission_wide_functions: tuple[str, ...] = (*always, *further.mission_wide)
-        self._search = Task("search_pipeline", (*each_task, GENERATE_SEARCH_PATH, *further.search_pipeline))
-        self._inspect = Task("inspect_pipeline", (*each_task, FOLLOW_PIPELINE, *further.inspect_pipeline))
+        self._search = Task(
+            "search_pipeline", (*each_task, GENERATE_SEARCH_PATH, *further.search_pipeline)
+        )
+        self._inspect = Task(
+            "inspect_pipeline", (*each_task, FOLLOW_PIPELINE, *further.inspect_pipeline)
+        )
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -98,7 +111,9 @@ class MissionCoordinator:
         yield self._next_poll()
         by_detection = self.revision.search_time == "detection"
         found_s = self.detector.detected_s if by_detection else self.env.now
-        self.search_time_s = float(math.floor(found_s + 1e-9))  # a rounding error below a second counts as it
+        self.search_time_s = float(
+            math.floor(found_s + 1e-9)
+        )  # a rounding error below a second counts as it
         self._end("task_done")
         self._begin(self._inspect)
         yield self.follow.finished
@@ -108,7 +123,10 @@ class MissionCoordinator:
 
     def _surface(self) -> Process:
         self._end("task_cancelled")
-        given_up, self.mission_wide_functions = Task("mission_wide", self.mission_wide_functions), ()
+        given_up, self.mission_wide_functions = (
+            Task("mission_wide", self.mission_wide_functions),
+            (),
+        )
         self._cancel(given_up)
         self._begin(Task("surface", (SURFACE,)))
         assert self.surfaced is not None  # there is a leak
@@ -130,7 +148,10 @@ class MissionCoordinator:
         self._finish(f"the battery is down to {battery.level(self.env.now):.2f}")
 
     def _next_poll(self) -> simpy.Event:
-        return until(self.env, tick_at_or_after(self.env.now, self._poll_phase_s, self.revision.poll_period_s))
+        return until(
+            self.env,
+            tick_at_or_after(self.env.now, self._poll_phase_s, self.revision.poll_period_s),
+        )
 
     def _begin(self, task: Task) -> None:
         self.task = task

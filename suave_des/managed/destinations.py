@@ -1,4 +1,5 @@
-"""Functions that send the vehicle to one place: the recharge station (revision 1.5), and the surface after a leak.
+"""Functions that send the vehicle to one place: the recharge station (revision 1.5), and the
+surface after a leak.
 
 Source of the first: node recharge_battery of kas-lab/suave 1.5.0; the exemplar has no leak.
 """
@@ -23,7 +24,8 @@ CHECKS_A_SECOND, RESEND_CHECKS = 2, 20
 
 @dataclass(eq=False)
 class GenerateRechargePath(ProcessNode):
-    """The recharge function: at each tick while active a docked vehicle is recharged, and the station is sent.
+    """The recharge function: at each tick while active a docked vehicle is recharged, and the
+    station is sent.
 
     Attributes:
         station, level: where the station is, and how often docking is checked; the battery's level.
@@ -37,10 +39,15 @@ class GenerateRechargePath(ProcessNode):
     def activity(self) -> Process:
         """Go to the station, and recharge there."""
         station, z_m = self.station, SEA_BED_Z_M + self.station.approach_altitude_m
-        yield until(self.env, tick_at_or_after(self.env.now, self.phase_s, station.docking_check_period_s))
+        yield until(
+            self.env, tick_at_or_after(self.env.now, self.phase_s, station.docking_check_period_s)
+        )
         while True:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-            if max(abs(x_m - station.station_x_m), abs(y_m - station.station_y_m)) <= station.station_radius_m:
+            if (
+                max(abs(x_m - station.station_x_m), abs(y_m - station.station_y_m))
+                <= station.station_radius_m
+            ):
                 self.level.recharge(self.env.now)
             self.sender.send(station.station_x_m, station.station_y_m, z_m)
             yield self.env.timeout(station.docking_check_period_s)
@@ -48,7 +55,8 @@ class GenerateRechargePath(ProcessNode):
 
 @dataclass(eq=False)
 class Surface(ProcessNode):
-    """The surface function: while active, the set-point is above the place of activation, sent again every 10 s.
+    """The surface function: while active, the set-point is above the place of activation, sent
+    again every 10 s.
 
     Attributes:
         surfaced: triggered when the vehicle is at the surface, which is checked twice a second.

@@ -12,20 +12,26 @@ from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _MIN_ROWS_AHEAD = 60
-"""Minimum look-ahead after a change of control, doubled while there is no other; or as far as guidance has computed."""
+"""Minimum look-ahead after a change of control, doubled while there is no other; or as far as
+guidance has computed.
+"""
 _AFTER_CONTROL_S = 0.6 * STEP_S
-"""Delay past the last checked row before more are checked: a control change that rounds to that row comes first."""
+"""Delay past the last checked row before more are checked: a control change that rounds to that row
+comes first.
+"""
 
 
 @dataclass(eq=False)
 class PipelineDetector:
     """Watches from t = 0 until a point of the pipeline is seen for the first time.
 
-    The exemplar checks at each pose message. Here each row of the vehicle's track is checked, ahead of time under the
-    present control, and again when control changes; so the moment does not depend on when the position is read.
+    The exemplar checks at each pose message. Here each row of the vehicle's track is checked, ahead
+    of time under the present control, and again when control changes; so the moment does not depend
+    on when the position is read.
 
     Attributes:
-        visibility: measured water visibility: the times, s, at which the value changes, and the values, m.
+        visibility: measured water visibility: the times, s, at which the value changes, and the
+            values, m.
         points: points as the detection places them, shape (n, 3), m.
         bounds_m: the least and the greatest coordinates of the points.
         view_tangent: tangent of half the camera's field of view.
@@ -58,14 +64,18 @@ class PipelineDetector:
         self._look_ahead(row)
 
     def _look_ahead(self, row: int) -> None:
-        """Check the rows from one on; set the alarm to the first sight, or to the last row that was checked."""
+        """Check the rows from one on; set the alarm to the first sight, or to the last row that was
+        checked.
+        """
         last = min(max(row + self._rows_ahead, self.vehicle.computed_row), self.vehicle.last_row)
         if row >= last:
             self._alarm.cancel()
             return
         self.vehicle.look_ahead(last)
         seen = self.points, self.bounds_m, self.view_tangent
-        seen_row, self._seen = first_detection(self.vehicle.track, (row, last), STEP_S, self.visibility, *seen)
+        seen_row, self._seen = first_detection(
+            self.vehicle.track, (row, last), STEP_S, self.visibility, *seen
+        )
         if self._seen < 0:
             self._row = last
             self._alarm.set(last * STEP_S + _AFTER_CONTROL_S)

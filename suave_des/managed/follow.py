@@ -38,8 +38,8 @@ class InspectionPath(NamedTuple):
     def there_and_back(cls, points_m: Array, altitude_m: float) -> Self:
         """Make the path above all points, shape (n, at least 2), and back: 2 n points.
 
-        From its element i on it is the path to follow when point i is seen first: on to the far end, then back along
-        all.
+        From its element i on it is the path to follow when point i is seen first: on to the far
+        end, then back along all.
         """
         x_y_m = np.concatenate((points_m[:, :2], points_m[::-1, :2]))
         lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
@@ -48,7 +48,8 @@ class InspectionPath(NamedTuple):
 
 @dataclass(eq=False)
 class FollowPipeline(WaypointFunction):
-    """The follow function: its way-points are the points of the path, each sent when the previous one is reached.
+    """The follow function: its way-points are the points of the path, each sent when the previous
+    one is reached.
 
     Attributes:
         path: from the start of the pipeline to its end, and back.
@@ -75,7 +76,8 @@ class FollowPipeline(WaypointFunction):
         return self._published_m
 
     def activated(self) -> None:
-        """Start; the distance restarts at zero, although the published value stays until there is a new one.
+        """Start; the distance restarts at zero, although the published value stays until there is a
+        new one.
 
         If the revision lets the distance accumulate, only the piece that was interrupted is lost.
         """
@@ -88,20 +90,24 @@ class FollowPipeline(WaypointFunction):
             self.start_at(self.env.now)
 
     def deactivated(self) -> None:
-        """Stop; revision 2023 adds the distance from the last point reached, if any, to the current position."""
+        """Stop; revision 2023 adds the distance from the last point reached, if any, to the current
+        position.
+        """
         if self.finished.triggered:
             return
         self.stop()
         if self.revision.counts_interrupted_piece and self._has_arrived:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-            self._travelled_m += math.dist(self.path.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
+            self._travelled_m += math.dist(
+                self.path.points_m[self._next - 1, :2].tolist(), (x_m, y_m)
+            )
             self._published_m = self._travelled_m
 
     def arrival_check(self, start_s: float) -> ArrivalCheck:
         """Check at each poll, in x and y alone."""
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
-        # Otherwise the poll counter restarts with each resend; here it stays above the limit, so every later poll
-        # resends.
+        # Otherwise the poll counter restarts with each resend; here it stays above the limit, so
+        # every later poll resends.
         polls = self.revision.polls_before_resending
         waits = (polls + 1, 1) if self.revision.resends_at_each_poll else (polls, polls)
         return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits)
@@ -119,7 +125,9 @@ class FollowPipeline(WaypointFunction):
         return SEA_BED_Z_M + self.revision.altitude_m
 
     def reached(self, count: int) -> None:
-        """Add to the distance, starting at the first point, and publish it at each point after that."""
+        """Add to the distance, starting at the first point, and publish it at each point after
+        that.
+        """
         lengths_m = self.path.lengths_m[self._next + (not self._has_arrived) : self._next + count]
         self._next += count
         self._has_arrived = True

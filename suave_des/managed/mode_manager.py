@@ -19,15 +19,17 @@ from suave_des.scenario.modes import Mode, ModeTable
 class ModeManager:
     """Offers change_mode and available_modes for the functions of a modes file.
 
-    A request is answered at once: True for any known mode, even the one that is already set, in which case nothing
-    happens. The effect comes later; effects on one function keep the order of their requests.
+    A request is answered at once: True for any known mode, even the one that is already set, in
+    which case nothing happens. The effect comes later; effects on one function keep the order of
+    their requests.
 
     Attributes:
         latency_s: draws the time from a request to its effect.
         listeners: each is called with function and mode when a mode has taken effect.
-        adaptation_listeners: each is called at each adaptation with function, mode before and mode requested.
-        adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor
-            the fd_unground at its end counts.
+        adaptation_listeners: each is called at each adaptation with function, mode before and mode
+            requested.
+        adaptations: changes from one mode to another of functions in use; neither a task's first
+            mode of a function nor the fd_unground at its end counts.
         requests: requests for a mode that differs from the previous one.
         refused: functions and modes whose requests were refused.
     """
@@ -47,19 +49,26 @@ class ModeManager:
     _in_use: set[str] = field(default_factory=set)
 
     def available_modes(self, function: str) -> tuple[str, ...]:
-        """List a function's modes, in the order of the modes file; none for one that is unknown or has no node."""
-        return self.table.modes(function) if function in self.table and function in self.nodes else ()
+        """List a function's modes, in the order of the modes file; none for one that is unknown or
+        has no node.
+        """
+        return (
+            self.table.modes(function) if function in self.table and function in self.nodes else ()
+        )
 
     def current_mode(self, function: str) -> str | None:
         """Return the last requested mode; None before the first request."""
         return self._requested.get(function)
 
     def end_task(self, functions: Iterable[str]) -> None:
-        """End the functions' task: mode changes do not count as adaptations until they are in use again."""
+        """End the functions' task: mode changes do not count as adaptations until they are in use
+        again.
+        """
         self._in_use.difference_update(functions)
 
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
-        """Request a mode; False for a function or mode that the modes file does not have, or that has no node here.
+        """Request a mode; False for a function or mode that the modes file does not have, or that
+        has no node here.
 
         Its effect comes after `latency_s`; None: after a latency that is drawn.
         """
@@ -91,8 +100,12 @@ class ModeManager:
             called = f"change_mode({shown(function)}, {shown(mode)})"
             return InputError(f"{called} has its arguments swapped", remedy="function, then mode")
         if known := self.available_modes(function):
-            return InputError(f"{function} has no mode {shown(mode)}", remedy=did_you_mean(mode, known))
-        remedy = f"{did_you_mean(function, self.nodes)}; name its class under functions: in the scenario"
+            return InputError(
+                f"{function} has no mode {shown(mode)}", remedy=did_you_mean(mode, known)
+            )
+        remedy = (
+            f"{did_you_mean(function, self.nodes)}; name its class under functions: in the scenario"
+        )
         return InputError(f"there is no function {shown(function)}", remedy=remedy)
 
     def _take_effect(self, function: str, mode: Mode) -> None:

@@ -18,7 +18,8 @@ from suave_des.scenario.models import RecoveryRevision
 
 @dataclass(eq=False)
 class MaintainMotion(ProcessNode):
-    """The motion function: recovers the thrusters one by one after a delay, and reports each that can be recovered.
+    """The motion function: recovers the thrusters one by one after a delay, and reports each that
+    can be recovered.
 
     Attributes:
         delay_s: draws the time from the activation to the recovery of the first thruster.
@@ -46,7 +47,11 @@ class MaintainMotion(ProcessNode):
         vehicle.expected_changes_s["recovery"] = self.env.now + (delay_s := self.delay_s())
         yield self.env.timeout(delay_s)
         for number, name in enumerate(THRUSTER_NAMES, start=1):
-            if failed := [periods for periods, state in enumerate(vehicle.thrusters[number:], 1) if state != "works"]:
+            if failed := [
+                periods
+                for periods, state in enumerate(vehicle.thrusters[number:], 1)
+                if state != "works"
+            ]:
                 vehicle.expected_changes_s["recovery"] = self.env.now + failed[0] * period_s
             if self.thrusters.recover(number):
                 self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))

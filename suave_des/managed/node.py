@@ -1,4 +1,6 @@
-"""Functions of the managed subsystem: nodes with a life cycle; and the base of functions that the exemplar lacks."""
+"""Functions of the managed subsystem: nodes with a life cycle; and the base of functions that the
+exemplar lacks.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,8 @@ Log = Callable[[str, str, str], None]
 class FunctionNode:
     """A function's life-cycle node: active or inactive, according to its current mode.
 
-    Subclasses say what happens on activation, on deactivation and on a change of parameters while active; each hook is
-    called at the mission time at which the mode takes effect.
+    Subclasses say what happens on activation, on deactivation and on a change of parameters while
+    active; each hook is called at the mission time at which the mode takes effect.
     """
 
     env: simpy.Environment
@@ -68,7 +70,9 @@ class ProcessNode(FunctionNode):
         self._process = self.env.process(self._until_interrupted())
 
     def deactivated(self) -> None:
-        """Interrupt the activity; the autopilot keeps the last set-point until another function sends one."""
+        """Interrupt the activity; the autopilot keeps the last set-point until another function
+        sends one.
+        """
         if self._process is not None and self._process.is_alive:
             self._process.interrupt()
 
@@ -83,7 +87,8 @@ class SetPointSender:
 
     Attributes:
         vehicle: the vehicle whose autopilot receives the set-points.
-        frame_error_m: where the vehicle goes minus where the node sends it, in x, y and z: its frame is a bit off.
+        frame_error_m: where the vehicle goes minus where the node sends it, in x, y and z: its
+            frame is a bit off.
         loss_probability: probability that a message is lost.
         stream: random stream that decides which messages are lost; not needed if none can be.
     """
@@ -93,7 +98,9 @@ class SetPointSender:
     frame_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     loss_probability: float = 0.0
     stream: random.Random | None = None
-    _before_loss: float = field(init=False)  # how many messages arrive before the next one that is lost
+    _before_loss: float = field(
+        init=False
+    )  # how many messages arrive before the next one that is lost
 
     def __post_init__(self) -> None:
         self._before_loss = self._draw()
@@ -110,8 +117,12 @@ class SetPointSender:
             x_error_m, y_error_m, z_error_m = self.frame_error_m
             self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
 
-    def course(self, waypoints: Array, z_m: float, check: ArrivalCheck, ticks: Ticks, most: int) -> Course:
-        """Make a course (see there) that ends with the first set-point whose message will be lost."""
+    def course(
+        self, waypoints: Array, z_m: float, check: ArrivalCheck, ticks: Ticks, most: int
+    ) -> Course:
+        """Make a course (see there) that ends with the first set-point whose message will be
+        lost.
+        """
         x_error_m, y_error_m, z_error_m = self.frame_error_m
         sent_as_m = x_error_m, y_error_m, z_m + z_error_m + self.vehicle.altitude_error_m
         return Course(check, waypoints, sent_as_m, ticks, int(min(most, self._before_loss)))
@@ -127,10 +138,14 @@ class SetPointSender:
         return is_lost
 
     def _draw(self) -> float:
-        """Draw the number of messages that arrive before one is lost, from the geometric distribution, by inversion."""
+        """Draw the number of messages that arrive before one is lost, from the geometric
+        distribution, by inversion.
+        """
         if self.stream is None or self.loss_probability == 0.0:
             return math.inf
-        return math.floor(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
+        return math.floor(
+            math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability)
+        )
 
 
 @dataclass(frozen=True)
@@ -161,10 +176,11 @@ class FunctionContext:
 
 
 class CustomFunction(FunctionNode):
-    """Base of user-defined functions: override what happens on activation, deactivation and a change of parameters.
+    """Base of user-defined functions: override what happens on activation, deactivation and a
+    change of parameters.
 
-    The hooks are called at the mission time at which a mode takes effect. They must not block; what takes mission time
-    is a process: `self.env.process(...)`.
+    The hooks are called at the mission time at which a mode takes effect. They must not block; what
+    takes mission time is a process: `self.env.process(...)`.
 
     Attributes:
         context: what can be seen and done.

@@ -32,8 +32,10 @@ def spiral(
 
     Args:
         step, radius_m: step counter and radius before the first of them.
-        altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees from there.
-        form: angle from one way-point to the next, rad, and the tangent of half the camera's field of view.
+        altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees
+            from there.
+        form: angle from one way-point to the next, rad, and the tangent of half the camera's field
+            of view.
         centre_m: x and y of its centre.
         waypoints: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
     """
@@ -51,7 +53,8 @@ def spiral(
 
 @dataclass(eq=False)
 class GenerateSearchPath(WaypointFunction):
-    """The search function: generates the way-points of a spiral, each sent when the previous one is reached.
+    """The search function: generates the way-points of a spiral, each sent when the previous one is
+    reached.
 
     Attributes:
         centre_m: x and y of the spiral's centre; in revision 2023 the local frame's origin.
@@ -68,7 +71,9 @@ class GenerateSearchPath(WaypointFunction):
     start_latency_s: float = 0.0
     altitude_m: float = field(init=False)
     _below_m: float = field(default=0.0, init=False)  # how far below the altitude the set-point is
-    _ready_s: float | None = field(default=None, init=False)  # earliest mission time of the first tick
+    _ready_s: float | None = field(
+        default=None, init=False
+    )  # earliest mission time of the first tick
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,7 +83,9 @@ class GenerateSearchPath(WaypointFunction):
     def _restart(self) -> None:
         self._step = 0
         self._last_altitude_m: float | None = None  # at the last tick
-        self._ahead: Array | None = None  # the current way-point and some that follow it; None before the first
+        self._ahead: Array | None = (
+            None  # the current way-point and some that follow it; None before the first
+        )
 
     def configure(self, mode: Mode) -> None:
         """Apply the mode's spiral_altitude; the spiral itself continues."""
@@ -96,12 +103,16 @@ class GenerateSearchPath(WaypointFunction):
         if self.revision.workaround_cleared_on_activation:
             self._below_m = 0.0
         is_first = self._ahead is None
-        if self.revision.centre == "activation" or (self.revision.centre == "first_activation" and is_first):
+        if self.revision.centre == "activation" or (
+            self.revision.centre == "first_activation" and is_first
+        ):
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
             self._keep_current()
         if self._ready_s is None:
             self._ready_s = self.env.now + self.start_latency_s
-        first_s = tick_at_or_after(max(self.env.now, self._ready_s), self.phase_s, self.revision.tick_period_s)
+        first_s = tick_at_or_after(
+            max(self.env.now, self._ready_s), self.phase_s, self.revision.tick_period_s
+        )
         self.start_at(first_s, resumes=not (is_first or self.revision.resends_on_activation))
 
     def deactivated(self) -> None:
@@ -135,7 +146,9 @@ class GenerateSearchPath(WaypointFunction):
         return waypoints[:count]
 
     def set_point_z_m(self) -> float:
-        """Return the z of the altitude, lowered by the work-around; arrival is checked at the way-point's own z."""
+        """Return the z of the altitude, lowered by the work-around; arrival is checked at the
+        way-point's own z.
+        """
         return SEA_BED_Z_M + self.altitude_m - self._below_m
 
     def reached(self, count: int) -> None:
@@ -147,17 +160,23 @@ class GenerateSearchPath(WaypointFunction):
     def not_reached(self) -> None:
         """Command a lower altitude if only z is not reached.
 
-        This is the exemplar's work-around for an autopilot that stops short of its altitude set-point.
+        This is the exemplar's work-around for an autopilot that stops short of its altitude
+        set-point.
         """
         x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
         waypoint = self.waypoints(1)
-        if max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1))) <= self.revision.acceptance_m:
+        if (
+            max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1)))
+            <= self.revision.acceptance_m
+        ):
             self._below_m += self.revision.workaround_step_m
 
     def arrival_check(self, start_s: float) -> ArrivalCheck:
         """Check at each tick, from the one after the way-point's on."""
-        # The exemplar resends when its wait counter exceeds 10. Sending resets the counter; a resend also counts in
-        # the same tick, hence one tick less.
+        # The exemplar resends when its wait counter exceeds 10. Sending resets the counter; a
+        # resend also counts in the same tick, hence one tick less.
         node = self.revision
         first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
-        return ArrivalCheck(start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)
+        return ArrivalCheck(
+            start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again
+        )

@@ -1,7 +1,7 @@
 """The managing subsystem: a base class with a few hooks, and what it sees of the managed subsystem.
 
-The built-in managers use nothing that one of your own cannot. Give yours on the command line as `package.module:Class`,
-or register it by name as an entry point of the group `suave_des.managers`.
+The built-in managers use nothing that one of your own cannot. Give yours on the command line as
+`package.module:Class`, or register it by name as an entry point of the group `suave_des.managers`.
 """
 
 from __future__ import annotations
@@ -43,11 +43,13 @@ class System:
 
     Attributes:
         env: the mission's clock; `env.timeout(s)` is an event to wait for.
-        modes: the mode manager: `available_modes(function)`, and `current_mode(function)`, which was requested last.
+        modes: the mode manager: `available_modes(function)`, and `current_mode(function)`, which
+            was requested last.
         measurements: the monitors' measurements, by quality attribute; see `measured`.
         scenario: the mission's scenario.
         settings: the scenario's entry for this manager, under `managers:`.
-        recorded: whether the mission is recorded; if not, work that only serves the log can be skipped.
+        recorded: whether the mission is recorded; if not, work that only serves the log can be
+            skipped.
         state_changed: call this when something that `adapt` depends on has changed outside a hook.
 
     Example:
@@ -70,7 +72,9 @@ class System:
     _files: Mapping[str, Path]
     _open_knowledge: Callable[[], Reasoner]
     state_changed: Callable[[], None] = field(default=lambda: None, init=False)
-    unmeasured: set[str] = field(default_factory=set, init=False)  # names that nothing measures, for a remark
+    unmeasured: set[str] = field(
+        default_factory=set, init=False
+    )  # names that nothing measures, for a remark
 
     @property
     def now_s(self) -> float:
@@ -88,7 +92,8 @@ class System:
         return self._coordinator.functions
 
     def measured(self, attribute: str, since_s: float = 0.0) -> float | None:
-        """Look up the last published value of a quality attribute, such as water_visibility, not before `since_s`.
+        """Look up the last published value of a quality attribute, such as water_visibility, not
+        before `since_s`.
 
         None if there is none; a repetition of the value before is not a publication.
         """
@@ -129,7 +134,8 @@ class System:
     def first_tick_s(self, timer: str, period_s: float) -> float:
         """Draw when a periodic timer of the manager first ticks in this run.
 
-        Nodes start at arbitrary times; a timer that the scenario's revision has in step with others ticks with them.
+        Nodes start at arbitrary times; a timer that the scenario's revision has in step with others
+        ticks with them.
         """
         in_step = timer in self.scenario.revision.timers_in_step
         return period_s if in_step else self.stream(f"{timer}/phase").uniform(0.0, period_s)
@@ -139,7 +145,8 @@ class System:
         return self._open_knowledge()
 
     def file(self, name: str) -> Path:
-        """Find an input file on this machine by its name, as `ManagingSubsystem.input_files` gave it.
+        """Find an input file on this machine by its name, as `ManagingSubsystem.input_files` gave
+        it.
 
         Raises:
             InputError: it was not given there.
@@ -151,27 +158,32 @@ class System:
 
 
 class ManagingSubsystem:
-    """Base of all managers. Override the hooks that you need; each is called at the mission time of its event.
+    """Base of all managers. Override the hooks that you need; each is called at the mission time of
+    its event.
 
-    A hook must not block: to let mission time pass, `adapt` may be a generator that yields events of `system.env`.
+    A hook must not block: to let mission time pass, `adapt` may be a generator that yields events
+    of `system.env`.
 
     Attributes:
         system: what the manager sees and can do.
         period_s: time between calls of `adapt`; None: never called.
         starts_s: mission time of the first call of `adapt`.
         reasoning_time_s: mission time that reasoning took before adaptations; a further metric.
-        least_latency_s: time from a call of `adapt` to a request at the earliest; only serves the simulation's speed.
-        needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one, and a
-            reasoner runs beside the simulator, which slows it down (`calibration.reasoning_slowdown`).
-        subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads `system.measured`
-            when it adapts need not subscribe to measured values; publishing each of them takes time. Pose and distance
-            come once a second, to those who name their kinds.
+        least_latency_s: time from a call of `adapt` to a request at the earliest; only serves the
+            simulation's speed.
+        needs_knowledge: whether missions need the knowledge base, so that it is checked before the
+            first one, and a reasoner runs beside the simulator, which slows it down
+            (`calibration.reasoning_slowdown`).
+        subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads
+            `system.measured` when it adapts need not subscribe to measured values; publishing each
+            of them takes time. Pose and distance come once a second, to those who name their kinds.
 
-    A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends only on what its hooks were
-    called with, and on how measured values compare with fixed thresholds, is event-triggered, and declares it by
-    `depends_on`. After a call of `adapt` that returned None, or a generator that returned True (a call right then would
-    change nothing), the next call is at the first of its times after a hook was called, or a measured value has crossed
-    a threshold: fewer calls, the same mission (but for an event at the very time of a call, which may come before it;
+    A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends only on what
+    its hooks were called with, and on how measured values compare with fixed thresholds, is
+    event-triggered, and declares it by `depends_on`. After a call of `adapt` that returned None, or
+    a generator that returned True (a call right then would change nothing), the next call is at the
+    first of its times after a hook was called, or a measured value has crossed a threshold: fewer
+    calls, the same mission (but for an event at the very time of a call, which may come before it;
     and if a call that changes nothing takes time, in which something happens).
 
     Example:
@@ -194,9 +206,11 @@ class ManagingSubsystem:
 
     @classmethod
     def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
-        """Name the files that the manager reads, with its settings; it finds them by `system.file(name)`.
+        """Name the files that the manager reads, with its settings; it finds them by
+        `system.file(name)`.
 
-        They are hashed into manifest.json, compared when a campaign is resumed, and sent to the workers of a cluster.
+        They are hashed into manifest.json, compared when a campaign is resumed, and sent to the
+        workers of a cluster.
         """
         return (str(settings["learned"]),) if "learned" in settings else ()
 
@@ -213,7 +227,8 @@ class ManagingSubsystem:
 
     @property
     def depends_on(self) -> Dependencies | None:
-        """The measured values that `adapt` depends on, with their thresholds; None: it may depend on anything.
+        """The measured values that `adapt` depends on, with their thresholds; None: it may depend
+        on anything.
 
         Only the class that defines it is asked: one derived from it may depend on more.
         """
@@ -223,8 +238,9 @@ class ManagingSubsystem:
         """Called before t = 0 with the training result.
 
         Args:
-            learned: in `suave-des train` a dict that is kept from mission to mission; otherwise the content of the file
-                that the setting `learned` names, which cannot be changed, empty without one.
+            learned: in `suave-des train` a dict that is kept from mission to mission; otherwise the
+                content of the file that the setting `learned` names, which cannot be changed, empty
+                without one.
             training: whether the mission is one of `suave-des train`.
         """
 
@@ -243,8 +259,12 @@ class ManagingSubsystem:
             self.system.change_mode(function, UNGROUND_MODE)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Called for each diagnostic of a subscribed kind: a component's status, or a changed measured value."""
+        """Called for each diagnostic of a subscribed kind: a component's status, or a changed
+        measured value.
+        """
 
     def adapt(self) -> AdaptationProcess | None:
-        """Adapt, once every `period_s`; a call that would come while an earlier one still runs is skipped."""
+        """Adapt, once every `period_s`; a call that would come while an earlier one still runs is
+        skipped.
+        """
         return None

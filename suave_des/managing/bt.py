@@ -29,8 +29,8 @@ class Behaviour:
     """A part of a behaviour tree; nothing here takes longer than a tick.
 
     Attributes:
-        kind: "->" (sequence) ticks its children until one fails, "?" (fallback) until one succeeds, "=>" (parallel)
-            ticks all; "!" requests a mode, and succeeds; "" is a condition.
+        kind: "->" (sequence) ticks its children until one fails, "?" (fallback) until one succeeds,
+            "=>" (parallel) ticks all; "!" requests a mode, and succeeds; "" is a condition.
         name: for drawings and timelines.
         children: the parts below, in the order in which they are ticked.
         act: what a condition or request does; it returns whether it succeeded.
@@ -69,10 +69,14 @@ class Behaviour:
         yield f"{first}{self.kind} {self.name}" if self.kind else f"{first}{self.name}"
         for child in self.children:
             is_last = child is self.children[-1]
-            yield from child.drawing(further + ("└─ " if is_last else "├─ "), further + ("   " if is_last else "│  "))
+            yield from child.drawing(
+                further + ("└─ " if is_last else "├─ "), further + ("   " if is_last else "│  ")
+            )
 
     def requests(self, held: tuple[str, ...] = ()) -> Iterator[str]:
-        """Summarise the last tick: each mode that was requested, with the conditions that held on the way to it."""
+        """Summarise the last tick: each mode that was requested, with the conditions that held on
+        the way to it.
+        """
         for child in self.children:
             if child.succeeded is None:
                 continue
@@ -85,7 +89,9 @@ class Behaviour:
 
 
 class BehaviourTree(RemembersFailures):
-    """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected."""
+    """bt: recover a failed thruster; search as high as the visibility allows; follow once the
+    pipeline is detected.
+    """
 
     def __init__(self, system: System) -> None:
         super().__init__(system)
@@ -125,23 +131,36 @@ class BehaviourTree(RemembersFailures):
         surface = self._while_needed(SURFACE, self._set(SURFACE, SURFACE_MODE))
         mode = self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
         follow = self._while_needed(FOLLOW_PIPELINE, self._set(FOLLOW_PIPELINE, mode))
-        return self._motion(), self._search(), *((surface,) if self.system.scenario.leak is not None else ()), follow
+        return (
+            self._motion(),
+            self._search(),
+            *((surface,) if self.system.scenario.leak is not None else ()),
+            follow,
+        )
 
     def _motion(self) -> Behaviour:
         failed = Behaviour("", "a thruster has failed", act=lambda: bool(self.failed))
         recover = self._set(MAINTAIN_MOTION, "fd_recover_thrusters")
-        choices = (Behaviour("->", "recovery", (failed, recover)), self._set(MAINTAIN_MOTION, "fd_all_thrusters"))
+        choices = (
+            Behaviour("->", "recovery", (failed, recover)),
+            self._set(MAINTAIN_MOTION, "fd_all_thrusters"),
+        )
         return self._while_needed(MAINTAIN_MOTION, Behaviour("?", "thrusters", choices))
 
     def _search(self) -> Behaviour:
-        # An unknown visibility counts as good; below the lowest threshold, the search stays at the lowest altitude.
-        pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
+        # An unknown visibility counts as good; below the lowest threshold, the search stays at the
+        # lowest altitude.
+        pairs = zip(
+            self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True
+        )
         heights = [
             Behaviour("->", mode, (self._is_clear(least_m), self._set(GENERATE_SEARCH_PATH, mode)))
             for least_m, mode in pairs
         ]
         lowest = self._set(GENERATE_SEARCH_PATH, self._settings.search_modes[-1])
-        return self._while_needed(GENERATE_SEARCH_PATH, Behaviour("?", "altitude", (*heights, lowest)))
+        return self._while_needed(
+            GENERATE_SEARCH_PATH, Behaviour("?", "altitude", (*heights, lowest))
+        )
 
     def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
         needed = Behaviour("", "is needed", act=lambda: function in self.system.functions)
@@ -163,7 +182,9 @@ class BehaviourTree(RemembersFailures):
 
 
 class ExtendedBehaviourTree(BehaviourTree):
-    """bt_extended: the same, but with a low battery the vehicle goes to recharge; the way there then stays active."""
+    """bt_extended: the same, but with a low battery the vehicle goes to recharge; the way there
+    then stays active.
+    """
 
     @property
     def depends_on(self) -> Dependencies:
@@ -174,13 +195,21 @@ class ExtendedBehaviourTree(BehaviourTree):
         """Make the tree; without a battery there is no station to go to."""
         if self.system.scenario.battery is None:
             return super().make_tree()
-        # A guard on the level halts the exemplar's sequence as soon as the battery is full, before the last step, which
-        # would make the function inactive: it goes on sending the station, whatever else is done.
-        go = Behaviour("->", GENERATE_RECHARGE_PATH, (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
+        # A guard on the level halts the exemplar's sequence as soon as the battery is full, before
+        # the last step, which would make the function inactive: it goes on sending the station,
+        # whatever else is done.
+        go = Behaviour(
+            "->",
+            GENERATE_RECHARGE_PATH,
+            (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")),
+        )
         return Behaviour("=>", "mission", (*self._branches(), go))
 
     def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
-        if self.system.scenario.battery is not None and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
+        if self.system.scenario.battery is not None and function in (
+            GENERATE_SEARCH_PATH,
+            FOLLOW_PIPELINE,
+        ):
             pause = Behaviour("->", "pause", (self._is_low(), self._set(function, UNGROUND_MODE)))
             branch = Behaviour("?", "unless the battery is low", (pause, branch))
         return super()._while_needed(function, branch)
@@ -188,6 +217,10 @@ class ExtendedBehaviourTree(BehaviourTree):
     def _is_low(self) -> Behaviour:
         def holds() -> bool:
             level = self.system.measured(BATTERY_LEVEL)
-            return level is not None and level < self._settings.battery_limit and SURFACE not in self.system.functions
+            return (
+                level is not None
+                and level < self._settings.battery_limit
+                and SURFACE not in self.system.functions
+            )
 
         return Behaviour("", f"battery is below {self._settings.battery_limit:g}", act=holds)

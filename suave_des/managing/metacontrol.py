@@ -1,8 +1,9 @@
 """Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol).
 
-Monitor: read the measured values; component statuses arrive as diagnostics. Analyze: a reasoner infers what the rules
-say about that state. Plan: the best function design for each objective that needs one. Execute: request the mode of the
-design's name. Source of what revisions do differently: kas-lab/suave with its reasoner, 4 February 2023 to 1.5.0.
+Monitor: read the measured values; component statuses arrive as diagnostics. Analyze: a reasoner
+infers what the rules say about that state. Plan: the best function design for each objective that
+needs one. Execute: request the mode of the design's name. Source of what revisions do differently:
+kas-lab/suave with its reasoner, 4 February 2023 to 1.5.0.
 """
 
 from collections.abc import Callable, Collection, Hashable
@@ -27,19 +28,24 @@ from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSub
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.models import MetacontrolRevision, draw, support
 
-_cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = WeakKeyDictionary()
-"""What follows and is planned, by symbolic state: missions of one scenario go through the same few states."""
+_cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
+    WeakKeyDictionary()
+)
+"""What follows and is planned, by symbolic state: missions of one scenario go through the same few
+states.
+"""
 _MAX_CACHED: Final = 16384
 
 
 class Metacontrol(ManagingSubsystem):
     """The metacontrol manager.
 
-    What the reasoner infers is never written back, so nothing has to be retracted: the state below changes only by
-    tasks, diagnostics, measurements and executed plans.
+    What the reasoner infers is never written back, so nothing has to be retracted: the state below
+    changes only by tasks, diagnostics, measurements and executed plans.
 
     Attributes:
-        objectives: the status of the objective of each required function; None while the objective is met.
+        objectives: the status of the objective of each required function; None while the objective
+            is met.
         groundings: the function designs in use, by function.
         components: the reported statuses, by component.
         measurements: the last measured values, by quality attribute.
@@ -59,7 +65,8 @@ class Metacontrol(ManagingSubsystem):
         scenario, revision = system.scenario, system.scenario.revision.metacontrol
         self._revision = revision
         self._reasoner = system.knowledge()
-        # In a derived class analyze and plan may depend on more than the state, so their results are not cached.
+        # In a derived class analyze and plan may depend on more than the state, so their results
+        # are not cached.
         methods = type(self).analyze, type(self).plan
         self._is_cacheable = methods == (Metacontrol.analyze, Metacontrol.plan)
         cached = _cached.setdefault(self._reasoner, {}).setdefault(revision, {})
@@ -69,17 +76,27 @@ class Metacontrol(ManagingSubsystem):
         self.components: dict[str, str] = {}
         self.measurements: dict[str, float] = {}
         self._listens_since_s = 0.0  # values that were published before are ignored
-        self._cancelled: set[str] = set()  # functions whose objectives were removed since the last cycle began
+        self._cancelled: set[str] = (
+            set()
+        )  # functions whose objectives were removed since the last cycle began
         self._recorded_statuses: frozenset[str] = frozenset()
-        self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
+        self._without_design: frozenset[str] = (
+            frozenset()
+        )  # functions for which the last plan had no design
         # Measured before the first cycle: signals of which function designs expect a value.
-        expected = self._reasoner.expected_attributes if revision.waits_for_first_measurement else frozenset[str]()
+        expected = (
+            self._reasoner.expected_attributes
+            if revision.waits_for_first_measurement
+            else frozenset[str]()
+        )
         self._awaited = expected.intersection(system.measurements, scenario.signals)
         self.least_latency_s, self._longest_s = support(scenario.latencies.inference_s)
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_tick_s("metacontrol", self.period_s)
         bridge_s = revision.task_bridge_period_s
-        self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
+        self._bridge_phase_s = (
+            system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
+        )
         self._has_objectives_from_launch = bool(system.functions)
         self._add_objectives((*system.functions, *revision.objectives_at_launch))
         may_depend_on_more = system.recorded or type(self) is not Metacontrol
@@ -118,9 +135,15 @@ class Metacontrol(ManagingSubsystem):
     def analyze(self) -> Inference:
         """Infer what the rules say about the current state."""
         improves = self._revision.always_improve
-        objectives = [ObjectiveState(name, status, name in improves) for name, status in self.objectives.items()]
+        objectives = [
+            ObjectiveState(name, status, name in improves)
+            for name, status in self.objectives.items()
+        ]
         state = KnowledgeState.of(
-            objectives, groundings=self.groundings, components=self.components, measurements=self.measurements
+            objectives,
+            groundings=self.groundings,
+            components=self.components,
+            measurements=self.measurements,
         )
         return self._reasoner.analyze(state)
 
@@ -129,8 +152,12 @@ class Metacontrol(ManagingSubsystem):
         return self._reasoner.plan(inference, improve_exceeded=self._revision.improve_when_exceeded)
 
     def execute(self, reasoning: Reasoning, latency_s: float) -> AdaptationProcess:
-        """Request the plan's modes after the reasoner's latency; return whether another cycle would change nothing."""
-        recovered = [component for component, status in self.components.items() if status == RECOVERED]
+        """Request the plan's modes after the reasoner's latency; return whether another cycle would
+        change nothing.
+        """
+        recovered = [
+            component for component, status in self.components.items() if status == RECOVERED
+        ]
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
             for line in sorted(reasoning.inference.statuses - self._recorded_statuses):
@@ -141,8 +168,9 @@ class Metacontrol(ManagingSubsystem):
             self.reasoning_time_s += latency_s
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded)
-        # From now on a recovered component counts as never failed. Otherwise its status would make every objective
-        # updatable for ever, and in the exemplar's oldest files contradict the status UNGROUNDED of later objectives.
+        # From now on a recovered component counts as never failed. Otherwise its status would make
+        # every objective updatable for ever, and in the exemplar's oldest files contradict the
+        # status UNGROUNDED of later objectives.
         for component in recovered:
             if self.components.get(component) == RECOVERED:
                 del self.components[component]
@@ -152,7 +180,8 @@ class Metacontrol(ManagingSubsystem):
         return not self.objectives or self._changes_nothing(self._analyze_and_plan())
 
     def _request_modes(self, plan: Plan) -> dict[str, str]:
-        """Request the mode of each design of a plan, but for functions that no longer have an objective.
+        """Request the mode of each design of a plan, but for functions that no longer have an
+        objective.
 
         Returns:
             The function designs that are in use from now on, by function.
@@ -175,7 +204,9 @@ class Metacontrol(ManagingSubsystem):
 
     def _log_decision(self, event: str, what: str, decision: Decision) -> None:
         if self.system.recorded:
-            left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
+            left_out = "".join(
+                [f"; not {each.design}: {each.reason}" for each in decision.rejected]
+            )
             self.system.log(event, f"{what}: {decision.reason}{left_out}")
 
     # What changes the state.
@@ -194,7 +225,9 @@ class Metacontrol(ManagingSubsystem):
         self._pass_on(task, self._remove_objectives)
 
     def _pass_on(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
-        """Call `update` with the task's functions at the next tick of the exemplar's task bridge, if it has a timer."""
+        """Call `update` with the task's functions at the next tick of the exemplar's task bridge,
+        if it has a timer.
+        """
 
         def deliver() -> None:
             update(task.functions)
@@ -225,10 +258,11 @@ class Metacontrol(ManagingSubsystem):
             self.system.change_mode(function, UNGROUND_MODE)
 
     def _execute_plan_under_way(self, functions: tuple[str, ...]) -> None:
-        """Have the modes requested all the same that the cycle under way, if any, chooses for functions.
+        """Have the modes requested all the same that the cycle under way, if any, chooses for
+        functions.
 
-        So a search goes on although its task is over, and disturbs what follows. Cycles that change nothing are left
-        out (see `depends_on`), so the plan is made here.
+        So a search goes on although its task is over, and disturbs what follows. Cycles that change
+        nothing are left out (see `depends_on`), so the plan is made here.
         """
         env, passed_s = self.system.env, self.system.now_s - self.starts_s
         began_s = self.starts_s + passed_s // self.period_s * self.period_s
@@ -237,7 +271,11 @@ class Metacontrol(ManagingSubsystem):
             return
         for decision in self._analyze_and_plan().plan.decisions:
             if decision.function in functions and decision.design is not None:
-                call_at(env, ends_s, partial(self.system.change_mode, decision.function, decision.design))
+                call_at(
+                    env,
+                    ends_s,
+                    partial(self.system.change_mode, decision.function, decision.design),
+                )
 
     # Queries of the loop.
 
@@ -247,11 +285,16 @@ class Metacontrol(ManagingSubsystem):
 
     @property
     def depends_on(self) -> Dependencies | None:
-        """The numbers in the knowledge base, if the rules only compare measured values with them."""
+        """The numbers in the knowledge base, if the rules only compare measured values with
+        them.
+        """
         thresholds = self._reasoner.thresholds
         if thresholds is None:
             return None
-        if self._revision.ignores_diagnostics_without_objective and not self._has_objectives_from_launch:
+        if (
+            self._revision.ignores_diagnostics_without_objective
+            and not self._has_objectives_from_launch
+        ):
             return None  # then it also depends on when a value was published
         return dict.fromkeys(self.system.measurements, thresholds)
 
@@ -269,15 +312,22 @@ class Metacontrol(ManagingSubsystem):
         return reasoning
 
     def _symbolic_state(self) -> Hashable:
-        """Make the key of the state: with regions of measured values, or with the values if the mission is recorded."""
+        """Make the key of the state: with regions of measured values, or with the values if the
+        mission is recorded.
+        """
         measured = self.measurements.values()
         values = tuple(measured) if self.system.recorded else self._reasoner.distinguished(measured)
-        known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
+        known = (
+            tuple(self.objectives.items()),
+            tuple(self.groundings.items()),
+            tuple(self.components.items()),
+        )
         return known, tuple(self.measurements), values
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""
-        # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
+        # A latency of a period or more must pass even so: cycles that come due meanwhile are
+        # skipped.
         if RECOVERED in self.components.values() or self._longest_s >= self.period_s:
             return False
         if self.system.recorded:

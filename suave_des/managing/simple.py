@@ -1,7 +1,8 @@
-"""Managers without an ontology: the paper's none and random (SEAMS 2023 paper, section on managers), a fixed mode,
-plain thresholds and perfect knowledge.
+"""Managers without an ontology: the paper's none and random (SEAMS 2023 paper, section on
+managers), a fixed mode, plain thresholds and perfect knowledge.
 
-Source of none and random: nodes task_bridge and task_bridge_random of kas-lab/suave, of 4 February 2023 and of 1.5.0.
+Source of none and random: nodes task_bridge and task_bridge_random of kas-lab/suave, of 4 February
+2023 and of 1.5.0.
 """
 
 from __future__ import annotations
@@ -43,24 +44,36 @@ class NoManager(ManagingSubsystem):
 
 
 class FixedMode(NoManager):
-    """fixed:MODE: functions that have this mode get it, others their default mode; it never adapts."""
+    """fixed:MODE: functions that have this mode get it, others their default mode; it never
+    adapts.
+    """
 
     mode: ClassVar[str]
 
     @classmethod
     def check(cls, loaded: LoadedScenario) -> None:
         """Check that some function has the mode."""
-        known = sorted({mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)})
+        known = sorted(
+            {mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)}
+        )
         if cls.mode not in known:
-            remedy = did_you_mean(cls.mode, grounding_modes(known), f"modes in {loaded.modes_path.name}")
-            raise InputError(f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy)
+            remedy = did_you_mean(
+                cls.mode, grounding_modes(known), f"modes in {loaded.modes_path.name}"
+            )
+            raise InputError(
+                f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy
+            )
 
     def task_requested(self, task: Task) -> None:
         """Set the modes of the task's functions."""
-        fixed = [each for each in task.functions if self.mode in self.system.modes.available_modes(each)]
+        fixed = [
+            each for each in task.functions if self.mode in self.system.modes.available_modes(each)
+        ]
         for function in fixed:
             self.system.change_mode(function, self.mode)
-        super().task_requested(Task(task.name, tuple(each for each in task.functions if each not in fixed)))
+        super().task_requested(
+            Task(task.name, tuple(each for each in task.functions if each not in fixed))
+        )
 
 
 @cache
@@ -70,11 +83,12 @@ def fixed_mode(mode: str) -> type[ManagingSubsystem]:
 
 
 class RandomManager(ManagingSubsystem):
-    """random: every period, each function of the task gets one of its modes, with equal probability.
+    """random: every period, each function of the task gets one of its modes, with equal
+    probability.
 
-    maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023 picks only on its
-    timer, and sets the search to fd_unground as soon as the pipeline is detected; revision 1.5 picks at each task
-    request too.
+    maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023
+    picks only on its timer, and sets the search to fd_unground as soon as the pipeline is detected;
+    revision 1.5 picks at each task request too.
     """
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.DETECTION,)
@@ -101,17 +115,23 @@ class RandomManager(ManagingSubsystem):
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """End the search when the pipeline is detected."""
         if self._revision.ungrounds_search_at_detection and GENERATE_SEARCH_PATH in self._functions:
-            self._functions = tuple(name for name in self._functions if name != GENERATE_SEARCH_PATH)
+            self._functions = tuple(
+                name for name in self._functions if name != GENERATE_SEARCH_PATH
+            )
             self.system.change_mode(GENERATE_SEARCH_PATH, UNGROUND_MODE)
 
     def adapt(self) -> None:
         """Pick a mode for each function."""
         for function in self._functions:
-            self.system.change_mode(function, self._stream.choice(self.system.modes.available_modes(function)))
+            self.system.change_mode(
+                function, self._stream.choice(self.system.modes.available_modes(function))
+            )
 
 
 class RemembersFailures(ManagingSubsystem):
-    """Base of managers that remember which thrusters have failed: `failed`, those that were last reported as such."""
+    """Base of managers that remember which thrusters have failed: `failed`, those that were last
+    reported as such.
+    """
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
@@ -128,13 +148,15 @@ class RemembersFailures(ManagingSubsystem):
 
 
 class Threshold(RemembersFailures):
-    """threshold: metacontrol's decisions as plain conditions; the difference is the cost of the ontology.
+    """threshold: metacontrol's decisions as plain conditions; the difference is the cost of the
+    ontology.
 
-    It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, from the same first cycle on in each
-    run), takes no time to reason, and searches by the thresholds of `managers.bt`.
+    It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, from the same first
+    cycle on in each run), takes no time to reason, and searches by the thresholds of `managers.bt`.
 
     Attributes:
-        thresholds_m: least visibility for each of the search modes; the first one that is reached decides.
+        thresholds_m: least visibility for each of the search modes; the first one that is reached
+            decides.
         search_modes: a mode for each threshold; the last one is also for a visibility below all.
 
     Example:
@@ -163,13 +185,19 @@ class Threshold(RemembersFailures):
             self.system.change_mode(function, mode)
 
     def wanted(self, visibility_m: float | None) -> Iterator[tuple[str, str]]:
-        """Choose the mode that fits, for each function; a visibility that is not known yet counts as good."""
+        """Choose the mode that fits, for each function; a visibility that is not known yet counts
+        as good.
+        """
         for function in self.system.functions:
             if function == MAINTAIN_MOTION:
                 yield function, "fd_recover_thrusters" if self.failed else "fd_all_thrusters"
             elif function == GENERATE_SEARCH_PATH:
                 pairs = zip(self.thresholds_m, self.search_modes, strict=True)
-                fitting = (mode for least_m, mode in pairs if visibility_m is None or visibility_m >= least_m)
+                fitting = (
+                    mode
+                    for least_m, mode in pairs
+                    if visibility_m is None or visibility_m >= least_m
+                )
                 yield function, next(fitting, self.search_modes[-1])
             elif function == FOLLOW_PIPELINE:
                 yield function, self.system.scenario.default_modes[FOLLOW_PIPELINE]
@@ -178,13 +206,16 @@ class Threshold(RemembersFailures):
 class Oracle(Threshold):
     """oracle: the same decisions from the true visibility, at once and without latency.
 
-    The difference to a manager of the same thresholds is the cost of measuring, deciding and changing modes.
+    The difference to a manager of the same thresholds is the cost of measuring, deciding and
+    changing modes.
     """
 
     def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = None
-        self._visibility_m = system.measurements[WATER_VISIBILITY].signal  # which no real manager could know
+        self._visibility_m = system.measurements[
+            WATER_VISIBILITY
+        ].signal  # which no real manager could know
 
     def mission_started(self) -> None:
         """Start watching the true visibility."""
@@ -207,7 +238,9 @@ class Oracle(Threshold):
     def _watch(self) -> AdaptationProcess:
         """Adapt whenever the true visibility crosses a threshold."""
         scenario, reached = self.system.scenario, self._thresholds_reached(0.0)
-        longest_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        longest_s = (
+            scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        )
         for look in range(1, int(longest_s / _LOOK_PERIOD_S) + 1):
             before, reached = reached, self._thresholds_reached(look * _LOOK_PERIOD_S)
             if reached != before:

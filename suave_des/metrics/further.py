@@ -1,4 +1,6 @@
-"""Further metrics of a mission, for scenarios that ask for them, and the degree to which requirements are satisfied."""
+"""Further metrics of a mission, for scenarios that ask for them, and the degree to which
+requirements are satisfied.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ from suave_des.vehicle.vehicle import STEP_S, row_at
 MetricValue = float | int | None
 CELL_M = 0.1
 _ROW_STEP = 4
-"""Only every fourth row of the track is used: the area is at most 1% smaller, in a quarter of the time."""
+"""Only every fourth row of the track is used: the area is at most 1% smaller, in a quarter of the
+time.
+"""
 _MAX_CELLS = 4_000_000
 """At most 4 MB: 40,000 m2 in cells of 0.1 m."""
 
@@ -35,7 +39,8 @@ class FurtherMetrics:
     Attributes:
         measurements: what monitors have measured, by quality attribute.
         adaptations_undone: changes of a function's mode that were soon taken back: indecision.
-        reasoning_time_s: mission time that the reasoner took in cycles that changed a function design.
+        reasoning_time_s: mission time that the reasoner took in cycles that changed a function
+            design.
         surfacing_time_s: from the leak to the surface; None while the vehicle has not surfaced.
     """
 
@@ -46,7 +51,9 @@ class FurtherMetrics:
     adaptations_undone: int = 0
     reasoning_time_s: float = 0.0
     surfacing_time_s: float | None = None
-    _changes: dict[str, tuple[float, str]] = field(default_factory=dict)  # of each function: when, and from which mode
+    _changes: dict[str, tuple[float, str]] = field(
+        default_factory=dict
+    )  # of each function: when, and from which mode
     _in_force: dict[str, str] = field(default_factory=dict)
     _in_force_since_s: float = 0.0
     _configurations: set[frozenset[tuple[str, str]]] = field(default_factory=set)
@@ -104,7 +111,10 @@ class FurtherMetrics:
         if now_s <= 0.0:
             return float(all_thrusters)
         steps = [(0.0, all_thrusters), *self.thrusters.working, (now_s, 0)]
-        return sum((later_s - since_s) * count for (since_s, count), (later_s, _) in pairwise(steps)) / now_s
+        return (
+            sum((later_s - since_s) * count for (since_s, count), (later_s, _) in pairwise(steps))
+            / now_s
+        )
 
     def _area_covered_m2(self, now_s: float) -> float:
         vehicle, visibility = self.thrusters.vehicle, self.measurements[WATER_VISIBILITY]
@@ -116,14 +126,20 @@ class FurtherMetrics:
     def _satisfaction(
         self, requirement: Requirement, metrics: MissionMetrics, further: Mapping[str, MetricValue]
     ) -> float | None:
-        """Compute the degree to which a requirement is satisfied as of now, from 0 to 1; None if there is no value."""
+        """Compute the degree to which a requirement is satisfied as of now, from 0 to 1; None if
+        there is no value.
+        """
         if requirement.attribute is not None:
-            return self._satisfaction_over_time(requirement, self.measurements[requirement.attribute])
+            return self._satisfaction_over_time(
+                requirement, self.measurements[requirement.attribute]
+            )
         metric = str(requirement.metric)
         value = further[metric] if metric in further else getattr(metrics, metric)
         return None if value is None else requirement.satisfaction(float(value))
 
-    def _satisfaction_over_time(self, requirement: Requirement, measured: Measurements) -> float | None:
+    def _satisfaction_over_time(
+        self, requirement: Requirement, measured: Measurements
+    ) -> float | None:
         now_s = float(self.env.now)
         count = measured.count_until(now_s)
         times_s, values = measured.times_s[:count], measured.values[:count]
@@ -131,26 +147,34 @@ class FurtherMetrics:
             return None
         ends_s = (*times_s[1:], now_s)
         shares = zip(times_s, ends_s, values, strict=True)
-        total_s = sum((end_s - since_s) * requirement.satisfaction(value) for since_s, end_s, value in shares)
+        total_s = sum(
+            (end_s - since_s) * requirement.satisfaction(value) for since_s, end_s, value in shares
+        )
         return float(total_s / (now_s - times_s[0]))
 
 
 def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: int) -> Array:
     """Find the value measured last at each row of a track, shape (rows,); nan before the first."""
-    since_rows = np.minimum(np.rint(np.array(times_s) / STEP_S), rows).astype(np.int64)  # rounded as Vehicle does
+    since_rows = np.minimum(np.rint(np.array(times_s) / STEP_S), rows).astype(
+        np.int64
+    )  # rounded as Vehicle does
     return np.repeat(np.append(np.nan, values), np.diff(since_rows, prepend=0, append=rows))
 
 
-def covered_area_m2(track: Array, last_row: int, visibility_m: Array, sea_bed_z_m: float, view_tangent: float) -> float:
-    """Measure the area of the sea bed that the camera, looking straight down, has seen at least once.
+def covered_area_m2(
+    track: Array, last_row: int, visibility_m: Array, sea_bed_z_m: float, view_tangent: float
+) -> float:
+    """Measure the area of the sea bed that the camera, looking straight down, has seen at least
+    once.
 
-    A place is seen when it is in view, and the camera's height above it is at most the water visibility. Areas are
-    counted in squares of 0.1 m, larger ones for very long tracks.
+    A place is seen when it is in view, and the camera's height above it is at most the water
+    visibility. Areas are counted in squares of 0.1 m, larger ones for very long tracks.
 
     Args:
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
         last_row: the last row that counts.
-        visibility_m: measured water visibility at each row, shape (rows,); nan while there is no measurement.
+        visibility_m: measured water visibility at each row, shape (rows,); nan while there is no
+            measurement.
         view_tangent: tangent of half the camera's field of view.
     """
     rows = track[: last_row + 1 : _ROW_STEP, :3]
@@ -167,7 +191,9 @@ def covered_area_m2(track: Array, last_row: int, visibility_m: Array, sea_bed_z_
 
 
 @compiled
-def _mark(seen: Array, half_m: Array, low: tuple[float, float], cell_m: float, grid: NDArray[np.uint8]) -> int:
+def _mark(
+    seen: Array, half_m: Array, low: tuple[float, float], cell_m: float, grid: NDArray[np.uint8]
+) -> int:
     """Mark the cells whose centre is in view from each place; return how many there are."""
     count = 0
     for row in range(seen.shape[0]):

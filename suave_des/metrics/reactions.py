@@ -1,4 +1,6 @@
-"""Mean reaction time, the metric of revision 1.5 (source: node mission_metrics of kas-lab/suave 1.5.0)."""
+"""Mean reaction time, the metric of revision 1.5 (source: node mission_metrics of kas-lab/suave
+1.5.0).
+"""
 
 from __future__ import annotations
 
@@ -25,12 +27,14 @@ _LATER_S = 1e-4
 class ReactionMeter:
     """Times from an event that asks for an adaptation to the adaptation's effect.
 
-    Three kinds of event: a thruster failure is reported, until maintain_motion is active; the measured visibility does
-    not fit the search altitude, until the fitting altitude is set; the battery is low, until the recharge path is
-    active. An event that is never answered does not count, nor does a failure that is reported while maintain_motion
-    is active: it asks for nothing that has not been done (as in the real runs of 2025, docs/background/fidelity.md).
+    Three kinds of event: a thruster failure is reported, until maintain_motion is active; the
+    measured visibility does not fit the search altitude, until the fitting altitude is set; the
+    battery is low, until the recharge path is active. An event that is never answered does not
+    count, nor does a failure that is reported while maintain_motion is active: it asks for nothing
+    that has not been done (as in the real runs of 2025, docs/background/fidelity.md).
 
-    During the mission reports and effects are only noted; what was measured is read from its tables at the end.
+    During the mission reports and effects are only noted; what was measured is read from its tables
+    at the end.
     """
 
     env: simpy.Environment
@@ -64,10 +68,15 @@ class ReactionMeter:
 
     def _fitting_altitudes(self) -> list[_Entry]:
         """The messages from which on another altitude fits than before."""
-        thresholds_m, altitudes_m = self.settings.visibility_thresholds_m, self.settings.expected_altitudes_m
+        thresholds_m, altitudes_m = (
+            self.settings.visibility_thresholds_m,
+            self.settings.expected_altitudes_m,
+        )
         crossings_s, regions = self.visibility.crossings(thresholds_m[::-1])
         fitting_m = [None, *(altitude_m for altitude_m in altitudes_m[::-1] for _ in range(2))]
-        passed = bisect_right(crossings_s, self._entries[-1][0]) if self._entries else 0  # later ones are not answered
+        passed = (
+            bisect_right(crossings_s, self._entries[-1][0]) if self._entries else 0
+        )  # later ones are not answered
         return [(crossings_s[n], _OpenEvents.expect, fitting_m[regions[n]]) for n in range(passed)]
 
     def _low_battery(self) -> Iterator[_Entry]:
@@ -80,8 +89,9 @@ class ReactionMeter:
 class _OpenEvents:
     """The events that wait for their adaptation, and the reactions to those that were answered.
 
-    The altitude is compared at every visibility message of the whole mission, except while the battery is low: then an
-    open mismatch is dropped. It ends when the expected altitude is set, not when the visibility comes back.
+    The altitude is compared at every visibility message of the whole mission, except while the
+    battery is low: then an open mismatch is dropped. It ends when the expected altitude is set, not
+    when the visibility comes back.
     """
 
     def __init__(self, next_message_s: Callable[[float], float], altitude_m: float) -> None:
@@ -107,7 +117,9 @@ class _OpenEvents:
         """A message of the battery's level."""
         if low:
             self._since_s.setdefault("low battery", t_s)
-            self._since_s.pop("mismatch", None)  # one that is open is dropped; if it lasts, it begins anew afterwards
+            self._since_s.pop(
+                "mismatch", None
+            )  # one that is open is dropped; if it lasts, it begins anew afterwards
         elif self._battery_low:
             self._battery_low = False
             self._compare_at(self._next_message_s(t_s))
@@ -130,8 +142,8 @@ class _OpenEvents:
             if self._altitude_m == self._expected_m and "mismatch" in self._since_s:
                 self._answer("mismatch", t_s)
             else:
-                # The next message finds the mismatch, if there is one, though its value may not be new; one at this
-                # very time came before.
+                # The next message finds the mismatch, if there is one, though its value may not be
+                # new; one at this very time came before.
                 self._compare_at(self._next_message_s(t_s + _LATER_S))
 
     def _answer(self, kind: str, t_s: float) -> None:

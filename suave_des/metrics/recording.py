@@ -34,7 +34,9 @@ class Recorder:
     metric: ReactionMetric
     events: list[Event] = field(default_factory=list)
     knowledge: list[KnowledgeRecord] = field(default_factory=list)
-    _reached: dict[str, int] = field(default_factory=dict)  # how many limits the last measured value has reached
+    _reached: dict[str, int] = field(
+        default_factory=dict
+    )  # how many limits the last measured value has reached
     _moving: str | None = None  # the function that the last of these modes is one of
     _modes: list[tuple[float, str]] = field(default_factory=lambda: [(0.0, "")])
 
@@ -49,10 +51,16 @@ class Recorder:
             self.knowledge.append(KnowledgeRecord(float(self.env.now), state))
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Keep a component's report, or the first value and the crossings of a measured quality attribute."""
+        """Keep a component's report, or the first value and the crossings of a measured quality
+        attribute.
+        """
         key, value = diagnostic.key, diagnostic.value
         if diagnostic.kind == Kind.COMPONENT_STATUS:
-            self.log("leak_monitor" if key == HULL else "thruster_monitor", "component_status", f"{key} {value}")
+            self.log(
+                "leak_monitor" if key == HULL else "thruster_monitor",
+                "component_status",
+                f"{key} {value}",
+            )
         elif key in (WATER_VISIBILITY, BATTERY_LEVEL) and isinstance(value, float):
             word, unit, limits = "battery", "", [self.metric.battery_limit]
             if key == WATER_VISIBILITY:
@@ -61,8 +69,16 @@ class Recorder:
             if before is None:
                 self.log(f"{word}_monitor", "first_measurement", f"{value:.2f}{unit}")
             elif reached != before:
-                way, limit = ("rises to", limits[reached - 1]) if reached > before else ("falls below", limits[reached])
-                self.log(f"{word}_monitor", f"{word}_crossing", f"{way} {limit:g}{unit} ({value:.2f}{unit})")
+                way, limit = (
+                    ("rises to", limits[reached - 1])
+                    if reached > before
+                    else ("falls below", limits[reached])
+                )
+                self.log(
+                    f"{word}_monitor",
+                    f"{word}_crossing",
+                    f"{way} {limit:g}{unit} ({value:.2f}{unit})",
+                )
             self._reached[key] = reached
 
     def mode_effect(self, function: str, mode: Mode) -> None:
@@ -74,7 +90,9 @@ class Recorder:
     def trajectory(
         self, vehicle: Vehicle, visibility: Measurements, battery: Measurements | None
     ) -> tuple[TrajectoryPoint, ...]:
-        """The vehicle's path so far: at each point the mode in force, the visibility, and the battery's level."""
+        """The vehicle's path so far: at each point the mode in force, the visibility, and the
+        battery's level.
+        """
         if not self.enabled:
             return ()
         points = []
@@ -83,5 +101,7 @@ class Recorder:
             t_s = round(row * STEP_S, 6)
             mode = self._modes[bisect_right(mode_times, t_s) - 1][1]
             further = {} if battery is None else {battery.key: battery.value(t_s)}
-            points.append(TrajectoryPoint(t_s, *vehicle.pose(t_s), mode, visibility.value(t_s), further))
+            points.append(
+                TrajectoryPoint(t_s, *vehicle.pose(t_s), mode, visibility.value(t_s), further)
+            )
         return tuple(points)

@@ -1,4 +1,6 @@
-"""Results of a mission: its metrics, and, if it was recorded, its events, trajectory and states of knowledge."""
+"""Results of a mission: its metrics, and, if it was recorded, its events, trajectory and states of
+knowledge.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +29,18 @@ class MissionMetrics:
     """One row of runs.csv.
 
     Attributes:
-        run: number of the run, from 1; runs with the same number use common random numbers under all managers.
+        run: number of the run, from 1; runs with the same number use common random numbers under
+            all managers.
         initial_x_m: where the vehicle was put, world frame; likewise initial_y_m.
         mission_duration_s: mission time at the end.
-        search_time_s: as the revision counts it; the time limit (rev 1.5: the duration) if not found.
+        search_time_s: as the revision counts it; the time limit (rev 1.5: the duration) if not
+            found.
         distance_inspected_m: as published last by the follow function.
         mean_reaction_time_s: mean of the completed reactions, none if there was none.
         adaptations: mode changes of functions in use.
         detection_time_s: exact mission time of the first sight, none if there was none.
-        detection_x_m: x of the pipeline point seen first, none if there was none; likewise detection_y_m.
+        detection_x_m: x of the pipeline point seen first, none if there was none; likewise
+            detection_y_m.
     """
 
     scenario: str
@@ -57,9 +62,11 @@ class MissionMetrics:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryPoint:
-    """Where the vehicle was at a mission time, and under which mode; visibility as measured, none before that.
+    """Where the vehicle was at a mission time, and under which mode; visibility as measured, none
+    before that.
 
-    What else was measured, such as battery_level, is in `further` by its column; of each point the same.
+    What else was measured, such as battery_level, is in `further` by its column; of each point the
+    same.
     """
 
     t_s: float
@@ -76,7 +83,9 @@ class TrajectoryPoint:
 
 @dataclass(frozen=True, slots=True)
 class KnowledgeRecord:
-    """A KnowledgeState that was reasoned about at a mission time, and again until that of the next record."""
+    """A KnowledgeState that was reasoned about at a mission time, and again until that of the next
+    record.
+    """
 
     t_s: float
     state: KnowledgeState
@@ -93,17 +102,32 @@ class MissionResult:
     drawn: dict[str, float] = field(default_factory=dict)
     """Values drawn for the scenario's distributions in this run, by key path."""
     further: dict[str, float | int | None] = field(default_factory=dict)
-    """Further metrics and the satisfaction of requirements, if the scenario asks for them, by column."""
+    """Further metrics and the satisfaction of requirements, if the scenario asks for them, by
+    column.
+    """
     remarks: tuple[str, ...] = ()
-    """What the manager's author should know, such as a mode that was refused, or a name that nothing measures."""
+    """What the manager's author should know, such as a mode that was refused, or a name that
+    nothing measures.
+    """
 
     def __repr__(self) -> str:
         """Return the metrics as a table, and how much is recorded."""
         metrics = self.metrics
         title = f"{metrics.scenario}, {metrics.manager}, run {metrics.run}, seed {metrics.seed}"
-        rows = ((each.name, getattr(metrics, each.name)) for each in fields(metrics) if each.name not in _IN_TITLE)
-        lines = [f"  {name:<22} {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in rows]
-        parts = {"events": self.events, "points": self.trajectory, "states of knowledge": self.knowledge}
+        rows = (
+            (each.name, getattr(metrics, each.name))
+            for each in fields(metrics)
+            if each.name not in _IN_TITLE
+        )
+        lines = [
+            f"  {name:<22} {f'{value:.6g}' if isinstance(value, float) else value}"
+            for name, value in rows
+        ]
+        parts = {
+            "events": self.events,
+            "points": self.trajectory,
+            "states of knowledge": self.knowledge,
+        }
         recorded = ", ".join(f"{len(part)} {what}" for what, part in parts.items() if part)
         return "\n".join([title, *lines, f"  recorded: {recorded or 'nothing'}"])
 
@@ -115,7 +139,9 @@ class MissionResult:
         """Return the trajectory as a data frame with the columns of trajectory.csv."""
         frame = _frame(TrajectoryPoint, self.trajectory)
         further = [dict(each) for each in frame.pop("further")]
-        return frame.assign(**{name: [each[name] for each in further] for name in (further[0] if further else {})})
+        return frame.assign(
+            **{name: [each[name] for each in further] for name in (further[0] if further else {})}
+        )
 
 
 _IN_TITLE = ("scenario", "manager", "run", "seed")
@@ -127,4 +153,6 @@ def _frame(
     import pandas
 
     names = [each.name for each in fields(kind)]
-    return pandas.DataFrame([[getattr(entry, name) for name in names] for entry in entries], columns=names)
+    return pandas.DataFrame(
+        [[getattr(entry, name) for name in names] for entry in entries], columns=names
+    )

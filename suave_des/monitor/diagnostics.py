@@ -18,7 +18,9 @@ class Kind(StrEnum):
     QA_STATUS = "QA status"
     COMPONENT_STATUS = "Component status"
     POSE = "Pose"
-    """Key pose, a `Pose`. Not published by the exemplar's monitors, like the next two: subscribers have to name it."""
+    """Key pose, a `Pose`. Not published by the exemplar's monitors, like the next two: subscribers
+    have to name it.
+    """
     DISTANCE = "Distance inspected"
     """Key distance_inspected_m."""
     DETECTION = "Pipeline detected"
@@ -28,14 +30,18 @@ class Kind(StrEnum):
 EXEMPLAR_KINDS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
 """The kinds that the exemplar's monitors publish."""
 FAILED, RECOVERED = "FALSE", "RECOVERED"
-"""Statuses of a thruster, as the ontology's property c_status has them: FALSE, it cannot be used."""
+"""Statuses of a thruster, as the ontology's property c_status has them: FALSE, it cannot be
+used.
+"""
 HULL, LEAK = "hull", "LEAK"
 """The component that leaks, and its status then."""
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One message: a measured value of a quality attribute, a component's status, or what the other kinds say."""
+    """One message: a measured value of a quality attribute, a component's status, or what the other
+    kinds say.
+    """
 
     time_s: float
     kind: Kind
@@ -47,11 +53,15 @@ Subscriber = Callable[[Diagnostic], None]
 
 
 class DiagnosticsBus:
-    """Passes each diagnostic at once to the subscribers to its kind, in the order of subscription."""
+    """Passes each diagnostic at once to the subscribers to its kind, in the order of
+    subscription.
+    """
 
     def __init__(self) -> None:
         self._subscribers: defaultdict[Kind, list[Subscriber]] = defaultdict(list)
-        self._waiting: defaultdict[Kind, list[Callable[[], object]]] = defaultdict(list)  # monitors, for a subscriber
+        self._waiting: defaultdict[Kind, list[Callable[[], object]]] = defaultdict(
+            list
+        )  # monitors, for a subscriber
 
     def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = EXEMPLAR_KINDS) -> None:
         """Pass every later diagnostic of some kinds to `subscriber`."""
@@ -61,7 +71,9 @@ class DiagnosticsBus:
                 start()
 
     def when_subscribed(self, kind: Kind, start: Callable[[], object]) -> None:
-        """Start a monitor at the first subscription to its kind of diagnostic, or now if there has been one."""
+        """Start a monitor at the first subscription to its kind of diagnostic, or now if there has
+        been one.
+        """
         if self._subscribers[kind]:
             start()
         else:

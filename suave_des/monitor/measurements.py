@@ -1,6 +1,7 @@
 """What monitors measure of quality attributes, as tables of a whole mission.
 
-Managers look values up here; a monitor publishes them on the diagnostics bus only if somebody subscribes to them.
+Managers look values up here; a monitor publishes them on the diagnostics bus only if somebody
+subscribes to them.
 """
 
 from __future__ import annotations
@@ -24,9 +25,13 @@ from suave_des.scenario.models import Monitor, Scenario
 from suave_des.world.signals import Signal
 
 _DELIVERY_S = 0.01
-"""Delay from a timer's tick to the arrival of its message; a simultaneous tick of another timer misses it."""
+"""Delay from a timer's tick to the arrival of its message; a simultaneous tick of another timer
+misses it.
+"""
 _ROUNDING = 1e-6
-"""A time that is this share of a step below a multiple of it counts as the multiple: timers add up rounding errors."""
+"""A time that is this share of a step below a multiple of it counts as the multiple: timers add up
+rounding errors.
+"""
 
 Thresholds = tuple[float, ...]
 """Numbers, ascending, that measured values are compared with."""
@@ -55,7 +60,11 @@ def message_loss(key: str, monitor: Monitor, draws: Draws) -> Loss | None:
     """Make the function that says which of a monitor's messages are lost; None if none can be."""
     if not monitor.loses_messages:
         return None
-    stream, share, outages_s = draws.stream(f"{key}.dropout"), monitor.dropout_probability, monitor.outages_s
+    stream, share, outages_s = (
+        draws.stream(f"{key}.dropout"),
+        monitor.dropout_probability,
+        monitor.outages_s,
+    )
 
     def is_lost(t_s: float) -> bool:
         by_chance = stream.random() < share
@@ -66,16 +75,19 @@ def message_loss(key: str, monitor: Monitor, draws: Draws) -> Loss | None:
 
 @dataclass(eq=False)
 class Measurements:
-    """What a monitor measures of a quality attribute: a table of the values that it publishes over the whole mission.
+    """What a monitor measures of a quality attribute: a table of the values that it publishes over
+    the whole mission.
 
-    A monitor that repeats an unchanged value of a signal reports nothing new: only those that differ are in the table.
+    A monitor that repeats an unchanged value of a signal reports nothing new: only those that
+    differ are in the table.
 
     Attributes:
         signal: the true value over mission time.
         times_s: when the values are published, ascending.
         values: these values.
         arrays: both as arrays, for vectorised computations.
-        sent_s: when messages are published, changed or not, and inf, if some are lost; None: none is.
+        sent_s: when messages are published, changed or not, and inf, if some are lost; None: none
+            is.
     """
 
     key: str
@@ -85,7 +97,9 @@ class Measurements:
     values: list[float] = field(repr=False)
     arrays: tuple[Array, Array] = field(repr=False)
     sent_s: Array | None = field(default=None, repr=False)
-    _crossings: dict[Thresholds, tuple[list[float], list[int]]] = field(default_factory=dict, repr=False, init=False)
+    _crossings: dict[Thresholds, tuple[list[float], list[int]]] = field(
+        default_factory=dict, repr=False, init=False
+    )
 
     @classmethod
     def of(
@@ -102,46 +116,68 @@ class Measurements:
 
         Args:
             key, signal, duration_s, timing: what is measured in a mission of that time, and when.
-            time_step_s: the signal is read at mission time rounded down to multiples of this; 0: at mission time.
+            time_step_s: the signal is read at mission time rounded down to multiples of this; 0: at
+                mission time.
             noise: draws the error of one measurement; None: there is none.
             is_lost: says which messages are not published; None: all are.
         """
-        times: Array = timing.phase_s + timing.period_s * np.arange(timing.count(duration_s), dtype=np.float64)
-        read_s = np.floor(times / time_step_s + _ROUNDING) * time_step_s if time_step_s > 0.0 else times
+        times: Array = timing.phase_s + timing.period_s * np.arange(
+            timing.count(duration_s), dtype=np.float64
+        )
+        read_s = (
+            np.floor(times / time_step_s + _ROUNDING) * time_step_s if time_step_s > 0.0 else times
+        )
         values, changes, numbers = _sampled(signal, read_s.tobytes())
         if noise is not None or is_lost is not None:
             times, values = _published(times, values, noise, is_lost)
             changes = _changes(values)
             numbers = values[changes].tolist()
         sent_s, times = None if is_lost is None else np.append(times, math.inf), times[changes]
-        return Measurements(key, signal, timing, times.tolist(), numbers, (times, values[changes]), sent_s)
+        return Measurements(
+            key, signal, timing, times.tolist(), numbers, (times, values[changes]), sent_s
+        )
 
     def count_until(self, t_s: float) -> int:
         """Count the values published by mission time t."""
         return bisect_right(self.times_s, t_s)
 
     def value(self, t_s: float, since_s: float = 0.0) -> float | None:
-        """Look up the value last published by mission time t; None if there is none, or it is older than `since_s`."""
+        """Look up the value last published by mission time t; None if there is none, or it is older
+        than `since_s`.
+        """
         published = self.count_until(t_s)
-        return self.values[published - 1] if published and self.times_s[published - 1] >= since_s else None
+        return (
+            self.values[published - 1]
+            if published and self.times_s[published - 1] >= since_s
+            else None
+        )
 
     def crossings(self, thresholds: Thresholds) -> tuple[list[float], list[int]]:
-        """Find when a value in another region is published, and its region: even between thresholds, odd on one."""
+        """Find when a value in another region is published, and its region: even between
+        thresholds, odd on one.
+        """
         crossings = self._crossings.get(thresholds)
         if crossings is None:
             indices, regions = _crossings(self.arrays[1].tobytes(), thresholds)
-            crossings = self._crossings[thresholds] = [self.times_s[index] for index in indices], regions
+            crossings = self._crossings[thresholds] = (
+                [self.times_s[index] for index in indices],
+                regions,
+            )
         return crossings
 
     def region_until(self, t_s: float, thresholds: Thresholds) -> tuple[int, float]:
-        """Find the region of the value last published by mission time t, or -1, and when another one begins, or inf."""
+        """Find the region of the value last published by mission time t, or -1, and when another
+        one begins, or inf.
+        """
         crossings_s, regions = self.crossings(thresholds)
         passed = bisect_right(crossings_s, t_s)
         until_s = crossings_s[passed] if passed < len(crossings_s) else math.inf
         return regions[passed - 1] if passed else -1, until_s
 
     def next_message_s(self, t_s: float) -> float:
-        """Find the time of the first message, changed or not, at or after t; inf if there is none."""
+        """Find the time of the first message, changed or not, at or after t; inf if there is
+        none.
+        """
         if self.sent_s is None:
             return tick_at_or_after(t_s, self.timing.phase_s, self.timing.period_s)
         return self.sent_s.item(np.searchsorted(self.sent_s, t_s - _ROUNDING))
@@ -162,7 +198,8 @@ class Measurements:
 
 
 class BatteryMeasurements(Measurements):
-    """The battery's level, which falls linearly from 1. Recharging makes what follows in the table another.
+    """The battery's level, which falls linearly from 1. Recharging makes what follows in the table
+    another.
 
     Args:
         discharge_time_s: time from full to empty.
@@ -213,7 +250,10 @@ class BatteryMeasurements(Measurements):
         levels = np.maximum(0.0, 1.0 - (times - self._full_at_s) / self._discharge_time_s)
         times, levels = _published(times, levels, *self._disturbances)
         self.times_s[known:], self.values[known:] = times.tolist(), levels.tolist()
-        self.arrays = np.append(self.arrays[0][:known], times), np.append(self.arrays[1][:known], levels)
+        self.arrays = (
+            np.append(self.arrays[0][:known], times),
+            np.append(self.arrays[1][:known], levels),
+        )
         self._crossings.clear()
 
 
@@ -234,23 +274,32 @@ def _changes(values: Array) -> IntArray:
     return np.flatnonzero(np.diff(values, prepend=np.nan))
 
 
-# Cached by the arrays' bytes (float64): without noise, a signal that is read in time steps is the same in each run.
+# Cached by the arrays' bytes (float64): without noise, a signal that is read in time steps is the
+# same in each run.
 
 
 @lru_cache(maxsize=16)
 def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, IntArray, list[float]]:
-    """Read a signal at some times; return the values, the indices of those that differ, and the latter as numbers."""
+    """Read a signal at some times; return the values, the indices of those that differ, and the
+    latter as numbers.
+    """
     times = np.frombuffer(times_s)
     first = _changes(times)
-    values = np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
+    values = np.repeat(
+        [signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times))
+    )
     changes = _changes(values)
     return values, changes, values[changes].tolist()
 
 
 @lru_cache(maxsize=64)
 def _crossings(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
-    """Find the indices of values whose region differs from that of the one before, the first included; and regions."""
+    """Find the indices of values whose region differs from that of the one before, the first
+    included; and regions.
+    """
     measured = np.frombuffer(values)
-    regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
+    regions = np.searchsorted(thresholds, measured) + np.searchsorted(
+        thresholds, measured, side="right"
+    )
     indices = np.flatnonzero(np.diff(regions, prepend=-1))
     return indices.tolist(), regions[indices].tolist()

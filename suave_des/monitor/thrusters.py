@@ -1,4 +1,6 @@
-"""The vehicle's thrusters, which fail and recover; and the exemplar's thruster monitor, which makes them do so."""
+"""The vehicle's thrusters, which fail and recover; and the exemplar's thruster monitor, which makes
+them do so.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ class Thrusters:
     Attributes:
         revision: says how they fail, and from when on.
         unrecoverable: thrusters that f_maintain_motion cannot recover at present.
-        working: mission times at which thrusters failed or recovered, and how many worked from then on.
+        working: mission times at which thrusters failed or recovered, and how many worked from then
+            on.
     """
 
     env: simpy.Environment
@@ -38,13 +41,17 @@ class Thrusters:
         """Let one of the scenario's events happen to the vehicle now."""
         fails = event.event == "failure"
         if fails and self.env.now < self.revision.effective_from_s:
-            self.log("thruster_monitor", "failure_without_effect", THRUSTER_NAMES[event.thruster - 1])
+            self.log(
+                "thruster_monitor", "failure_without_effect", THRUSTER_NAMES[event.thruster - 1]
+            )
             return
         if fails and not event.recoverable:
             self.unrecoverable.add(event.thruster)
         else:
             self.unrecoverable.discard(event.thruster)
-        self._set(event.thruster, (event.failure_mode or self.revision.failure_mode) if fails else "works")
+        self._set(
+            event.thruster, (event.failure_mode or self.revision.failure_mode) if fails else "works"
+        )
 
     def recover(self, thruster: int) -> bool:
         """Recover a thruster; return whether it can be recovered."""
@@ -61,7 +68,10 @@ class Thrusters:
 def draw_schedule(scenario: Scenario, draws: Draws) -> list[tuple[ThrusterEvent, float]]:
     """Draw the times of the thruster events for a run, each as the revision counts it, s."""
     events = enumerate(scenario.thruster_events)
-    return [(each, draws.value(f"thruster_events.{n}.time_s", each.time_s, least=0.0)) for n, each in events]
+    return [
+        (each, draws.value(f"thruster_events.{n}.time_s", each.time_s, least=0.0))
+        for n, each in events
+    ]
 
 
 def thruster_monitor(
@@ -74,13 +84,15 @@ def thruster_monitor(
 ) -> Process:
     """Let the scheduled failures and recoveries happen, and publish them.
 
-    Once a period the monitor checks the first event of the list that has not happened yet: so several that are due
-    come one period apart, in list order, and a later one waits for the one before it.
+    Once a period the monitor checks the first event of the list that has not happened yet: so
+    several that are due come one period apart, in list order, and a later one waits for the one
+    before it.
 
     Args:
         thrusters, bus: to whom it happens, and where it is published.
         schedule, timing: the events with their times, s, and when the monitor checks.
-        after_previous: whether each time counts from the event before it (revision 2023) or from the start (1.5).
+        after_previous: whether each time counts from the event before it (revision 2023) or from
+            the start (1.5).
         is_lost: says whether the message at a mission time is not published; None: each one is.
     """
     env, counted_from_s, earliest_s, ticks_s = thrusters.env, 0.0, 0.0, []
@@ -94,8 +106,14 @@ def thruster_monitor(
     for (event, _), tick_s, next_s in zip(schedule, ticks_s, [*ticks_s[1:], inf], strict=False):
         expected_s.setdefault("thrusters", tick_s)
         yield until(env, tick_s)
-        expected_s["thrusters"] = next_s  # known before the vehicle is affected, and looked ahead for
+        expected_s["thrusters"] = (
+            next_s  # known before the vehicle is affected, and looked ahead for
+        )
         thrusters.apply(event)
         if is_lost is None or not is_lost(env.now):
             status = FAILED if event.event == "failure" else RECOVERED
-            bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, THRUSTER_NAMES[event.thruster - 1], status))
+            bus.publish(
+                Diagnostic(
+                    env.now, Kind.COMPONENT_STATUS, THRUSTER_NAMES[event.thruster - 1], status
+                )
+            )

@@ -1,4 +1,6 @@
-"""Puts a page together: its HTML, styles, scripts and data in one file that loads nothing from elsewhere."""
+"""Puts a page together: its HTML, styles, scripts and data in one file that loads nothing from
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ def asset(name: str) -> str:
 
 
 def data_text(content: Any) -> str:
-    """Write plain data as JSON that may stand inside a script element: nothing in it can end the element."""
+    """Write plain data as JSON that may stand inside a script element: nothing in it can end the
+    element.
+    """
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
@@ -34,10 +38,18 @@ def compressed(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
-def page(name: str, title: str, content: Any, styles: Sequence[str], scripts: Sequence[str], **blocks: str) -> str:
+def page(
+    name: str,
+    title: str,
+    content: Any,
+    styles: Sequence[str],
+    scripts: Sequence[str],
+    **blocks: str,
+) -> str:
     """Put a page together of assets by their names, a title as plain text, and plain data.
 
-    The scripts share one scope, in their order; `blocks` are further text that the HTML has a place for.
+    The scripts share one scope, in their order; `blocks` are further text that the HTML has a place
+    for.
     """
     return Template(asset(name)).substitute(
         title=html.escape(title),

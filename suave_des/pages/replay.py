@@ -1,4 +1,6 @@
-"""The replay: a page that plays missions, read, repeated or run, with the reasoning behind each adaptation."""
+"""The replay: a page that plays missions, read, repeated or run, with the reasoning behind each
+adaptation.
+"""
 
 from __future__ import annotations
 
@@ -44,17 +46,25 @@ Plain = dict[str, Any]
 
 
 def missions_in(
-    folders: Sequence[Path], managers: Sequence[str] = (), run: int = 1, point: int = 0, *, confirmed: bool = False
+    folders: Sequence[Path],
+    managers: Sequence[str] = (),
+    run: int = 1,
+    point: int = 0,
+    *,
+    confirmed: bool = False,
 ) -> list[MissionRecord]:
-    """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which are run again.
+    """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which
+    are run again.
 
     Args:
         managers: names; none: of a campaign the last and the first.
         run, point: of a campaign, the same for all managers.
-        confirmed: whether the code of managers and functions that a campaign's folder names may run.
+        confirmed: whether the code of managers and functions that a campaign's folder names may
+            run.
 
     Raises:
-        InputError: there is neither a mission nor a campaign in a folder, or too many missions for one page.
+        InputError: there is neither a mission nor a campaign in a folder, or too many missions for
+            one page.
         MissionError: a manager raised.
     """
     missions: list[MissionRecord] = []
@@ -70,11 +80,15 @@ def missions_in(
         else:
             problem = f"has neither a mission ({MISSION_FILE}) nor a campaign that can be run again ({STORE_FILE})"
             remedy = "give the folder that run or campaign wrote with --out"
-            raise InputError(problem if folder.is_dir() else "no such folder", file=folder, remedy=remedy)
+            raise InputError(
+                problem if folder.is_dir() else "no such folder", file=folder, remedy=remedy
+            )
     _check_number(len(missions))
     for mission, folder in zip(missions, folders, strict=False):
         if mission.settings.pipeline.vertices_m != missions[0].settings.pipeline.vertices_m:
-            raise InputError("has another pipeline", file=folder, remedy="give missions over the same one")
+            raise InputError(
+                "has another pipeline", file=folder, remedy="give missions over the same one"
+            )
     return missions
 
 
@@ -101,7 +115,9 @@ def _check_number(number: int) -> None:
 
 
 def replay_page(missions: Sequence[MissionRecord]) -> str:
-    """Make the page that plays missions over the same pipeline side by side, all at the same mission time."""
+    """Make the page that plays missions over the same pipeline side by side, all at the same
+    mission time.
+    """
     scenario = missions[0].settings
     battery = scenario.battery
     content = {
@@ -116,7 +132,8 @@ def replay_page(missions: Sequence[MissionRecord]) -> str:
             "sea_bed_z_m": SEA_BED_Z_M,
             "view_tangent": scenario.vehicle.camera.tangent,
             "thrusters": len(THRUSTER_NAMES),
-            "station": battery and [battery.station_x_m, battery.station_y_m, battery.station_radius_m],
+            "station": battery
+            and [battery.station_x_m, battery.station_y_m, battery.station_radius_m],
         },
         "missions": [mission_on_page(each) for each in missions],
     }
@@ -128,14 +145,19 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
     """Return a mission as the page plays it; times in s, lengths in m.
 
     Returns:
-        metrics: its row of runs.csv; track: columns of trajectory.csv; modes: by function, times at which they took
-        effect, with their names; thrusters: times of reports, with the number from 1 and whether it works; adaptations:
-        their times; inspected: times at which points of the way along the pipeline were reached, with the point's
-        number and the distance until then; way: that way from the point seen first, x and y; seen: time, x and y of the
-        first sight, or None; cycles: see explain_cycles.
+        metrics: its row of runs.csv; track: columns of trajectory.csv; modes: by function, times at
+            which they took
+        effect, with their names; thrusters: times of reports, with the number from 1 and whether it
+        works; adaptations: their times; inspected: times at which points of the way along the
+        pipeline were reached, with the point's number and the distance until then; way: that way
+        from the point seen first, x and y; seen: time, x and y of the first sight, or None; cycles:
+        see explain_cycles.
     """
     metrics, track = mission.metrics, mission.trajectory.round(_DECIMALS)
-    modes = {function: [(span.begin_s, span.what) for span in spans] for function, spans in mode_spans(mission).items()}
+    modes = {
+        function: [(span.begin_s, span.what) for span in spans]
+        for function, spans in mode_spans(mission).items()
+    }
     thrusters: list[tuple[float, int, bool]] = []
     for t_s, detail in details(mission, "component_status"):
         component, _, status = detail.partition(" ")
@@ -144,7 +166,9 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
             thrusters.append((t_s, int(number), status != FAILED))
     events = mission.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
-    x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))
+    x_m, y_m, seen_s = (
+        metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s")
+    )
     return {
         "name": mission.name,
         "metrics": metrics,
@@ -176,7 +200,9 @@ def _way(mission: MissionRecord) -> InspectionPath | None:
 def _inspected(
     mission: MissionRecord, way: InspectionPath | None, modes: Sequence[tuple[float, str]]
 ) -> list[tuple[float, int, float]]:
-    """The points of the way that the vehicle reached while it followed the pipeline, each after the one before."""
+    """The points of the way that the vehicle reached while it followed the pipeline, each after the
+    one before.
+    """
     if way is None:
         return []
     follow = mission.settings.revision.follow
@@ -211,12 +237,15 @@ def explain_cycles(mission: MissionRecord) -> Plain:
     Where the ontologies are not there any more, only the states are given, with a note.
 
     Returns:
-        Plain data for the page. cycles: in order of time, with t_s, objectives (status by function; None while all is
-        well), groundings (design in use by function), components (status of each that reported one), measured (value of
-        each quality attribute), inferred (index of what followed; -1: nothing) and decided (function, design before and
-        chosen, reason, and all designs with name, verdict, expected performance, and the reason why one is left out).
-        inferences: what followed, each kind of situation once, with t_s and facts (fact, source, rule, bindings, and
-        because of which facts). rules: text of each rule that took part. note: why some of it is missing, or empty.
+        Plain data for the page. cycles: in order of time, with t_s, objectives (status by function;
+        None while all is well), groundings (design in use by function), components (status of each
+        that reported one), measured (value of each quality attribute), inferred (index of what
+        followed; -1: nothing) and decided (function, design before and chosen, reason, and all
+        designs with name, verdict, expected performance, and the reason why one is left out).
+        inferences: what followed, each kind of situation once, with t_s and facts (fact, source,
+            rule, bindings, and
+        because of which facts). rules: text of each rule that took part. note: why some of it is
+        missing, or empty.
     """
     scenario, cycles = mission.settings, list[Plain]()
     known: Plain = {"cycles": cycles, "inferences": [], "rules": {}, "note": ""}
@@ -225,7 +254,9 @@ def explain_cycles(mission: MissionRecord) -> Plain:
     try:
         base, note = _base(mission)
         limit = TimeLimit(TIME_LIMIT_S, "the reasoner")
-        knowledge = KnowledgeBase.of(base, ManagingSettings.of(scenario), scenario.knowledge.reasoner, limit)
+        knowledge = KnowledgeBase.of(
+            base, ManagingSettings.of(scenario), scenario.knowledge.reasoner, limit
+        )
     except InputError as error:
         cycles += [_cycle(record, -1, []) for record in mission.knowledge]
         return known | {"note": f"Decisions are not explained: {error}"}
@@ -233,9 +264,18 @@ def explain_cycles(mission: MissionRecord) -> Plain:
     for record in mission.knowledge:
         try:
             reasoning = knowledge.infer(record.state)
-            cycles.append(_cycle(record, explainer.inferred(record.t_s, reasoning), list(explainer.decided(reasoning))))
+            cycles.append(
+                _cycle(
+                    record,
+                    explainer.inferred(record.t_s, reasoning),
+                    list(explainer.decided(reasoning)),
+                )
+            )
         except KnowledgeError as error:
-            note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
+            note = (
+                note
+                or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
+            )
             cycles.append(_cycle(record, -1, []))
     rules = {
         rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
@@ -250,7 +290,8 @@ def _base(mission: MissionRecord) -> tuple[Ontology, str]:
     if mission.loaded is not None:
         return open_base(mission.loaded), ""
     knowledge = mission.settings.knowledge
-    # A file beside the scenario has its name from there in the scenario, and its path among the inputs.
+    # A file beside the scenario has its name from there in the scenario, and its path among the
+    # inputs.
     paths = {Path(name).name: Path(name) for name in mission.inputs if Path(name).is_file()}
     ontologies, rules = (
         [paths.get(Path(name).name) or find(name, "ontology") for name in names]
@@ -259,8 +300,16 @@ def _base(mission: MissionRecord) -> tuple[Ontology, str]:
     base = read_base(mission.settings, ontologies, rules)
     before = {Path(name).name: digest for name, digest in mission.inputs.items()}
     now = hashes((*ontologies, *rules))
-    changed = [Path(name).name for name, digest in now.items() if before.get(Path(name).name, digest) != digest]
-    note = f"{', '.join(changed)} changed since the mission: decisions are explained with today's." if changed else ""
+    changed = [
+        Path(name).name
+        for name, digest in now.items()
+        if before.get(Path(name).name, digest) != digest
+    ]
+    note = (
+        f"{', '.join(changed)} changed since the mission: decisions are explained with today's."
+        if changed
+        else ""
+    )
     return base, note
 
 
@@ -274,7 +323,9 @@ class _Explainer:
         self.rules: set[str] = set()
 
     def inferred(self, t_s: float, reasoning: Reasoning) -> int:
-        """The index of what follows; the numbers in its derivations are those of the first such cycle."""
+        """The index of what follows; the numbers in its derivations are those of the first such
+        cycle.
+        """
         facts, state = reasoning.inference.facts, reasoning.inference.state
         if not facts:
             return -1
@@ -334,14 +385,18 @@ def _step(derivation: Derivation) -> Plain:
 
 def _shown(value: object) -> str:
     """A bound value, a number with three decimals at most."""
-    return f"{float(value):.3f}".rstrip("0").rstrip(".") if isinstance(value, Decimal) else str(value)
+    return (
+        f"{float(value):.3f}".rstrip("0").rstrip(".") if isinstance(value, Decimal) else str(value)
+    )
 
 
 def adaptation_rules(record: MissionRecord) -> Rules:
-    """Find the rules that fired in the reasoning cycle from which each adaptation of a mission comes.
+    """Find the rules that fired in the reasoning cycle from which each adaptation of a mission
+    comes.
 
     Returns:
-        Names of rules, by mission time (s) and function of the adaptation; empty for a manager that does not reason.
+        Names of rules, by mission time (s) and function of the adaptation; empty for a manager that
+        does not reason.
 
     Raises:
         InputError: the mission's scenario is of another version.
@@ -354,12 +409,16 @@ def adaptation_rules(record: MissionRecord) -> Rules:
             words = each.before.removeprefix("fd_"), each.function.removeprefix("f_")
             facts = known["inferences"][cycle["inferred"]]["facts"]
             steps = [step for step in facts if any(word in step["fact"] for word in words)]
-            found[each.t_s, each.function] = tuple(dict.fromkeys(rule for step in steps for rule in _rules_of(step)))
+            found[each.t_s, each.function] = tuple(
+                dict.fromkeys(rule for step in steps for rule in _rules_of(step))
+            )
     return found
 
 
 def _decided_in(cycles: Sequence[Plain], t_s: float, function: str, design: str) -> Plain | None:
-    """Return the last cycle before a time that chose a design for a function in place of another."""
+    """Return the last cycle before a time that chose a design for a function in place of
+    another.
+    """
     for cycle in reversed(cycles):
         for each in cycle["decided"] if cycle["t_s"] <= t_s else ():
             if each["function"] == function and each["before"] != each["chosen"] == design:

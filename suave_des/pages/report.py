@@ -44,7 +44,9 @@ _TOLERANCE_S: Final = 1e-3
 _EVENTS: Final = ("component_status", "pipeline_detected")
 """What is kept of a mission's way, besides its adaptations."""
 MOST_DRAWN: Final = 20_000
-"""Missions whose values are in a page; of more, every second, third, ... run is, under all managers."""
+"""Missions whose values are in a page; of more, every second, third, ... run is, under all
+managers.
+"""
 _DIGITS = 2
 _CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
 """Metrics in charts."""
@@ -88,10 +90,14 @@ def plotly_script() -> str:
         InputError: it is not installed.
     """
     try:
-        return compressed(files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8"))
+        return compressed(
+            files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8")
+        )
     except (ImportError, OSError):
         remedy = "pip install 'suave-des[report]'"
-        raise InputError("the report's charts need plotly, which is not installed", remedy=remedy) from None
+        raise InputError(
+            "the report's charts need plotly, which is not installed", remedy=remedy
+        ) from None
 
 
 def _results(missions: Missions) -> dict[str, Any]:
@@ -118,9 +124,11 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
     """Put missions into columns for the page's charts, at most MOST_DRAWN of them.
 
     Returns:
-        groups: their names, as the tables have them, and the numbers of their looks, as in figures; titles of the
-        metrics by column; columns: group number, run, seed, and each metric and swept parameter, None where there is no
-        value; swept: names of parameters; every: 1, or n if only each nth run is there; missions: how many there are;
+        groups: their names, as the tables have them, and the numbers of their looks, as in figures;
+            titles of the
+        metrics by column; columns: group number, run, seed, and each metric and swept parameter,
+        None where there is no value; swept: names of parameters; every: 1, or n if only each nth
+        run is there; missions: how many there are;
         is_paired: whether runs of the same seed and number share their random numbers.
     """
     groups = grouped(missions).groups
@@ -138,7 +146,11 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
         "seed": seeds[:1] if len(set(seeds)) == 1 else seeds,
         "found": _plain(frame["pipeline_found"].astype(float)),
     }
-    titles = {name: METRICS[name].heading for name in _CHARTED if name in frame and frame[name].notna().any()}
+    titles = {
+        name: METRICS[name].heading
+        for name in _CHARTED
+        if name in frame and frame[name].notna().any()
+    }
     columns |= {name: _plain(frame[name]) for name in (*titles, *missions.swept)}
     names = [each.name for each in groups]
     return {
@@ -158,7 +170,10 @@ def _plain(column: pandas.Series) -> list[Any]:
     if not pandas.api.types.is_numeric_dtype(column):
         return column.astype(str).tolist()
     values = column.astype(float).round(_DIGITS).tolist()
-    return [None if not math.isfinite(value) else int(value) if value.is_integer() else value for value in values]
+    return [
+        None if not math.isfinite(value) else int(value) if value.is_integer() else value
+        for value in values
+    ]
 
 
 def _made(folder: Path) -> dict[str, Any]:
@@ -172,7 +187,8 @@ def _made(folder: Path) -> dict[str, Any]:
         "folder": str(folder),
         "command": shlex.join(map(str, command)) if isinstance(command, list) else "",
         "manifest": {
-            key: value if isinstance(value, dict) else json.dumps(value).strip('"') for key, value in manifest.items()
+            key: value if isinstance(value, dict) else json.dumps(value).strip('"')
+            for key, value in manifest.items()
         },
     }
 
@@ -181,24 +197,38 @@ def _made(folder: Path) -> dict[str, Any]:
 
 
 def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[str, Any]:
-    """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
+    """Run some missions of a campaign again, to have their ways: the first runs, and the quickest,
+    median and slowest.
 
-    `runs` is how many runs of each manager: 0 for none. A path's altitude is that above the sea bed, its visibility as
-    measured; its modes are those of the function that moves the vehicle, with the times at which they changed.
+    `runs` is how many runs of each manager: 0 for none. A path's altitude is that above the sea
+    bed, its visibility as measured; its modes are those of the function that moves the vehicle,
+    with the times at which they changed.
     """
     ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": ""}
     if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():
-        return ways | {"note": "Paths and timelines are in the report of one campaign's folder only"}
+        return ways | {
+            "note": "Paths and timelines are in the report of one campaign's folder only"
+        }
     if runs == 0:
-        return ways | {"note": "Paths and timelines are left out; suave-des report --paths N adds those of N runs"}
+        return ways | {
+            "note": "Paths and timelines are left out; suave-des report --paths N adds those of N runs"
+        }
     managers = list(dict.fromkeys(frame["manager"]))
     try:
         opened = opened_campaign(folders[0])
         vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
-        paths = list(_paths(opened, frame, managers, max(1, min(runs, _MOST_WAYS // len(managers)))))
+        paths = list(
+            _paths(opened, frame, managers, max(1, min(runs, _MOST_WAYS // len(managers))))
+        )
     except SuaveDesError as error:
-        return ways | {"note": f"Paths and timelines are left out: {getattr(error, 'problem', error)}"}
-    return {"pipeline": vertices, "paths": paths, "note": "" if paths else "No mission could be run again as it was"}
+        return ways | {
+            "note": f"Paths and timelines are left out: {getattr(error, 'problem', error)}"
+        }
+    return {
+        "pipeline": vertices,
+        "paths": paths,
+        "note": "" if paths else "No mission could be run again as it was",
+    }
 
 
 def _paths(
@@ -217,10 +247,14 @@ def _paths(
 
 
 def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
-    """Choose runs to look at: those in which each manager was quickest, in the middle and slowest, and the first."""
+    """Choose runs to look at: those in which each manager was quickest, in the middle and slowest,
+    and the first.
+    """
     chosen: dict[int, None] = {}
     for manager in groups:
-        own = frame[frame["manager"] == manager].sort_values(["search_time_s", "run"], kind="stable")["run"]
+        own = frame[frame["manager"] == manager].sort_values(
+            ["search_time_s", "run"], kind="stable"
+        )["run"]
         for place in (0, len(own) // 2, len(own) - 1):
             if len(own):
                 chosen.setdefault(int(own.iloc[place]))
@@ -232,14 +266,24 @@ def _path(result: MissionResult, changes: Sequence[Adaptation]) -> dict[str, Any
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]
-    x_m, y_m, altitude_m = np.round([(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2).T.tolist()
+    x_m, y_m, altitude_m = np.round(
+        [(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2
+    ).T.tolist()
     return {
         "t_s": [round(each.t_s, 1) for each in some],
         "x_m": x_m,
         "y_m": y_m,
         "altitude_m": altitude_m,
-        "visibility_m": [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
+        "visibility_m": [
+            None if each.visibility_m is None else round(each.visibility_m, 2) for each in some
+        ],
         "modes": [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
-        "adaptations": [(round(each.t_s, 1), f"{each.function} -> {each.after}") for each in changes],
-        "events": [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
+        "adaptations": [
+            (round(each.t_s, 1), f"{each.function} -> {each.after}") for each in changes
+        ],
+        "events": [
+            (round(each.t_s, 1), each.event, each.detail)
+            for each in result.events
+            if each.event in _EVENTS
+        ],
     }

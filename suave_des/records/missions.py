@@ -29,8 +29,8 @@ class Missions:
     """Missions to compare, a row for each.
 
     Attributes:
-        frame: with `source`, the columns of records.runs.COLUMNS, further metrics, and what a sweep varies; with
-            `runs_sharing_draw` where that is known.
+        frame: with `source`, the columns of records.runs.COLUMNS, further metrics, and what a sweep
+            varies; with `runs_sharing_draw` where that is known.
         notes: what readers of the comparison should know about the files.
         folders: of the campaigns that can be run again, by source.
     """
@@ -42,20 +42,29 @@ class Missions:
 
 
 def missions_in(source: Source) -> Missions:
-    """Take the missions of a data frame, or read those in folders and files; see missions_of and read_missions."""
+    """Take the missions of a data frame, or read those in folders and files; see missions_of and
+    read_missions.
+    """
     if isinstance(source, pandas.DataFrame):
         return missions_of(source)
-    return read_missions([Path(source)] if isinstance(source, str | Path) else list(map(Path, source)))
+    return read_missions(
+        [Path(source)] if isinstance(source, str | Path) else list(map(Path, source))
+    )
 
 
 def read_missions(paths: Sequence[Path]) -> Missions:
-    """Read the missions in folders of `suave-des campaign` or `reproduce`, or of the exemplar, or in single CSV files.
+    """Read the missions in folders of `suave-des campaign` or `reproduce`, or of the exemplar, or
+    in single CSV files.
 
     Raises:
-        InputError: one of them has no missions, is given twice, or has missions of several scenarios.
+        InputError: one of them has no missions, is given twice, or has missions of several
+            scenarios.
     """
     if not paths:
-        raise InputError("no results are given", remedy="give the --out folders of suave-des campaign, or CSV files")
+        raise InputError(
+            "no results are given",
+            remedy="give the --out folders of suave-des campaign, or CSV files",
+        )
     resolved = [path.resolve() for path in paths]
     for place, path in enumerate(paths):
         if resolved[place] in resolved[:place]:
@@ -65,7 +74,9 @@ def read_missions(paths: Sequence[Path]) -> Missions:
     frames = [each.frame.assign(source=name) for each, name in zip(sources, names, strict=True)]
     swept = tuple(dict.fromkeys(name for source in sources for name in source.swept))
     notes = tuple(note for source in sources for note in source.notes)
-    folders = {name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()}
+    folders = {
+        name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()
+    }
     return Missions(pandas.concat(frames, ignore_index=True), swept, notes, folders)
 
 
@@ -79,16 +90,22 @@ def _read_source(path: Path) -> Missions:
     manifest = read_manifest(path.parent if is_file else path)
     if is_exemplars and (path / STORE_FILE).is_file():
         remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
-        raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
+        raise InputError(
+            "the campaign ended before its result files were written", file=path, remedy=remedy
+        )
     files = [path]
     if not is_file:
         files = sorted(path.glob("*.csv")) if is_exemplars else [path / RUNS_FILE]
     contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
     own = [file for file in files if not is_foreign(contents[file])] or files[:1]
     if not own:
-        remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+        remedy = (
+            "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+        )
         raise InputError("has no result files", file=path, remedy=remedy)
-    notes = [f"{file} is left out: it has no columns of missions" for file in files if file not in own]
+    notes = [
+        f"{file} is left out: it has no columns of missions" for file in files if file not in own
+    ]
     frames = []
     for file in own:
         runs = runs_in(file, contents[file])
@@ -119,24 +136,34 @@ def _check_once(frame: pandas.DataFrame, swept: Sequence[str], file: Path | None
 
 
 def missions_of(frame: pandas.DataFrame) -> Missions:
-    """Take the missions of a data frame with the columns of runs.csv, as run_campaign returns it or pandas reads it.
+    """Take the missions of a data frame with the columns of runs.csv, as run_campaign returns it or
+    pandas reads it.
 
     Raises:
         InputError: it has no missions, lacks a column, or has a mission twice.
     """
     for column in ("manager", SEARCH_TIME, DISTANCE):
         if column not in frame.columns:
-            raise InputError(f"the data frame has no column {column!r}", remedy="it needs the columns of runs.csv")
+            raise InputError(
+                f"the data frame has no column {column!r}",
+                remedy="it needs the columns of runs.csv",
+            )
     if frame.empty:
-        raise InputError("the data frame has no missions", remedy="one row for each mission is needed")
+        raise InputError(
+            "the data frame has no missions", remedy="one row for each mission is needed"
+        )
     plain = pandas.DataFrame(frame).reset_index(drop=True)
     texts = ("scenario", "manager", "seed")
     missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in plain}
     plain = plain.assign(**missing, source="", **{SHARING: int(frame.attrs.get(SHARING, 1))})
     plain = plain.assign(**{name: plain[name].astype(str) for name in texts})
-    numbers = [str(name) for name in plain if name == "run" or (name not in texts and metric_of(str(name)))]
+    numbers = [
+        str(name) for name in plain if name == "run" or (name not in texts and metric_of(str(name)))
+    ]
     try:
-        plain = plain.astype(dict.fromkeys(numbers, "Float64")).astype(dict.fromkeys(numbers, float))
+        plain = plain.astype(dict.fromkeys(numbers, "Float64")).astype(
+            dict.fromkeys(numbers, float)
+        )
     except (ValueError, TypeError) as error:
         problem = f"the data frame's columns of metrics have something that is no number: {error}"
         raise InputError(problem, remedy="it needs the columns of runs.csv") from None
@@ -146,7 +173,9 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
 
 
 def in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
-    """Sort real missions by manager as in the paper's table, others after these in their own order."""
+    """Sort real missions by manager as in the paper's table, others after these in their own
+    order.
+    """
     ranks = frame["manager"].map(PAPER_ORDER).fillna(len(PAPER_ORDER))
     return frame.iloc[ranks.argsort(kind="stable")].reset_index(drop=True)
 
@@ -162,7 +191,9 @@ def _sharing(manifest: Mapping[str, Any]) -> int:
 def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
     """Say how many missions a campaign lacks."""
     with suppress(ValueError, KeyError, TypeError):
-        left_out, failed, planned = (int(manifest["missions"][key]) for key in ("left_out", "failed", "planned"))
+        left_out, failed, planned = (
+            int(manifest["missions"][key]) for key in ("left_out", "failed", "planned")
+        )
         if left_out or failed:
             yield (
                 f"{folder}: of {planned} missions {left_out} are missing and {failed} failed;"
@@ -171,7 +202,8 @@ def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, ...]:
-    """Return the columns that a sweep varies: those that the manifest names, or else those that seem to vary.
+    """Return the columns that a sweep varies: those that the manifest names, or else those that
+    seem to vary.
 
     These differ between missions of one manager, seed and run, and are no metrics.
     """
@@ -180,11 +212,17 @@ def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, .
         with suppress(AttributeError, TypeError):
             forms = manifest.get("sweep", {})
             ranges = (forms.get("sample") or {}).get("ranges", {})
-            named = [name for form in (forms.get("grid", {}), forms.get("zip", {}), ranges) for name in form]
+            named = [
+                name
+                for form in (forms.get("grid", {}), forms.get("zip", {}), ranges)
+                for name in form
+            ]
             return tuple(name for name in named if name in columns)
     if not columns or frame["run"].isna().any():
         return ()
-    counts = frame.groupby(["manager", "seed", "run"], sort=False, observed=True)[columns].nunique(dropna=False)
+    counts = frame.groupby(["manager", "seed", "run"], sort=False, observed=True)[columns].nunique(
+        dropna=False
+    )
     return tuple(name for name in columns if (counts[name] > 1).any())
 
 

@@ -1,7 +1,8 @@
-"""Missions, real or simulated, in the CSV files in which they come: how they are read, and the exemplar's written.
+"""Missions, real or simulated, in the CSV files in which they come: how they are read, and the
+exemplar's written.
 
-The exemplar's runner (kas-lab/suave) writes a file for each manager and mission, MANAGER_MISSION.csv, which its scripts
-look for by name.
+The exemplar's runner (kas-lab/suave) writes a file for each manager and mission,
+MANAGER_MISSION.csv, which its scripts look for by name.
 """
 
 from __future__ import annotations
@@ -22,14 +23,33 @@ from numpy.typing import NDArray
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
 from suave_des.files import csv_pieces, read_csv
-from suave_des.records.metrics import COLUMN_TYPES, DISTANCE, FOUND, REACTION_TIME, SEARCH_TIME, metric_of
+from suave_des.records.metrics import (
+    COLUMN_TYPES,
+    DISTANCE,
+    FOUND,
+    REACTION_TIME,
+    SEARCH_TIME,
+    metric_of,
+)
 
-COLUMNS = (*("scenario", "manager", SEARCH_TIME, DISTANCE, "detection_x_m", FOUND, REACTION_TIME, "run", "seed"),)
+COLUMNS = (
+    *(
+        "scenario",
+        "manager",
+        SEARCH_TIME,
+        DISTANCE,
+        "detection_x_m",
+        FOUND,
+        REACTION_TIME,
+        "run",
+        "seed",
+    ),
+)
 """Columns that every frame of missions has.
 
-detection_x_m is nan where it is not known or nothing was detected; pipeline_found 1 or 0, and nan where the file does
-not say; mean_reaction_time_s nan where nothing was reacted to or the file does not say. run is nan, and scenario and
-seed, which are text, empty where the file does not say.
+detection_x_m is nan where it is not known or nothing was detected; pipeline_found 1 or 0, and nan
+where the file does not say; mean_reaction_time_s nan where nothing was reacted to or the file does
+not say. run is nan, and scenario and seed, which are text, empty where the file does not say.
 """
 _LIMIT, _DURATION = "time_limit_s", "mission_duration_s"
 SIZE_LIMIT_BYTES = 500_000_000
@@ -43,7 +63,9 @@ REMEDY = "one line for each mission, cells separated by commas"
 Content = tuple[list[str], Iterator[tuple[int, list[str]]], str]
 """Of a CSV file: its header, its rows, each with its line, and its SHA-256."""
 _Mission = Mapping[str, Any]
-"""A row of runs.csv by column, and with it time_limit_s, stamp, month, position, and the exemplar's name."""
+"""A row of runs.csv by column, and with it time_limit_s, stamp, month, position, and the exemplar's
+name.
+"""
 
 
 def _whole(seconds: float) -> float:
@@ -58,7 +80,8 @@ _LAYOUT_2023: _Layout = {
     "datetime": ("", lambda of: f"{of['month']}-{of['stamp']:%d-%Y-%H-%M-%S}"),
     "initial pos (x,y)": ("", lambda of: of["position"]),
     "time budget (s)": (_LIMIT, lambda of: _whole(of[_LIMIT])),
-    # The program wrote -1 when the pipeline was not found; the published table has the limit instead.
+    # The program wrote -1 when the pipeline was not found; the published table has the limit
+    # instead.
     "time search (s)": (SEARCH_TIME, lambda of: _whole(of[SEARCH_TIME]) if of[FOUND] else -1),
     "distance inspected (m)": (DISTANCE, lambda of: of[DISTANCE]),
 }
@@ -80,7 +103,10 @@ _LAYOUT_1_5: _Layout = {
 _OWN = {name: name for name in (*COLUMNS, _LIMIT)}
 _LAYOUTS: tuple[Mapping[str, str], ...] = (
     _OWN,
-    *({ours: column for column, (ours, _) in layout.items() if ours} for layout in (_LAYOUT_2023, _LAYOUT_1_5)),
+    *(
+        {ours: column for column, (ours, _) in layout.items() if ours}
+        for layout in (_LAYOUT_2023, _LAYOUT_1_5)
+    ),
 )
 """Names of the columns in each kind of file, by ours; the three of _NEEDED are in every one."""
 _NEEDED = ("manager", SEARCH_TIME, DISTANCE)
@@ -96,8 +122,9 @@ class Runs:
 
     Attributes:
         files: SHA-256 of each file's bytes, in hex, by its path.
-        frame: a row for each mission with COLUMNS and the further columns of the files; of one file, indexed by its
-            line; of several real ones, with `condition` if the conditions are known.
+        frame: a row for each mission with COLUMNS and the further columns of the files; of one
+            file, indexed by its line; of several real ones, with `condition` if the conditions are
+            known.
         notes: what a reader of a comparison should know about the files.
     """
 
@@ -119,7 +146,10 @@ class Runs:
         for manager in wanted:
             if manager not in self.managers:
                 remedy = f"{did_you_mean(manager, self.managers, 'its managers')}; choose with --managers"
-                problem, files = f"has no mission of manager {manager!r}", ", ".join(map(str, self.files))
+                problem, files = (
+                    f"has no mission of manager {manager!r}",
+                    ", ".join(map(str, self.files)),
+                )
                 raise InputError(problem, file=files, remedy=remedy)
         return tuple(dict.fromkeys(wanted)) or self.managers
 
@@ -129,24 +159,30 @@ class Runs:
         if len(names) > 1:
             problem = f"has missions of several scenarios: {names[0]} and {names[1]}"
             line = self.frame.index[self.frame["scenario"] == names[1]][0]
-            raise line_error(next(iter(self.files)), line, problem, "give the missions of one scenario")
+            raise line_error(
+                next(iter(self.files)), line, problem, "give the missions of one scenario"
+            )
 
 
 @plain_arguments
 def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
-    """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
+    """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the
+    exemplar's own results.
 
-    Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
-    limit stands for it, as in the published table. A file that has a time limit, but does not say which missions found
-    the pipeline, has found it in those whose search took less. In files that are no campaign's a reaction time of 0
-    stands for no reaction. Rows of averages, blank rows and the header where it is repeated are left out.
+    Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing
+    was found: the time limit stands for it, as in the published table. A file that has a time
+    limit, but does not say which missions found the pipeline, has found it in those whose search
+    took less. In files that are no campaign's a reaction time of 0 stands for no reaction. Rows of
+    averages, blank rows and the header where it is repeated are left out.
 
     Args:
-        path: of the file; columns that are no metrics are numbers where all their values are, and else text.
+        path: of the file; columns that are no metrics are numbers where all their values are, and
+            else text.
         needed: further columns that it must have, such as those of a sweep.
 
     Raises:
-        InputError: with file and line: the file cannot be read, has other columns, no mission, or an impossible value.
+        InputError: with file and line: the file cannot be read, has other columns, no mission, or
+            an impossible value.
     """
     path = Path(path)
     return runs_in(path, read_csv(path, SIZE_LIMIT_BYTES, REMEDY), needed)
@@ -167,17 +203,25 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     for line, row in numbered:
         if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
             averages.append(str(line))
-        elif layout[DISTANCE] not in row:  # else it is the header again, as in files that were put together
+        elif (
+            layout[DISTANCE] not in row
+        ):  # else it is the header again, as in files that were put together
             if len(row) != len(header):
                 problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
-                raise line_error(path, line, problem, "give each column a value, if only an empty one")
+                raise line_error(
+                    path, line, problem, "give each column a value, if only an empty one"
+                )
             rows.append(row)
             lines.append(line)
     if not rows:
         raise line_error(path, 1, "has no missions under its header", REMEDY)
-    text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str).apply(lambda column: column.str.strip())
+    text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str).apply(
+        lambda column: column.str.strip()
+    )
     left_out = f"{path}: line{'s' * (len(averages) > 1)} {', '.join(averages)} left out: averages, not missions"
-    return Runs({path: digest}, _Cells(path, text, layout).missions(), (left_out,) if averages else ())
+    return Runs(
+        {path: digest}, _Cells(path, text, layout).missions(), (left_out,) if averages else ()
+    )
 
 
 def is_foreign(content: Content) -> bool:
@@ -196,7 +240,9 @@ class _Cells:
         self.names = {name: column for column, name in ours.items()}
 
     def missions(self) -> pandas.DataFrame:
-        """Check and convert the cells; a frame with COLUMNS and the further ones. Errors name the line."""
+        """Check and convert the cells; a frame with COLUMNS and the further ones. Errors name the
+        line.
+        """
         is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
         managers = [str(name) for name in self.text["manager"].unique()]
         are_names = {name: bool(name.strip()) for name in managers}  # one of exec: has spaces
@@ -216,22 +262,36 @@ class _Cells:
             found = (words == "true").to_numpy(float)
         elif limit_s is not None:
             found = (search_time_s < limit_s).astype(float)
-        values: dict[str, Any] = {name: "" if name in ("scenario", "seed") else math.nan for name in COLUMNS}
-        values |= {name: self._converted(name) for name in map(str, self.text) if name not in ("", _LIMIT, FOUND)}
-        values |= {SEARCH_TIME: search_time_s, DISTANCE: self._numbers(DISTANCE, least=0.0), FOUND: found}
+        values: dict[str, Any] = {
+            name: "" if name in ("scenario", "seed") else math.nan for name in COLUMNS
+        }
+        values |= {
+            name: self._converted(name)
+            for name in map(str, self.text)
+            if name not in ("", _LIMIT, FOUND)
+        }
+        values |= {
+            SEARCH_TIME: search_time_s,
+            DISTANCE: self._numbers(DISTANCE, least=0.0),
+            FOUND: found,
+        }
         frame = pandas.DataFrame(values, index=self.text.index)
         if not is_campaigns:  # the exemplar writes 0.0 for none, a campaign nothing
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)
         return frame
 
     def _converted(self, name: str) -> Any:
-        """Convert a column: a metric to numbers; another to numbers if all its cells are, to integers if these are."""
+        """Convert a column: a metric to numbers; another to numbers if all its cells are, to
+        integers if these are.
+        """
         text = self.text[name]
         if name in ("scenario", "manager", "seed"):
             return text
         if name == "run" or metric_of(name) is not None:
             is_whole = COLUMN_TYPES.get(name) == "int"
-            return self._numbers(name, least=0.0 if is_whole else -math.inf, may_be_empty=True, is_whole=is_whole)
+            return self._numbers(
+                name, least=0.0 if is_whole else -math.inf, may_be_empty=True, is_whole=is_whole
+            )
         numbers = _as_numbers(text)
         if not np.isfinite(numbers).all():
             return text
@@ -239,7 +299,12 @@ class _Cells:
         return pandas.Series(numbers.astype(np.int64) if are_whole else numbers, text.index)
 
     def _numbers(
-        self, name: str, *, least: float = -math.inf, may_be_empty: bool = False, is_whole: bool = False
+        self,
+        name: str,
+        *,
+        least: float = -math.inf,
+        may_be_empty: bool = False,
+        is_whole: bool = False,
     ) -> NDArray[np.float64]:
         """Convert a column; empty cells are nan."""
         numbers = _as_numbers(self.text[name])
@@ -249,7 +314,9 @@ class _Cells:
         if may_be_empty:
             is_right |= (self.text[name] == "").to_numpy()
         ends = f"at least {least:g} and at most" if least > -math.inf else "at most"
-        self._check(name, is_right, f"{'a whole' if is_whole else 'a finite'} number, {ends} {_GREATEST:g}")
+        self._check(
+            name, is_right, f"{'a whole' if is_whole else 'a finite'} number, {ends} {_GREATEST:g}"
+        )
         return numbers
 
     def _check(self, name: str, is_right: Iterable[bool], wanted: str) -> None:
@@ -257,14 +324,23 @@ class _Cells:
         wrong = np.flatnonzero(~np.asarray(is_right, dtype=bool))
         if len(wrong):
             problem = f"{self.names.get(name, name)}: expected {wanted}, got {shown(self.text[name].iloc[wrong[0]])}"
-            raise line_error(self.path, int(self.text.index[wrong[0]]), problem, "correct it, or leave the mission out")
+            raise line_error(
+                self.path,
+                int(self.text.index[wrong[0]]),
+                problem,
+                "correct it, or leave the mission out",
+            )
 
 
 def _as_numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
-    """Convert cells to numbers; other cells, and those without a finite value, become nan or inf."""
+    """Convert cells to numbers; other cells, and those without a finite value, become nan or
+    inf.
+    """
     cells = text.to_list()
     together = "".join(cells)
-    if together.isascii() and "_" not in together:  # else float() would accept more than numbers of a CSV file
+    if (
+        together.isascii() and "_" not in together
+    ):  # else float() would accept more than numbers of a CSV file
         with suppress(ValueError):
             return np.array([float(cell) if cell else math.nan for cell in cells])
     return pandas.to_numeric(text, errors="coerce").to_numpy(float)
@@ -275,15 +351,21 @@ def _as_numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
 _EXTENDED = "suave_extended"
 """The exemplar's mission with a battery and recharging; its other mission is called suave."""
 _TREES = {"bt": "suave", "bt_extended": _EXTENDED}
-"""Missions of the behaviour trees, of which the exemplar has one for each: both are its manager bt."""
+"""Missions of the behaviour trees, of which the exemplar has one for each: both are its manager
+bt.
+"""
 _OUTSIDE_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
 _FIRST_STAMP = datetime(2000, 1, 1)
-"""The exemplar stamps each row with the time of day. Ours must be the same each time: a second for each mission."""
+"""The exemplar stamps each row with the time of day. Ours must be the same each time: a second for
+each mission.
+"""
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 """strftime's %b depends on the user's language; the exemplar's files are in English."""
 
 
-def exemplar_names(managers: Sequence[str], revision: str, *, has_battery: bool) -> Iterator[tuple[str, str]]:
+def exemplar_names(
+    managers: Sequence[str], revision: str, *, has_battery: bool
+) -> Iterator[tuple[str, str]]:
     """Yield for each manager the name of its file, without .csv, and that of its missions in it.
 
     The mission of a scenario with a battery is the extended one, except for manager bt.
@@ -307,12 +389,17 @@ def manager_of(mission_name: str) -> str:
 
 
 def suave_pieces(
-    revision: str, name: str, columns: Sequence[str], rows: Iterable[tuple[int, Sequence[object]]], time_limit_s: float
+    revision: str,
+    name: str,
+    columns: Sequence[str],
+    rows: Iterable[tuple[int, Sequence[object]]],
+    time_limit_s: float,
 ) -> Iterator[str]:
     """Yield the content of a file of the exemplar's, piece by piece.
 
-    Seconds and metres are as in runs.csv, but for durations, which are whole seconds, and for the search time when the
-    pipeline was not found. All revisions but 2023 have the current layout, that of 1.5.
+    Seconds and metres are as in runs.csv, but for durations, which are whole seconds, and for the
+    search time when the pipeline was not found. All revisions but 2023 have the current layout,
+    that of 1.5.
 
     Args:
         name: of the missions in it.
@@ -322,9 +409,18 @@ def suave_pieces(
 
     def cells(number: int, row: Sequence[object]) -> list[object]:
         stamp = _FIRST_STAMP + timedelta(seconds=number)
-        mission: dict[str, Any] = dict(zip(columns, row, strict=False))  # drawn and swept parameters follow
-        mission |= {_LIMIT: time_limit_s, "stamp": stamp, "month": _MONTHS[stamp.month - 1], "name": name}
-        mission["position"] = str((round(mission["initial_x_m"], 2), round(mission["initial_y_m"], 2)))
+        mission: dict[str, Any] = dict(
+            zip(columns, row, strict=False)
+        )  # drawn and swept parameters follow
+        mission |= {
+            _LIMIT: time_limit_s,
+            "stamp": stamp,
+            "month": _MONTHS[stamp.month - 1],
+            "name": name,
+        }
+        mission["position"] = str(
+            (round(mission["initial_x_m"], 2), round(mission["initial_y_m"], 2))
+        )
         return [make(mission) for _, make in layout.values()]
 
     return csv_pieces(tuple(layout), (cells(number, row) for number, row in rows))

@@ -1,8 +1,9 @@
-"""The output folder of a campaign: the store of its outcomes, so that no finished mission is lost, and its files.
+"""The output folder of a campaign: the store of its outcomes, so that no finished mission is lost,
+and its files.
 
-The store is an SQLite database rather than a Parquet file, because transactions are atomic even after a kill, appending
-needs no new file, damage is noticed, a folder is locked for one campaign, and it comes with Python. In addition, each
-outcome carries a checksum.
+The store is an SQLite database rather than a Parquet file, because transactions are atomic even
+after a kill, appending needs no new file, damage is noticed, a folder is locked for one campaign,
+and it comes with Python. In addition, each outcome carries a checksum.
 """
 
 from __future__ import annotations
@@ -18,7 +19,14 @@ from typing import Any, NamedTuple
 from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
-from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, remove_results, write_files
+from suave_des.files import (
+    check_own,
+    csv_pieces,
+    make_output_folder,
+    read_json,
+    remove_results,
+    write_files,
+)
 from suave_des.interrupts import Stopped, is_stopping
 from suave_des.records.metrics import COLUMNS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
@@ -48,8 +56,8 @@ _ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
 class MissionKey(NamedTuple):
     """The key of a mission in a campaign; missions and their rows are in the order of their keys.
 
-    A sweep's points and a campaign's managers are counted from 0, runs from 1. Runs with the same number use common
-    random numbers under all managers and at all points.
+    A sweep's points and a campaign's managers are counted from 0, runs from 1. Runs with the same
+    number use common random numbers under all managers and at all points.
     """
 
     point: int
@@ -63,8 +71,8 @@ class MissionFailure(NamedTuple):
     Attributes:
         time_s: mission time at which it happened; None if that is not known.
         cause: the manager's exception, or another reason why the mission ended.
-        lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
-            resumed campaign runs such a mission once more.
+        lasting: whether the mission itself failed; a time-out or a worker that was killed may not
+            happen again, so a resumed campaign runs such a mission once more.
     """
 
     manager: str
@@ -93,11 +101,13 @@ class Store:
     """The outcomes of one campaign; no other process can use the file until it is closed.
 
     Args:
-        path: the database's file, made if it is missing; None for a temporary one, which is gone when this is closed.
+        path: the database's file, made if it is missing; None for a temporary one, which is gone
+            when this is closed.
         replace: whether one that cannot be used is removed; what else is in it goes with `begin`.
 
     Raises:
-        InputError: another campaign uses it, it is damaged, another version's, or no file of its own, such as a link.
+        InputError: another campaign uses it, it is damaged, another version's, or no file of its
+            own, such as a link.
         StoreError: it cannot be opened or made.
     """
 
@@ -131,7 +141,8 @@ class Store:
     def _check(self) -> None:
         self._db.execute("PRAGMA locking_mode = EXCLUSIVE")
         self._db.execute("PRAGMA journal_mode = WAL")
-        # With this a kill of the process loses nothing; loss of power perhaps the last transactions, whole ones.
+        # With this a kill of the process loses nothing; loss of power perhaps the last
+        # transactions, whole ones.
         self._db.execute("PRAGMA synchronous = NORMAL")
         self._db.execute("BEGIN EXCLUSIVE")
         if self.is_new:
@@ -147,27 +158,37 @@ class Store:
 
     @property
     def is_new(self) -> bool:
-        """Whether no campaign was begun in it; one that was killed at its very start leaves that, too."""
+        """Whether no campaign was begun in it; one that was killed at its very start leaves that,
+        too.
+        """
         return bool(self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,))
 
     @contextmanager
     def reading(self) -> Iterator[None]:
         """Turn whatever is unexpected while what is stored is used into one error about the store.
 
-        Whoever interprets its content does so in this, as there is no end to what a file from elsewhere can hold. An
-        error after a signal asked to stop is no damage: it may be that of a module whose import the signal broke off.
+        Whoever interprets its content does so in this, as there is no end to what a file from
+        elsewhere can hold. An error after a signal asked to stop is no damage: it may be that of a
+        module whose import the signal broke off.
         """
         try:
             yield
         except (SuaveDesError, MemoryError):
             raise
         except sqlite3.OperationalError as error:
-            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF  # none: what is read is no text
+            code = (
+                getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+            )  # none: what is read is no text
             if code == sqlite3.SQLITE_BUSY and self.path is not None:
-                problem, remedy = "another campaign is running in the output folder", "wait for it, or give another"
+                problem, remedy = (
+                    "another campaign is running in the output folder",
+                    "wait for it, or give another",
+                )
                 raise InputError(problem, file=self.path.parent, remedy=remedy) from None
             if code not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
-                raise StoreError(f"{self.path or 'temporary files'}: results cannot be kept: {error}") from None
+                raise StoreError(
+                    f"{self.path or 'temporary files'}: results cannot be kept: {error}"
+                ) from None
             raise _damaged(self.path, error) from None
         except Exception as error:
             if is_stopping():
@@ -175,7 +196,8 @@ class Store:
             raise _damaged(self.path, error) from error
 
     def begin(self, about: Mapping[str, Any]) -> None:
-        """Begin a new campaign, in place of an earlier one, with what is noted about it, by name; atomic.
+        """Begin a new campaign, in place of an earlier one, with what is noted about it, by name;
+        atomic.
 
         Raises:
             StoreError: it cannot be written.
@@ -183,12 +205,17 @@ class Store:
         was_new = self.is_new
         with self.reading():
             try:
-                for kind, name in self._db.execute("SELECT type, name FROM sqlite_master").fetchall():
+                for kind, name in self._db.execute(
+                    "SELECT type, name FROM sqlite_master"
+                ).fetchall():
                     if kind in ("table", "view"):
                         self._db.execute(f'DROP {kind} "{name}"')
                 for statement in _TABLES:
                     self._db.execute(statement)
-                self._db.executemany("INSERT INTO about VALUES (?, ?, ?)", (_note(name, about[name]) for name in about))
+                self._db.executemany(
+                    "INSERT INTO about VALUES (?, ?, ?)",
+                    (_note(name, about[name]) for name in about),
+                )
             except BaseException:
                 self._db.execute("ROLLBACK")
                 self._db.execute("BEGIN")
@@ -208,11 +235,16 @@ class Store:
             InputError: nothing was and there is no default, or it is damaged.
         """
         with self.reading():
-            found = self._db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
+            found = self._db.execute(
+                "SELECT value, crc FROM about WHERE name = ?", (name,)
+            ).fetchone()
             if found is None and default is not None:
                 return default
             if found is None or _crc(name, found[0]) != found[1]:
-                raise _damaged(self.path, f"its {name} is {'missing' if found is None else 'not what was written'}")
+                raise _damaged(
+                    self.path,
+                    f"its {name} is {'missing' if found is None else 'not what was written'}",
+                )
             return json.loads(found[0])
 
     def note(self, name: str, value: Any) -> None:
@@ -224,19 +256,24 @@ class Store:
     # Outcomes.
 
     def append(self, outcomes: Iterable[Outcome]) -> None:
-        """Keep outcomes; they are safe after _COMMIT_PERIOD_S at the latest, if more are appended, or after commit().
+        """Keep outcomes; they are safe after _COMMIT_PERIOD_S at the latest, if more are appended,
+        or after commit().
 
         Raises:
             StoreError: the disk is full, or the output folder was removed.
         """
         with self.reading():
-            self._db.executemany("INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, ?, ?, ?)", map(_record, outcomes))
+            self._db.executemany(
+                "INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, ?, ?, ?)", map(_record, outcomes)
+            )
         if time.monotonic() - self._committed_s > _COMMIT_PERIOD_S:
             self.commit()
 
     def commit(self) -> None:
         """Make appended outcomes durable."""
-        if self.path is not None and not self.path.exists():  # the system would let this write on, and throw it away
+        if (
+            self.path is not None and not self.path.exists()
+        ):  # the system would let this write on, and throw it away
             problem = f"{self.path} was removed while the campaign ran; its content is lost, so start a new campaign"
             raise StoreError(problem)
         with self.reading():
@@ -262,7 +299,8 @@ class Store:
             return int(self._db.execute("SELECT count(*) FROM outcomes").fetchone()[0])
 
     def outcomes(self) -> Iterator[Outcome]:
-        """Yield all outcomes in the order of their keys, read as they are requested; also of a store that is closed.
+        """Yield all outcomes in the order of their keys, read as they are requested; also of a
+        store that is closed.
 
         Raises:
             InputError: the store is damaged.
@@ -285,13 +323,18 @@ class Store:
         with suppress(SuaveDesError):
             is_empty = not keep_empty and (self.is_new or self.count() == 0)
         self._is_open = False
-        for cursor in list(self._cursors):  # one that an interruption left unread would keep the file locked
+        for cursor in list(
+            self._cursors
+        ):  # one that an interruption left unread would keep the file locked
             cursor.close()
         with suppress(sqlite3.Error):
             self._db.execute("COMMIT")
         self._db.close()
         if self.path is not None and self.path.exists():
-            with suppress(sqlite3.Error), closing(sqlite3.connect(self.path, isolation_level=None)) as db:
+            with (
+                suppress(sqlite3.Error),
+                closing(sqlite3.connect(self.path, isolation_level=None)) as db,
+            ):
                 db.execute("PRAGMA journal_mode = DELETE")
             if is_empty:
                 self.path.unlink()
@@ -299,7 +342,9 @@ class Store:
 
 def has_campaign(folder: Path) -> bool:
     """Return whether a campaign was begun in a folder; damaged and busy ones count."""
-    return (folder / STORE_FILE).is_file() and _looked_up(folder, "SELECT count(*) FROM sqlite_master") != 0
+    return (folder / STORE_FILE).is_file() and _looked_up(
+        folder, "SELECT count(*) FROM sqlite_master"
+    ) != 0
 
 
 def _looked_up(folder: Path, query: str) -> Any:
@@ -333,7 +378,9 @@ def _note(name: str, value: Any) -> tuple[str, str, int]:
 
 def _record(outcome: Outcome) -> tuple[int, int, int, int, str, int]:
     key, found = outcome
-    kind = _ROW if not isinstance(found, MissionFailure) else _LASTING if found.lasting else _PASSING
+    kind = (
+        _ROW if not isinstance(found, MissionFailure) else _LASTING if found.lasting else _PASSING
+    )
     content = json.dumps(found)
     return (*key, kind, content, _crc(*key, kind, content))
 
@@ -354,11 +401,14 @@ def _crc(*parts: object) -> int:
 # The files beside it.
 
 
-def write_campaign(folder: Path, files: Mapping[str, Content], suave: Mapping[str, Content]) -> None:
-    """Write a campaign's files, of those in FILES, into its folder, replacing those of an earlier campaign.
+def write_campaign(
+    folder: Path, files: Mapping[str, Content], suave: Mapping[str, Content]
+) -> None:
+    """Write a campaign's files, of those in FILES, into its folder, replacing those of an earlier
+    campaign.
 
-    The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a folder, or compare
-    one file with the others, find what they expect.
+    The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a
+    folder, or compare one file with the others, find what they expect.
 
     Raises:
         InputError: they cannot be written; nothing half-written stays.
@@ -374,18 +424,23 @@ def write_campaign(folder: Path, files: Mapping[str, Content], suave: Mapping[st
 
 
 def tidy(folder: Path, *, is_new: bool) -> None:
-    """Remove unfinished files from the folder of a campaign, and the results of an earlier one, if this is a new one.
+    """Remove unfinished files from the folder of a campaign, and the results of an earlier one, if
+    this is a new one.
 
     Raises:
         InputError: the folder of the exemplar's files is a link, whose files would be replaced.
     """
     if (folder / SUAVE_FOLDER).is_symlink():
-        raise InputError("is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it")
+        raise InputError(
+            "is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it"
+        )
     remove_results(folder, FILES, parts_only=not is_new)
 
 
 def is_left_over(name: str) -> bool:
-    """Return whether a file of a folder that has no campaign was left by one that was killed at its start."""
+    """Return whether a file of a folder that has no campaign was left by one that was killed at its
+    start.
+    """
     return name.startswith(STORE_FILE)
 
 
@@ -397,7 +452,10 @@ def runs_pieces(columns: Sequence[str], rows: Iterable[Row]) -> Iterator[str]:
     metrics = len(COLUMNS)
 
     def exact(row: Row) -> Row:
-        return (*row[:metrics], *(repr(cell) if isinstance(cell, float) else cell for cell in row[metrics:]))
+        return (
+            *row[:metrics],
+            *(repr(cell) if isinstance(cell, float) else cell for cell in row[metrics:]),
+        )
 
     return csv_pieces(columns, map(exact, rows))
 
@@ -406,7 +464,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Read a campaign's manifest.json; empty without one.
 
     Raises:
-        InputError: it cannot be read, or is of another campaign than the missions that are kept beside it.
+        InputError: it cannot be read, or is of another campaign than the missions that are kept
+            beside it.
     """
     kept = _looked_up(folder, "SELECT json_extract(value, '$') FROM about WHERE name = 'identity'")
     path = folder / MANIFEST_FILE
@@ -414,6 +473,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     manifest = found if isinstance(found, dict) else {}
     written = manifest.get("campaign_sha256")
     if written is not None and kept is not None and written != kept:
-        remedy = f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
-        raise InputError(f"{RUNS_FILE} and {STORE_FILE} are of different campaigns", file=folder, remedy=remedy)
+        remedy = (
+            f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
+        )
+        raise InputError(
+            f"{RUNS_FILE} and {STORE_FILE} are of different campaigns", file=folder, remedy=remedy
+        )
     return manifest

@@ -1,6 +1,8 @@
-"""Compare managers: estimate each metric of each group of missions and their differences, and conclude.
+"""Compare managers: estimate each metric of each group of missions and their differences, and
+conclude.
 
-Groups are compared run by run where runs share their random numbers, and else as independent samples.
+Groups are compared run by run where runs share their random numbers, and else as independent
+samples.
 """
 
 from __future__ import annotations
@@ -22,7 +24,12 @@ from suave_des.files import as_number
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.records.missions import SHARING, Missions, Source, missions_in
 from suave_des.results import statistics
-from suave_des.results.comparison import AssistedComparison, Comparison, assisted_conclusion, concluded
+from suave_des.results.comparison import (
+    AssistedComparison,
+    Comparison,
+    assisted_conclusion,
+    concluded,
+)
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
 from suave_des.results.real import CONDITION
 from suave_des.results.statistics import Sample
@@ -37,9 +44,10 @@ class Choices(TypedDict, total=False):
 
     Attributes:
         managers: names of managers; left out: all.
-        metrics: columns of runs.csv; left out: search time, distance, reaction time and the share that found the
-            pipeline.
-        by: swept parameters whose values are compared, too; the others of a sweep are averaged over, run by run.
+        metrics: columns of runs.csv; left out: search time, distance, reaction time and the share
+            that found the pipeline.
+        by: swept parameters whose values are compared, too; the others of a sweep are averaged
+            over, run by run.
         against: the one that all others are compared with, as tables name it; None: each with each.
         half_widths: METRIC:HALF_WIDTH of the intervals for which the number of runs is to be given.
         unpaired: whether runs are taken as independent though they share their random numbers.
@@ -58,7 +66,8 @@ def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> 
     """Compare the missions in folders or files of results.
 
     Args:
-        paths: folders of `suave-des campaign` or `reproduce`, folders of the exemplar's own CSV files, or CSV files.
+        paths: folders of `suave-des campaign` or `reproduce`, folders of the exemplar's own CSV
+            files, or CSV files.
         choices: what to compare, and how; see Choices.
 
     Raises:
@@ -84,9 +93,13 @@ class CampaignFrame(pandas.DataFrame):
         return CampaignFrame
 
     def __finalize__(self, other: Any, method: str | None = None, **keywords: Any) -> Self:
-        """Keep how many runs share a draw where frames are joined: pandas keeps attrs only if all are equal."""
+        """Keep how many runs share a draw where frames are joined: pandas keeps attrs only if all
+        are equal.
+        """
         found: Self = super().__finalize__(other, method, **keywords)  # type: ignore[misc]
-        parts: Iterable[Any] = getattr(other, "objs", getattr(other, "input_objs", ())) if method == "concat" else ()
+        parts: Iterable[Any] = (
+            getattr(other, "objs", getattr(other, "input_objs", ())) if method == "concat" else ()
+        )
         known = {part.attrs[SHARING] for part in parts if SHARING in part.attrs}
         if known:
             found.attrs[SHARING] = math.lcm(*known)
@@ -94,7 +107,8 @@ class CampaignFrame(pandas.DataFrame):
 
     @plain_arguments
     def compare(self, **choices: Unpack[Choices]) -> Comparison:  # type: ignore[override]
-        """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
+        """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by
+        cell.
 
         Args:
             choices: what to compare, and how; see Choices.
@@ -105,12 +119,17 @@ class CampaignFrame(pandas.DataFrame):
         return _compared(missions_in(self), **choices)
 
     def assist(
-        self, real: Source, population: Source, managers: Sequence[str] = (), metrics: Sequence[str] = ()
+        self,
+        real: Source,
+        population: Source,
+        managers: Sequence[str] = (),
+        metrics: Sequence[str] = (),
     ) -> AssistedComparison:
         """Estimate what real missions show, assisted by these, which are of the same conditions.
 
         Args:
-            real: real missions in a few conditions, as a data frame or as folders and files; likewise population.
+            real: real missions in a few conditions, as a data frame or as folders and files;
+                likewise population.
             population: a campaign under many conditions.
             managers: names; empty: all that have real missions.
             metrics: columns of runs.csv; empty: the usual ones.
@@ -126,7 +145,8 @@ class CampaignFrame(pandas.DataFrame):
         """Draw the missions, as `suave-des figure` does.
 
         Args:
-            kind: as of `suave-des figure --kind`; "auto": means over what was swept, or distributions.
+            kind: as of `suave-des figure --kind`; "auto": means over what was swept, or
+                distributions.
 
         Raises:
             InputError: there is no such kind of figure.
@@ -137,24 +157,38 @@ class CampaignFrame(pandas.DataFrame):
 
 
 def _compared(
-    missions: Missions, managers: Sequence[str] = (), metrics: Sequence[str] = (), by: Sequence[str] = (), **how: Any
+    missions: Missions,
+    managers: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+    by: Sequence[str] = (),
+    **how: Any,
 ) -> Comparison:
     return compare_groups(grouped(missions, managers, metrics, by), **how)
 
 
 def compare_groups(
-    groups: Groups, *, against: str | None = None, half_widths: Sequence[str] = (), unpaired: bool = False
+    groups: Groups,
+    *,
+    against: str | None = None,
+    half_widths: Sequence[str] = (),
+    unpaired: bool = False,
 ) -> Comparison:
     """Compare groups of missions; see compare_folders."""
     statistics.library()
     widths, pairs = _half_widths(half_widths, groups.metrics), _pairs(groups.groups, against)
-    asked = ((*pair, metric, widths.get(metric.name)) for metric in groups.metrics for pair in pairs)
+    asked = (
+        (*pair, metric, widths.get(metric.name)) for metric in groups.metrics for pair in pairs
+    )
     found = [_difference(*each, unpaired=unpaired) for each in asked]
     tested = [row for row in found if row["test"]]
     for row, p in zip(tested, statistics.holm([row["p"] for row in tested]), strict=True):
         row["p_holm"] = p
     largest = _largest(() if unpaired else pairs, groups.metrics[0], groups.missions.folders)
-    summaries = [_summary(group, metric, groups.time_limit_s) for metric in groups.metrics for group in groups.groups]
+    summaries = [
+        _summary(group, metric, groups.time_limit_s)
+        for metric in groups.metrics
+        for group in groups.groups
+    ]
     return concluded(groups, summaries, found, *largest)
 
 
@@ -173,7 +207,9 @@ def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, f
 
 
 def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:
-    """Pair the managers at each point of a sweep; the points of a manager, if it is the only one."""
+    """Pair the managers at each point of a sweep; the points of a manager, if it is the only
+    one.
+    """
     pairs = [(one, other) for one, other in combinations(groups, 2) if one.point == other.point]
     if against is None:
         return pairs or list(combinations(groups, 2))
@@ -189,7 +225,9 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
 
 
 def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
-    """Estimate one metric of one group; the restricted mean of search times reaches to horizon_s."""
+    """Estimate one metric of one group; the restricted mean of search times reaches to
+    horizon_s.
+    """
     known = group.frame[group.frame[metric.name].notna()]
     sample = known[metric.name].to_numpy(float)
     row: dict[str, Any] = {"group": group.name, "metric": metric.name}
@@ -197,22 +235,32 @@ def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
     if not len(sample):
         return row
     is_share = metric.name == FOUND and group.is_of_missions
-    mean = share_of(int(sample.sum()), len(sample)) if is_share else statistics.mean_interval(sample)
+    mean = (
+        share_of(int(sample.sum()), len(sample)) if is_share else statistics.mean_interval(sample)
+    )
     row["mean"] = mean.cut(0.0, 1.0) if metric.name == FOUND else mean
-    row |= zip(("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True)
+    row |= zip(
+        ("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True
+    )
     row["std"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
     if metric.name == SEARCH_TIME and group.is_of_missions:
         was_found = known[FOUND].to_numpy(float)
         if not np.isnan(was_found).any():
             restricted, half = statistics.search_times(sample, was_found > 0.0, horizon_s)
-            row |= {"horizon_s": horizon_s, "restricted_mean_s": restricted, "censored_median_s": half}
+            row |= {
+                "horizon_s": horizon_s,
+                "restricted_mean_s": restricted,
+                "censored_median_s": half,
+            }
     return row
 
 
 def _difference(
     first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool
 ) -> dict[str, Any]:
-    """Estimate the difference of two groups in one metric, and test it; half_width None: as usual for the metric."""
+    """Estimate the difference of two groups in one metric, and test it; half_width None: as usual
+    for the metric.
+    """
     is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
     row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
@@ -230,42 +278,69 @@ def _difference(
     else:
         difference, test = statistics.difference_interval(x, y), statistics.rank_sum_test(x, y)
     row |= test | {"difference": difference.cut(-1.0, 1.0) if metric.name == FOUND else difference}
-    half_width = half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
+    half_width = (
+        half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
+    )
     return row | _runs_needed(x, y, half_width, is_paired=is_paired)
 
 
 def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) -> dict[str, Any]:
-    """Return the number of runs that an interval needs, and the gain from pairing; equal values do not tell them."""
-    if min(len(x), len(y)) < 2 or half_width <= 0.0 or not (apart := float(x.var(ddof=1) + y.var(ddof=1))):
+    """Return the number of runs that an interval needs, and the gain from pairing; equal values do
+    not tell them.
+    """
+    if (
+        min(len(x), len(y)) < 2
+        or half_width <= 0.0
+        or not (apart := float(x.var(ddof=1) + y.var(ddof=1)))
+    ):
         return {}
-    row = {"half_width": half_width, "runs_needed_unpaired": statistics.runs_for(math.sqrt(apart), half_width)}
+    row = {
+        "half_width": half_width,
+        "runs_needed_unpaired": statistics.runs_for(math.sqrt(apart), half_width),
+    }
     if together := float((x - y).var(ddof=1)) if is_paired else 0.0:
         row["runs_needed_paired"] = statistics.runs_for(math.sqrt(together), half_width)
         row["variance_ratio"] = apart / together
     return row
 
 
-def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tuple[bool, str, Sample, Sample]:
-    """Return whether two groups are paired, why, and their values, those of the same runs in the same order if so."""
+def _samples(
+    first: Group, second: Group, metric: str, *, unpaired: bool
+) -> tuple[bool, str, Sample, Sample]:
+    """Return whether two groups are paired, why, and their values, those of the same runs in the
+    same order if so.
+    """
     x, y = first.frame[metric], second.frame[metric]
     apart = x.dropna().to_numpy(float), y.dropna().to_numpy(float)
     if unpaired:
         return False, "not paired: as asked", *apart
     if not (first.has_runs and second.has_runs):
-        return False, "not paired: real missions, or missions without seed, share no random numbers", *apart
+        return (
+            False,
+            "not paired: real missions, or missions without seed, share no random numbers",
+            *apart,
+        )
     common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
     both = common.dropna()
     if len(both) < min(2, *map(len, apart)):
         why = "not paired: fewer than two runs of the same seed and number have a value under both"
         return False, why, *apart
     left = max(map(len, apart)) - len(both)
-    rest = f"; runs with a value under only one of them ({left}) are left out" if left and len(both) else ""
+    rest = (
+        f"; runs with a value under only one of them ({left}) are left out"
+        if left and len(both)
+        else ""
+    )
     why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
     return True, why, both["x"].to_numpy(), both["y"].to_numpy()
 
 
-def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]) -> tuple[Table, str]:
-    """Return the least and the greatest difference of each pair, and the command that replays the largest of all."""
+def _largest(
+    pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]
+) -> tuple[Table, str]:
+    """Return the least and the greatest difference of each pair, and the command that replays the
+    largest of all.
+    """
     rows, found = [], []
     for first, second in pairs:
         if not all(each.has_runs and each.is_of_missions for each in (first, second)):
@@ -276,46 +351,66 @@ def _largest(pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapp
             cells = (text for value, run in ends for text in (metric.number(value), str(run)))
             rows.append((f"{first.name} - {second.name}", *cells))
             firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
-            managers, sources = (firsts[name].astype(str).unique() for name in ("manager", "source"))
-            if not first.point and 1 in (len(managers), len(sources)) and folders.keys() >= set(sources):
+            managers, sources = (
+                firsts[name].astype(str).unique() for name in ("manager", "source")
+            )
+            if (
+                not first.point
+                and 1 in (len(managers), len(sources))
+                and folders.keys() >= set(sources)
+            ):
                 size, run = max((abs(value), run) for value, run in ends)
                 places = (str(folders[source]) for source in sources)
                 chosen = "--run", str(run), "--managers", ",".join(managers)
                 found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
     title = f"runs that differ most: {metric.heading}"
-    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(found, default=(0.0, ""))[1]
+    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(
+        found, default=(0.0, "")
+    )[1]
 
 
 # Real missions, assisted by simulated ones
 #
-# A mean of real missions is corrected by what the simulation says about the conditions in which they were made: real +
-# weight * (population - same). This is prediction-powered inference (Angelopoulos et al. 2023; PPI++, arXiv:2311.01453)
-# with conditions as clusters. It holds for a wrong simulation, too, whose error is measured under the same conditions.
+# A mean of real missions is corrected by what the simulation says about the conditions in which
+# they were made: real + weight * (population - same). This is prediction-powered inference
+# (Angelopoulos et al. 2023; PPI++, arXiv:2311.01453) with conditions as clusters. It holds for a
+# wrong simulation, too, whose error is measured under the same conditions.
 
 LEAST_CONDITIONS = 3
 LEAST_TO_WEIGH = 10
-"""Conditions from which on the weight is estimated: with fewer, its own error costs more than it gains."""
+"""Conditions from which on the weight is estimated: with fewer, its own error costs more than it
+gains.
+"""
 _NOTICEABLE = 0.1
-"""Least weight, and least gain of an interval's width, with which the simulation is said to help."""
+"""Least weight, and least gain of an interval's width, with which the simulation is said to
+help.
+"""
 
 
 def assisted_mean(
-    real: Sample, same: Sample, population: Sample, chance: Sequence[float] = (0.0, 0.0, 0.0), shared: float = 0.0
+    real: Sample,
+    same: Sample,
+    population: Sample,
+    chance: Sequence[float] = (0.0, 0.0, 0.0),
+    shared: float = 0.0,
 ) -> tuple[Estimate, float]:
     """Estimate the mean over a population of conditions from real missions under a few of them.
 
     Args:
         real: mean of the real missions under each condition, shape (conditions,).
         same: mean of the simulated missions under the same conditions, in the same order.
-        population: mean of the simulated missions under each of many other conditions, shape (draws,).
-        chance: variances that these means have by chance within a condition: real, same, population.
+        population: mean of the simulated missions under each of many other conditions, shape
+            (draws,).
+        chance: variances that these means have by chance within a condition: real, same,
+            population.
         shared: variance of the mean of `same` by random numbers that its conditions share.
 
     Returns:
-        The mean, with its interval by Student's t over the conditions, and the weight of the simulation, from 0 to 1.
-        From LEAST_TO_WEIGH conditions on, the weight is that of PPI++. With fewer it is 1, or 0 where that makes the
-        interval narrower; and what the conditions show of their variance is not taken to be less than what follows from
-        chance and, for a weight of 0, from how the population varies: few conditions may be alike by accident.
+        The mean, with its interval by Student's t over the conditions, and the weight of the
+        simulation, from 0 to 1. From LEAST_TO_WEIGH conditions on, the weight is that of PPI++.
+        With fewer it is 1, or 0 where that makes the interval narrower; and what the conditions
+        show of their variance is not taken to be less than what follows from chance and, for a
+        weight of 0, from how the population varies: few conditions may be alike by accident.
     """
     n, draws, is_weighed = len(real), len(population), len(real) >= LEAST_TO_WEIGH
     spread = float(population.var(ddof=1))
@@ -323,7 +418,9 @@ def assisted_mean(
     def variance(weight: float) -> float:
         between = 0.0 if is_weighed else (1.0 - weight) ** 2 * max(0.0, spread - chance[2])
         seen = float((real - weight * same).var(ddof=1))
-        return max(seen, between + chance[0] + weight**2 * chance[1]) / n + weight**2 * (spread / draws + shared)
+        return max(seen, between + chance[0] + weight**2 * chance[1]) / n + weight**2 * (
+            spread / draws + shared
+        )
 
     if is_weighed:
         both = float(np.concatenate([same, population]).var(ddof=1))
@@ -337,7 +434,8 @@ def assisted_mean(
 
 
 def compare_assisted(real: Groups) -> AssistedComparison:
-    """Estimate each manager's means, and the differences between managers, from real missions and simulated ones.
+    """Estimate each manager's means, and the differences between managers, from real missions and
+    simulated ones.
 
     A mission that never found the pipeline counts with the time limit as its search time.
 
@@ -346,52 +444,90 @@ def compare_assisted(real: Groups) -> AssistedComparison:
     """
     names = [group.name for group in real.groups]
     in_real, in_same, drawn = (
-        each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=real.time_limit_s)}) for each in real.sides
+        each.assign(**{SEARCH_TIME: each[SEARCH_TIME].clip(upper=real.time_limit_s)})
+        for each in real.sides
     )
     rows = []
     for metric in real.metrics:
-        sides = [_means(frame, CONDITION, metric.name, name) for frame, name in ((in_real, "real"), (in_same, "same"))]
+        sides = [
+            _means(frame, CONDITION, metric.name, name)
+            for frame, name in ((in_real, "real"), (in_same, "same"))
+        ]
         conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
         draws, shared = _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
             rows.append(_estimate(both, metric, conditions, draws, shared))
-    return AssistedComparison(pandas.DataFrame(rows), (*real.missions.notes, *real.notes), real.metrics)
+    return AssistedComparison(
+        pandas.DataFrame(rows), (*real.missions.notes, *real.notes), real.metrics
+    )
 
 
 def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.DataFrame:
-    """Return mean (name), variance (name_var) and number (name_n) of missions, by condition or draw and by manager."""
+    """Return mean (name), variance (name_var) and number (name_n) of missions, by condition or draw
+    and by manager.
+    """
     found = frame.groupby([by, "manager"], observed=True)[metric].agg(["mean", "var", "count"])
     return found.set_axis([name, f"{name}_var", f"{name}_n"], axis=1)
 
 
 def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
-    """Return by run and manager how far simulated missions are on average from the mean of their condition."""
-    # Points of a sweep share a run's random numbers, so that the means of all conditions may be off by the same chance.
-    off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform("mean")
-    return same.assign(off=off).groupby(["seed", "run", "manager"], observed=True)["off"].mean().unstack("manager")
+    """Return by run and manager how far simulated missions are on average from the mean of their
+    condition.
+    """
+    # Points of a sweep share a run's random numbers, so that the means of all conditions may be off
+    # by the same chance.
+    off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform(
+        "mean"
+    )
+    return (
+        same.assign(off=off)
+        .groupby(["seed", "run", "manager"], observed=True)["off"]
+        .mean()
+        .unstack("manager")
+    )
 
 
 def _estimate(
-    both: list[str], metric: Metric, conditions: pandas.DataFrame, drawn: pandas.DataFrame, shared: pandas.DataFrame
+    both: list[str],
+    metric: Metric,
+    conditions: pandas.DataFrame,
+    drawn: pandas.DataFrame,
+    shared: pandas.DataFrame,
 ) -> dict[str, Any]:
-    """Estimate the mean of one manager, or the difference of two, over the conditions that both have."""
+    """Estimate the mean of one manager, or the difference of two, over the conditions that both
+    have.
+    """
     by_manager: Any = conditions.unstack()
     own = by_manager.reindex(columns=pandas.MultiIndex.from_product([conditions.columns, both]))
     own = own[own[["real", "same"]].notna().all(axis=1)]
-    draws, of_runs = (each.reindex(columns=both).dropna() for each in (drawn["draw"].unstack(), shared))
+    draws, of_runs = (
+        each.reindex(columns=both).dropna() for each in (drawn["draw"].unstack(), shared)
+    )
     for number, least, of, remedy in (
         (len(own), LEAST_CONDITIONS, "condition", "how they differ gives the interval"),
-        (int(own["same_n"].min().min()) if len(own) else 2, 2, "simulated mission", "in each condition, better 20"),
+        (
+            int(own["same_n"].min().min()) if len(own) else 2,
+            2,
+            "simulated mission",
+            "in each condition, better 20",
+        ),
         (len(draws), LEAST_TO_WEIGH, "draw", "in the population, better some hundred"),
     ):
         if number < least:
-            problem = f"{metric.title} of {' - '.join(both)}: there {'is' if number == 1 else 'are'}"
-            raise InputError(f"{problem} {number_of(number, of)}", remedy=f"at least {least} are needed: {remedy}")
+            problem = (
+                f"{metric.title} of {' - '.join(both)}: there {'is' if number == 1 else 'are'}"
+            )
+            raise InputError(
+                f"{problem} {number_of(number, of)}",
+                remedy=f"at least {least} are needed: {remedy}",
+            )
     signs = np.array([1.0, -1.0][: len(both)])
     real, same, many = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
     sizes = own["real_n"], own["same_n"], float(drawn["draw_n"].unstack().mean().mean())
     chance = [float((own["same_var"] / size).mean().sum()) for size in sizes]
-    in_common = float((of_runs.to_numpy() @ signs).var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
+    in_common = (
+        float((of_runs.to_numpy() @ signs).var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
+    )
     alone = statistics.mean_interval(real)
     assisted, weight = assisted_mean(real, same, many, chance, in_common)
     if metric.name == FOUND:
@@ -399,8 +535,18 @@ def _estimate(
     half, runs = (assisted.high - assisted.low) / 2.0, int(own["real_n"][both[0]].sum())
     narrower = (alone.high - alone.low) / 2.0 / half
     needed = statistics.runs_for(float(real.std(ddof=1)), half) if half > 0.0 else None
-    row = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name, "runs": runs, "conditions": len(own)}
-    row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight, "narrower": narrower}
+    row = {
+        "group": both[0],
+        "other": "".join(both[1:]),
+        "metric": metric.name,
+        "runs": runs,
+        "conditions": len(own),
+    }
+    row |= (
+        alone.columns("alone")
+        | assisted.columns("assisted")
+        | {"weight": weight, "narrower": narrower}
+    )
     row["equal_runs"] = None if needed is None else round(needed * runs / len(own))
     row["helps"] = weight >= _NOTICEABLE and narrower >= 1.0 + _NOTICEABLE
     return row | {"conclusion": assisted_conclusion(row, metric)}

@@ -1,4 +1,6 @@
-"""A comparison in words and tables: what is concluded, and how it is written, in LaTeX in the paper's layout."""
+"""A comparison in words and tables: what is concluded, and how it is written, in LaTeX in the
+paper's layout.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,15 @@ from suave_des.errors import number_of
 from suave_des.estimates import Estimate, interval_names
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.results.groups import Groups, listed
-from suave_des.results.statistics import A12, FISHER, MANN_WHITNEY, MCNEMAR, RANK_BISERIAL, SIGNIFICANCE, WILCOXON
+from suave_des.results.statistics import (
+    A12,
+    FISHER,
+    MANN_WHITNEY,
+    MCNEMAR,
+    RANK_BISERIAL,
+    SIGNIFICANCE,
+    WILCOXON,
+)
 from suave_des.tables import EFFECT, Section, Table, Written, capital, rows_of
 
 Row = Mapping[str, Any]
@@ -27,8 +37,12 @@ _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", 
 _MOST_SENTENCES = 3
 """Of a metric of which neither more nor less is better, in the conclusion from all differences."""
 _WORSE = 0.9
-"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what is nearer 1."""
-_OPEN = "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
+"""Ratio of variances below which pairing is said to be worse than not pairing; chance explains what
+is nearer 1.
+"""
+_OPEN = (
+    "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
+)
 
 
 def _ends(name: str) -> tuple[str, ...]:
@@ -36,12 +50,44 @@ def _ends(name: str) -> tuple[str, ...]:
 
 
 _SUMMARY = (
-    *("group", "metric", "n", "missing", *_ends("mean"), "mean_interval", "std", "median", "q1", "q3", "horizon_s"),
+    *(
+        "group",
+        "metric",
+        "n",
+        "missing",
+        *_ends("mean"),
+        "mean_interval",
+        "std",
+        "median",
+        "q1",
+        "q3",
+        "horizon_s",
+    ),
     *(*_ends("restricted_mean_s"), "restricted_mean_s_interval", *_ends("censored_median_s")),
 )
 _DIFFERENCE = (
-    *("group", "other", "metric", "paired", "why", "n", "n_other", *_ends("difference"), "difference_interval"),
-    *("test", "p", "p_holm", "p_less", "p_greater", "effect_name", *_ends("effect"), "variance_ratio", "half_width"),
+    *(
+        "group",
+        "other",
+        "metric",
+        "paired",
+        "why",
+        "n",
+        "n_other",
+        *_ends("difference"),
+        "difference_interval",
+    ),
+    *(
+        "test",
+        "p",
+        "p_holm",
+        "p_less",
+        "p_greater",
+        "effect_name",
+        *_ends("effect"),
+        "variance_ratio",
+        "half_width",
+    ),
     *("runs_needed_paired", "runs_needed_unpaired", "conclusion"),
 )
 """Columns of the frames, in order."""
@@ -49,7 +95,9 @@ _DIFFERENCE = (
 
 def estimate_in(row: Row, name: str) -> Estimate:
     """Return an estimate from the three columns that have it, as of Estimate.columns."""
-    value, low, high = (math.nan if row[each] is None else row[each] for each in (name, *interval_names(name)))
+    value, low, high = (
+        math.nan if row[each] is None else row[each] for each in (name, *interval_names(name))
+    )
     return Estimate(value, low, high)
 
 
@@ -60,25 +108,30 @@ class Comparison(Written):
         comparison = compare_folders(["before", "after"])
         comparison.differences[["group", "other", "difference", "p_holm"]]
 
-    In the frames, columns that end in `_ci95_low` and `_ci95_high` are the ends of the 95% interval of the one before,
-    whose method is in the column that ends in `_interval`; nan where there are too few values.
+    In the frames, columns that end in `_ci95_low` and `_ci95_high` are the ends of the 95% interval
+    of the one before, whose method is in the column that ends in `_interval`; nan where there are
+    too few values.
 
     Attributes:
-        summaries: a row for each metric and group: group (name of the manager, with its source or its value of a sweep
-            where that is needed), metric, n (independent values: missions, or runs where several points of a sweep are
-            averaged), missing (missions without a value), mean (of `pipeline_found` the share), std, median, q1 and q3;
-            of the search time horizon_s (the time to which the restricted mean reaches), restricted_mean_s (of the time
-            until found or horizon_s, missions without it being censored) and censored_median_s (time by which half of
-            the missions have found the pipeline; nan if less than half do).
-        differences: a row for each metric and pair: group, other, metric, paired (whether they are compared run by
-            run), why, n (values of the one, or pairs), n_other, difference (of the means, group - other), test, p
-            (two-sided), p_holm (adjusted for all tests of this comparison), p_less (one-sided: that the one is not less
-            than the other), p_greater, effect_name, effect, variance_ratio (by how much pairing divides the variance of
-            the difference), half_width (of the interval for which the number of runs is given), runs_needed_paired
-            (runs of each manager for that, if they are paired), runs_needed_unpaired (none: over ten million, or not
-            known), and conclusion.
-        counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
-        largest: of each pair the least and the greatest difference in the first metric, each with its run.
+        summaries: a row for each metric and group: group (name of the manager, with its source or
+            its value of a sweep where that is needed), metric, n (independent values: missions, or
+            runs where several points of a sweep are averaged), missing (missions without a value),
+            mean (of `pipeline_found` the share), std, median, q1 and q3; of the search time
+            horizon_s (the time to which the restricted mean reaches), restricted_mean_s (of the
+            time until found or horizon_s, missions without it being censored) and censored_median_s
+            (time by which half of the missions have found the pipeline; nan if less than half do).
+        differences: a row for each metric and pair: group, other, metric, paired (whether they are
+            compared run by run), why, n (values of the one, or pairs), n_other, difference (of the
+            means, group - other), test, p (two-sided), p_holm (adjusted for all tests of this
+            comparison), p_less (one-sided: that the one is not less than the other), p_greater,
+            effect_name, effect, variance_ratio (by how much pairing divides the variance of the
+            difference), half_width (of the interval for which the number of runs is given),
+            runs_needed_paired (runs of each manager for that, if they are paired),
+            runs_needed_unpaired (none: over ten million, or not known), and conclusion.
+        counted: what n counts: "mission", or "run" or "draw" where missions are averaged over
+            these.
+        largest: of each pair the least and the greatest difference in the first metric, each with
+            its run.
         replay: the command that replays both missions of the largest of these; empty: not known.
     """
 
@@ -96,20 +149,33 @@ class Comparison(Written):
         return {"summaries": self.summaries, "differences": self.differences}
 
     def sections(self) -> Iterator[Section]:
-        """Yield the tables of each metric, the numbers of runs that intervals need, and the runs that differ most."""
+        """Yield the tables of each metric, the numbers of runs that intervals need, and the runs
+        that differ most.
+        """
         needed = []
         for metric in self.metrics:
-            own = [rows_of(frame[frame["metric"] == metric.name]) for frame in self.frames().values()]
-            tables = _summary_table(metric, own[0]), _search_table(own[0]), _difference_table(metric, own[1])
+            own = [
+                rows_of(frame[frame["metric"] == metric.name]) for frame in self.frames().values()
+            ]
+            tables = (
+                _summary_table(metric, own[0]),
+                _search_table(own[0]),
+                _difference_table(metric, own[1]),
+            )
             sentences = [each["conclusion"] for each in own[1]]
             needed += [_runs_row(each, metric) for each in own[1] if each["half_width"] is not None]
             yield Section(metric.heading, [each for each in tables if each.rows], sentences)
         if needed:
             headings = ("difference", "for ±", "paired", "not paired", "variance ratio")
-            yield Section("runs of each manager that an interval of the difference needs", [Table(headings, needed)])
+            yield Section(
+                "runs of each manager that an interval of the difference needs",
+                [Table(headings, needed)],
+            )
         if self.largest.rows:
             below = f"To see both missions: {self.replay}" if self.replay else ""
-            yield Section(self.largest.title, [Table(self.largest.headings, self.largest.rows)], below=below)
+            yield Section(
+                self.largest.title, [Table(self.largest.headings, self.largest.rows)], below=below
+            )
 
     def remarks(self) -> list[str]:
         """Describe how missions were compared and why, and what to know about the data."""
@@ -126,30 +192,45 @@ class Comparison(Written):
             over_all = f", Holm's correction over all {len(tested)}" if len(tested) > 1 else ""
             yield f"Tests: {', '.join(tested['test'].unique())}; two-sided{over_all}."
         yield from (_EFFECTS[name] for name in tested["effect_name"].unique() if name)
-        methods = pandas.concat([self.summaries["mean_interval"], tested["difference_interval"]]).dropna().unique()
+        methods = (
+            pandas.concat([self.summaries["mean_interval"], tested["difference_interval"]])
+            .dropna()
+            .unique()
+        )
         if len(methods):
             yield f"95% intervals: {', '.join(methods)}."
 
     def latex(self) -> str:
-        """Write two tables for LaTeX with booktabs: means and standard deviations as in the paper, and differences."""
-        metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or list(self.metrics)
+        """Write two tables for LaTeX with booktabs: means and standard deviations as in the paper,
+        and differences.
+        """
+        metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or list(
+            self.metrics
+        )
         by_group: dict[str, list[str]] = {}
         for metric in metrics:
             for each in rows_of(self.summaries[self.summaries["metric"] == metric.name]):
                 cells = metric.number(each["mean"]), metric.number(each["std"])
                 by_group.setdefault(each["group"], [each["group"]]).extend(cells)
         shown = [row for row in by_group.values() if any(row[1:])]
-        means = Table(("Manager", *("Mean", "Std") * len(metrics)), shown, "Means and standard deviations.")
+        means = Table(
+            ("Manager", *("Mean", "Std") * len(metrics)), shown, "Means and standard deviations."
+        )
         lines = [r"% needs \usepackage{booktabs}", *(f"% Note: {note}." for note in self.notes)]
         over = [capital(metric.heading) for metric in metrics]
         lines.append(means.latex(over, label="tab:means", note=self._sizes()))
         if len(self.differences):
             rows: list[tuple[str, ...]] = []
             for metric in self.metrics:
-                own = self.differences[(self.differences["metric"] == metric.name) & self.differences["test"].notna()]
+                own = self.differences[
+                    (self.differences["metric"] == metric.name) & self.differences["test"].notna()
+                ]
                 rows += [(capital(metric.heading),)] if len(own) else []
                 cells_of = (_difference_row(each, metric) for each in rows_of(own))
-                rows += [(name, mean, interval, effect, p) for name, _, mean, interval, _, p, effect in cells_of]
+                rows += [
+                    (name, mean, interval, effect, p)
+                    for name, _, mean, interval, _, p, effect in cells_of
+                ]
             headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
             table = Table(headings, rows, "Differences between managers.")
             text = table.latex(label="tab:differences", note=" ".join(self._methods()))
@@ -163,7 +244,10 @@ class Comparison(Written):
         return "; ".join(f"{name}: {number_of(n, self.counted)}" for name, n in sizes.items()) + "."
 
     def _content(self) -> dict[str, Any]:
-        return {**super()._content(), "largest_differences": {"rows": self.largest.rows, "replay": self.replay}}
+        return {
+            **super()._content(),
+            "largest_differences": {"rows": self.largest.rows, "replay": self.replay},
+        }
 
 
 @dataclass(frozen=True)
@@ -174,11 +258,11 @@ class AssistedComparison(Written):
         found.estimates[["group", "other", "assisted", "narrower", "conclusion"]]
 
     Attributes:
-        estimates: a row for each metric and manager, or pair of managers: group, other (whose mean is subtracted, or
-            empty), metric, runs (real missions of the group), conditions, alone and assisted (means with the ends of
-            their intervals), weight, narrower (how many times as wide the interval of the real missions alone is),
-            equal_runs (real missions, as many in each condition, that would give the assisted interval), helps, and
-            conclusion.
+        estimates: a row for each metric and manager, or pair of managers: group, other (whose mean
+            is subtracted, or empty), metric, runs (real missions of the group), conditions, alone
+            and assisted (means with the ends of their intervals), weight, narrower (how many times
+            as wide the interval of the real missions alone is), equal_runs (real missions, as many
+            in each condition, that would give the assisted interval), helps, and conclusion.
         conclusion: of all; empty, as each estimate has its own.
     """
 
@@ -193,7 +277,16 @@ class AssistedComparison(Written):
 
     def sections(self) -> Iterator[Section]:
         """Yield a table for each metric."""
-        headings = ("mean", "n", "alone", "95% interval", "assisted", "95% interval", "weight", "equals")
+        headings = (
+            "mean",
+            "n",
+            "alone",
+            "95% interval",
+            "assisted",
+            "95% interval",
+            "weight",
+            "equals",
+        )
         for metric in self.metrics:
             own = rows_of(self.estimates[self.estimates["metric"] == metric.name])
             table = Table(headings, [_assisted_cells(row, metric) for row in own])
@@ -217,7 +310,11 @@ def _summary_table(metric: Metric, summaries: Sequence[Row]) -> Table:
     width = 4 if metric.name == FOUND else len(headings)
     rows = []
     for each in summaries:
-        quartiles = "" if each["q1"] is None else metric.interval(Estimate(each["median"], each["q1"], each["q3"]))
+        quartiles = (
+            ""
+            if each["q1"] is None
+            else metric.interval(Estimate(each["median"], each["q1"], each["q3"]))
+        )
         mean = metric.number(each["mean"]), metric.interval(estimate_in(each, "mean"))
         spread = metric.number(each["std"]), metric.number(each["median"]), quartiles
         rows.append((each["group"], f"{each['n']:,}", *mean, *spread)[:width])
@@ -225,14 +322,24 @@ def _summary_table(metric: Metric, summaries: Sequence[Row]) -> Table:
 
 
 def _search_table(summaries: Sequence[Row]) -> Table:
-    """Return search times in which missions that never found the pipeline are censored; no rows for other metrics."""
+    """Return search times in which missions that never found the pipeline are censored; no rows for
+    other metrics.
+    """
     known = [each for each in summaries if each["horizon_s"] is not None]
     horizon_s = min((each["horizon_s"] for each in known), default=0.0)
-    headings = ("manager", f"mean to {horizon_s:.0f} s", "95% interval", "half found by", "95% interval")
+    headings = (
+        "manager",
+        f"mean to {horizon_s:.0f} s",
+        "95% interval",
+        "half found by",
+        "95% interval",
+    )
     rows = []
     for each in known:
         mean = estimate_in(each, "restricted_mean_s")
-        half_s, low_s, high_s = (each[name] for name in ("censored_median_s", *interval_names("censored_median_s")))
+        half_s, low_s, high_s = (
+            each[name] for name in ("censored_median_s", *interval_names("censored_median_s"))
+        )
         if abs(mean.value - each["mean"]) < 0.005 and half_s is not None:
             continue  # as in the table above
         ends = "not reached" if low_s is None else f"{low_s:.0f} to {_seconds(high_s)}"
@@ -259,14 +366,27 @@ def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
     mean, size = estimate_in(each, "difference"), estimate_in(each, "effect")
     effect = "" if each["effect"] is None else f"{size.value:.2f}"
     effect += f" ({size.text('.2f')})" if size.has_interval else ""
-    return *names, metric.number(mean.value), metric.interval(mean), _p(each["p"]), _p(each["p_holm"]), effect
+    return (
+        *names,
+        metric.number(mean.value),
+        metric.interval(mean),
+        _p(each["p"]),
+        _p(each["p_holm"]),
+        effect,
+    )
 
 
 def _runs_row(each: Row, metric: Metric) -> tuple[str, ...]:
     ratio = "" if each["variance_ratio"] is None else f"{each['variance_ratio']:.1f}"
     paired = f"{each['runs_needed_paired']:,}" if each["runs_needed_paired"] else ""
-    unpaired = f"{each['runs_needed_unpaired']:,}" if each["runs_needed_unpaired"] else "over 10,000,000"
-    half = f"{100 * each['half_width']:g}%" if metric.name == FOUND else f"{each['half_width']:.4g} {metric.unit}"
+    unpaired = (
+        f"{each['runs_needed_unpaired']:,}" if each["runs_needed_unpaired"] else "over 10,000,000"
+    )
+    half = (
+        f"{100 * each['half_width']:g}%"
+        if metric.name == FOUND
+        else f"{each['half_width']:.4g} {metric.unit}"
+    )
     return f"{each['group']} - {each['other']}", half.strip(), paired, unpaired, ratio
 
 
@@ -279,9 +399,17 @@ def _p(p: float) -> str:
 
 def _assisted_cells(row: Row, metric: Metric) -> tuple[str, ...]:
     both = [estimate_in(row, name) for name in ("alone", "assisted")]
-    cells = [text for found in both for text in (metric.number(found.value), metric.interval(found))]
+    cells = [
+        text for found in both for text in (metric.number(found.value), metric.interval(found))
+    ]
     equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] is not None else ""
-    return _group_name(row), f"{row['runs']} in {row['conditions']}", *cells, f"{row['weight']:.2f}", equal
+    return (
+        _group_name(row),
+        f"{row['runs']} in {row['conditions']}",
+        *cells,
+        f"{row['weight']:.2f}",
+        equal,
+    )
 
 
 def _group_name(row: Row) -> str:
@@ -292,9 +420,14 @@ def _group_name(row: Row) -> str:
 
 
 def concluded(
-    groups: Groups, summaries: Sequence[Row], differences: Sequence[dict[str, Any]], largest: Table, replay: str
+    groups: Groups,
+    summaries: Sequence[Row],
+    differences: Sequence[dict[str, Any]],
+    largest: Table,
+    replay: str,
 ) -> Comparison:
-    """Write what follows from the estimates of groups and their differences; `largest` and `replay` as of Comparison.
+    """Write what follows from the estimates of groups and their differences; `largest` and `replay`
+    as of Comparison.
 
     Summaries and differences have the columns of Comparison's frames, but whole estimates.
     """
@@ -302,40 +435,59 @@ def concluded(
     for row in differences:
         row["conclusion"] = conclusion(row, by_name[row["metric"]])
     counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
-    frames = _frame(summaries, _SUMMARY).astype({"horizon_s": "Int64"}), _frame(differences, _DIFFERENCE).astype(counts)
+    frames = (
+        _frame(summaries, _SUMMARY).astype({"horizon_s": "Int64"}),
+        _frame(differences, _DIFFERENCE).astype(counts),
+    )
     sentences = " ".join(_conclusions(groups, summaries, differences))
     notes = (*groups.missions.notes, *groups.notes, *_worse_paired(differences))
     return Comparison(sentences, *frames, notes, groups.metrics, groups.counted, largest, replay)
 
 
 def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
-    """Make a frame of rows, of each estimate its value, the ends of its interval, and how that is found."""
+    """Make a frame of rows, of each estimate its value, the ends of its interval, and how that is
+    found.
+    """
     plain = []
     for row in rows:
         cells = dict.fromkeys(columns) | dict(row)
         for name, found in row.items():
             if isinstance(found, Estimate):
-                cells |= found.columns(name) | {f"{name}_interval": found.method if found.has_interval else None}
+                cells |= found.columns(name) | {
+                    f"{name}_interval": found.method if found.has_interval else None
+                }
         plain.append(cells)
     return pandas.DataFrame(plain, columns=columns)
 
 
-def _conclusions(groups: Groups, summaries: Sequence[Row], differences: Sequence[Row]) -> Iterator[str]:
-    """Yield the conclusion; of points of a sweep at which managers are compared, one for those that have the same."""
+def _conclusions(
+    groups: Groups, summaries: Sequence[Row], differences: Sequence[Row]
+) -> Iterator[str]:
+    """Yield the conclusion; of points of a sweep at which managers are compared, one for those that
+    have the same.
+    """
     metric = groups.metrics[0]
-    means = {each["group"]: each["mean"].value for each in summaries if each["metric"] == metric.name and each["n"]}
+    means = {
+        each["group"]: each["mean"].value
+        for each in summaries
+        if each["metric"] == metric.name and each["n"]
+    }
     points = dict.fromkeys(group.point for group in groups.groups)
     if len(points) == 1 or len(points) == len(groups.groups):
         points = {"": None}
     points_of: dict[str, list[str]] = {}
     for point in points:
         names = [group.name for group in groups.groups if not point or group.point == point]
-        text = overall_conclusion(metric, differences, {name: means[name] for name in names if name in means}, names)
+        text = overall_conclusion(
+            metric, differences, {name: means[name] for name in names if name in means}, names
+        )
         lost = [f"{name} in {groups.lost[name]}" for name in names if name in groups.lost]
         if lost and metric.name == SEARCH_TIME:
             what = "their search time is when they ended"
             text = f"The pipeline was not found by {listed(lost)}; {what}. {text}"
-        points_of.setdefault(text.replace(point, "") if point else text, []).append(point.removeprefix(", "))
+        points_of.setdefault(text.replace(point, "") if point else text, []).append(
+            point.removeprefix(", ")
+        )
     for text, where in points_of.items():
         yield f"{'; '.join(where)}: {text}" if where[0] else text
 
@@ -354,11 +506,14 @@ def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
 def conclusion(found: Row, metric: Metric) -> str:
     """Write the conclusion from one difference.
 
-    The test is one of ranks, the difference one of means: what only one of them shows is not said of the other.
+    The test is one of ranks, the difference one of means: what only one of them shows is not said
+    of the other.
     """
     group, other = found["group"], found["other"]
     if not found["test"]:
-        return f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
+        return (
+            f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
+        )
     apart, ranks = found["difference"], _direction_of_ranks(found)
     if _is_equal(found):
         return f"{group} and {other} have the same {metric.title} in all {number_of(found['n'], 'pair')}."
@@ -369,7 +524,9 @@ def conclusion(found: Row, metric: Metric) -> str:
         return f"No difference in {metric.title} is shown between {group} and {other}{but} ({mean}; {test})."
     if not _is_claimed(found):
         less, greater = (other, group)[:: 1 if ranks > 0.0 else -1]
-        first, phrase, second = (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
+        first, phrase, second = (
+            (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
+        )
         claim = f"{first} {phrase.format('mostly')} {second}"
         if not metric.better:
             claim = f"{greater} mostly exceeds {less} in {metric.title}"
@@ -387,7 +544,9 @@ def conclusion(found: Row, metric: Metric) -> str:
 def _is_equal(found: Row) -> bool:
     """Whether the two have the same value in each pair."""
     apart = found["difference"]
-    return bool(found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval)
+    return bool(
+        found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval
+    )
 
 
 def _is_open(found: Row) -> bool:
@@ -403,7 +562,9 @@ def _is_claimed(found: Row) -> bool:
 
 
 def difference_claim(first: str, second: str, value: float, metric: Metric) -> str:
-    """Write which of two managers has more or less, the better one first; the value is first - second."""
+    """Write which of two managers has more or less, the better one first; the value is first -
+    second.
+    """
     if value * (metric.better or 1) < 0.0:
         first, second, value = second, first, -value
     phrase = metric.more if value > 0.0 else metric.less
@@ -415,12 +576,18 @@ def difference_claim(first: str, second: str, value: float, metric: Metric) -> s
 def overall_conclusion(
     metric: Metric, differences: Sequence[Row], means: Mapping[str, float], groups: Sequence[str]
 ) -> str:
-    """Write the conclusion for the first metric: which manager is best, by how much, and whether it is significant.
+    """Write the conclusion for the first metric: which manager is best, by how much, and whether it
+    is significant.
 
-    It is about the groups named, of which `means` has those that are known; differences are of all metrics and groups.
+    It is about the groups named, of which `means` has those that are known; differences are of all
+    metrics and groups.
     """
     tested = [each for each in differences if each["test"]]
-    own = [each for each in tested if each["metric"] == metric.name and {each["group"], each["other"]} <= set(groups)]
+    own = [
+        each
+        for each in tested
+        if each["metric"] == metric.name and {each["group"], each["other"]} <= set(groups)
+    ]
     if len(groups) < 2:
         return f"There is only {groups[0]}, so there is nothing to compare it with."
     if not own or len(means) < 2:
@@ -436,17 +603,33 @@ def overall_conclusion(
         sentences.append(_claims(best, metric, claimed, alike, len(tested)))
     elif alike:
         has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
-        of_all = " of all its runs" if any(_favours(each, _other(each, best), metric) for each in against) else ""
+        of_all = (
+            " of all its runs"
+            if any(_favours(each, _other(each, best), metric) for each in against)
+            else ""
+        )
         is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean{of_all},"
-        over = f", after Holm's correction over {number_of(len(tested), 'test')}" if any(map(_is_open, against)) else ""
+        over = (
+            f", after Holm's correction over {number_of(len(tested), 'test')}"
+            if any(map(_is_open, against))
+            else ""
+        )
         sentences.append(f"{is_shown} and {_and(alike)}{over}.")
-    others = [each["conclusion"] for each in against if each["p_holm"] < SIGNIFICANCE and each not in claimed]
+    others = [
+        each["conclusion"]
+        for each in against
+        if each["p_holm"] < SIGNIFICANCE and each not in claimed
+    ]
     return " ".join([*sentences, *others])
 
 
 def _favours(found: Row, name: str, metric: Metric) -> bool:
-    """Whether a group is the better one in the runs that are compared, which need not be all that have a mean."""
-    return bool((1.0 if found["group"] == name else -1.0) * metric.better * found["difference"].value > 0.0)
+    """Whether a group is the better one in the runs that are compared, which need not be all that
+    have a mean.
+    """
+    return bool(
+        (1.0 if found["group"] == name else -1.0) * metric.better * found["difference"].value > 0.0
+    )
 
 
 def _not_shown(found: Row, best: str) -> str:
@@ -456,8 +639,12 @@ def _not_shown(found: Row, best: str) -> str:
     return f"{_other(found, best)} ({_OPEN})" if _is_open(found) else _other(found, best)
 
 
-def _claims(best: str, metric: Metric, claimed: Sequence[Row], alike: Sequence[str], tests: int) -> str:
-    """Write by how much the best is better than those from which it differs, and from which it does not."""
+def _claims(
+    best: str, metric: Metric, claimed: Sequence[Row], alike: Sequence[str], tests: int
+) -> str:
+    """Write by how much the best is better than those from which it differs, and from which it does
+    not.
+    """
     _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
     parts = [
         f"{metric.amount(abs(each['difference'].value))}{words} {_other(each, best)}"
@@ -500,8 +687,12 @@ def p_text(p: float) -> str:
 
 
 def _direction_of_ranks(found: Row) -> float:
-    """Return the sign of the effect: above 0 if the first has the greater values, 0 if there is none."""
-    return (found["effect"] or 0.0) - (0.5 if found["test"] == MANN_WHITNEY and found["effect"] is not None else 0.0)
+    """Return the sign of the effect: above 0 if the first has the greater values, 0 if there is
+    none.
+    """
+    return (found["effect"] or 0.0) - (
+        0.5 if found["test"] == MANN_WHITNEY and found["effect"] is not None else 0.0
+    )
 
 
 def assisted_conclusion(row: Row, metric: Metric) -> str:
@@ -517,5 +708,11 @@ def assisted_conclusion(row: Row, metric: Metric) -> str:
     claim += f" from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
     if not row["helps"]:
         return f"{claim}; the simulation does not help."
-    equal = f", as that of {row['equal_runs']:,} real missions alone" if row["equal_runs"] is not None else ""
-    return f"{claim}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
+    equal = (
+        f", as that of {row['equal_runs']:,} real missions alone"
+        if row["equal_runs"] is not None
+        else ""
+    )
+    return (
+        f"{claim}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
+    )

@@ -1,4 +1,6 @@
-"""Figures of results folders: of a mission; of a campaign distributions, differences, and means over a sweep."""
+"""Figures of results folders: of a mission; of a campaign distributions, differences, and means
+over a sweep.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,14 @@ from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
-from suave_des.results.groups import Group, Groups, check_swept, first_alike, grouped, least_and_greatest
+from suave_des.results.groups import (
+    Group,
+    Groups,
+    check_swept,
+    first_alike,
+    grouped,
+    least_and_greatest,
+)
 from suave_des.results.mission import Rules, draw_map, draw_timeline
 from suave_des.results.style import folded, key_words, value_words
 
@@ -49,7 +58,9 @@ _EACH_WITH_EACH = 4
 
 
 def draw_distributions(drawn: Groups) -> style.Picture:
-    """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
+    """Draw the empirical distribution functions of search time and inspected distance, a curve for
+    each group.
+    """
     groups = drawn.groups
     labels = [*map(_label, groups), "markers on the axis: means"]
     rows = math.ceil(len(labels) / _legend_columns(labels))
@@ -61,19 +72,42 @@ def draw_distributions(drawn: Groups) -> style.Picture:
             values = np.sort(group.frame[metric].dropna())
             shares = np.arange(1, len(values) + 1) / len(values)
             look = style.line(number)
-            axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look)
-            mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
+            axes.step(
+                [0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look
+            )
+            mark = {
+                "marker": style.marker(number),
+                "color": look["color"],
+                "ms": 5,
+                "mec": "white",
+                "mew": 0.5,
+            }
             axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
     times = figure.axes[0]
     if any((group.frame[FOUND] < 1.0).any() for group in groups):
         times.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
-        note: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
-        times.text(drawn.time_limit_s, 0.03, "not found ", transform=times.get_xaxis_transform(), **note)
+        note: dict[str, Any] = {
+            "color": "#555555",
+            "fontsize": 7,
+            "rotation": 90,
+            "ha": "right",
+            "va": "bottom",
+        }
+        times.text(
+            drawn.time_limit_s, 0.03, "not found ", transform=times.get_xaxis_transform(), **note
+        )
     times.set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     times.yaxis.set_major_formatter(PercentFormatter(1.0))
-    curves = [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
-    _legend(figure, [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)], labels)
+    curves = [
+        Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number))
+        for number, _ in _looks(groups)
+    ]
+    _legend(
+        figure,
+        [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)],
+        labels,
+    )
     return figure
 
 
@@ -92,29 +126,53 @@ def draw_differences(drawn: Groups) -> style.Picture:
     rows = []
     for one, other in pairs:
         is_paired = one.has_runs and other.has_runs
-        apart = [(one.frame[metric] - other.frame[metric]).dropna() for metric in PAPER_METRICS if is_paired]
+        apart = [
+            (one.frame[metric] - other.frame[metric]).dropna()
+            for metric in PAPER_METRICS
+            if is_paired
+        ]
         if apart and all(map(len, apart)):
             rows.append((one, other, apart))
     if not rows:
         problem = "no two of these have runs that share their random numbers"
-        raise InputError(problem, place="kind", remedy="give campaigns of two managers or more with the same seed")
+        raise InputError(
+            problem,
+            place="kind",
+            remedy="give campaigns of two managers or more with the same seed",
+        )
     height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     shares = drawn.counted in ("draw", "value")
     for place, (axes, _, title) in enumerate(_metric_panels(figure)):
         axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
         for row, (one, _, apart) in enumerate(rows):
-            _draw_row_of_differences(axes, row, apart[place], colours[one.name], has_numbers=not shares)
+            _draw_row_of_differences(
+                axes, row, apart[place], colours[one.name], has_numbers=not shares
+            )
         axes.set_xlabel(f"difference in {title}")
         axes.margins(x=0.22)
         axes.grid(axis="y", visible=False)
     left = figure.axes[0]
-    names = [f"{one.name}\n\N{MINUS SIGN} {other.name} (n = {len(apart[0]):,})" for one, other, apart in rows]
+    names = [
+        f"{one.name}\n\N{MINUS SIGN} {other.name} (n = {len(apart[0]):,})"
+        for one, other, apart in rows
+    ]
     left.set_yticks(range(len(rows)), [style.text(folded(name)) for name in names])
     left.set_ylim(len(rows) - 0.4, -0.6)
     handles: list[Artist] = [
-        Line2D([], [], lw=1.2, marker="D", ms=3, mfc="white", color=style.BLACK, label="mean, 95% interval"),
-        Line2D([], [], color=style.GREY, marker="o", ms=2.5, lw=0, label="draw" if shares else "run"),
+        Line2D(
+            [],
+            [],
+            lw=1.2,
+            marker="D",
+            ms=3,
+            mfc="white",
+            color=style.BLACK,
+            label="mean, 95% interval",
+        ),
+        Line2D(
+            [], [], color=style.GREY, marker="o", ms=2.5, lw=0, label="draw" if shares else "run"
+        ),
     ]
     _legend(figure, handles, [str(handle.get_label()) for handle in handles])
     return figure
@@ -125,22 +183,41 @@ def _draw_row_of_differences(
 ) -> None:
     values = apart.sort_values(kind="stable").to_numpy()
     rain = values[np.unique(np.linspace(0, len(values) - 1, _DOTS).astype(int))]
-    # Spread over a height by the golden ratio, without random numbers: equal data give equal figures.
+    # Spread over a height by the golden ratio, without random numbers: equal data give equal
+    # figures.
     beside = 0.24 * ((np.arange(len(rain)) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0)
     axes.plot(rain, row + 0.08 + beside, "o", color=colour, ms=2.4, alpha=0.6, mew=0)
     found = mean_of(values.tolist())
     errors = [[found.value - found.low], [found.high - found.value]] if found.has_interval else None
-    look: dict[str, Any] = {"fmt": "D", "ms": 3, "mfc": "white", "mew": 0.8, "elinewidth": 1.2, "capsize": 2.5}
+    look: dict[str, Any] = {
+        "fmt": "D",
+        "ms": 3,
+        "mfc": "white",
+        "mew": 0.8,
+        "elinewidth": 1.2,
+        "capsize": 2.5,
+    }
     axes.errorbar(found.value, row - 0.1, xerr=errors, color="k", **look)
     ends = zip(least_and_greatest(apart), (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
-        place: dict[str, Any] = {"textcoords": "offset points", "ha": side, "va": "center", "fontsize": 6.5}
-        place["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # lest the line at 0 cross the label
+        place: dict[str, Any] = {
+            "textcoords": "offset points",
+            "ha": side,
+            "va": "center",
+            "fontsize": 6.5,
+        }
+        place["bbox"] = {
+            "facecolor": "white",
+            "edgecolor": "none",
+            "pad": 0.5,
+        }  # lest the line at 0 cross the label
         axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **place)
 
 
 def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
-    """Make the panels a and b for the metrics of the paper's table; yield each with its metric, and the axis' title."""
+    """Make the panels a and b for the metrics of the paper's table; yield each with its metric, and
+    the axis' title.
+    """
     panels = figure.subplots(1, 2, sharey=True)
     for axes, letter, metric in zip(panels, "ab", PAPER_METRICS, strict=True):
         axes.set_title(f"{letter}   {METRICS[metric].title.capitalize()}")
@@ -156,14 +233,20 @@ def _label(group: Group) -> str:
 
 
 def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    figure.legend(handles, labels, loc="outside upper right", ncols=_legend_columns(labels), handlelength=2.8)
+    figure.legend(
+        handles, labels, loc="outside upper right", ncols=_legend_columns(labels), handlelength=2.8
+    )
 
 
 def _legend_columns(labels: Sequence[str]) -> int:
     """Return the number of columns with which a legend fits the width of a figure."""
     font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
-    parts = [[TextPath((0.0, 0.0), part, prop=font) for part in label.split("\n")] for label in labels]
-    widths_in = [_HANDLE_IN + max(float(part.get_extents().x1) for part in each) / 72.0 for each in parts]
+    parts = [
+        [TextPath((0.0, 0.0), part, prop=font) for part in label.split("\n")] for label in labels
+    ]
+    widths_in = [
+        _HANDLE_IN + max(float(part.get_extents().x1) for part in each) / 72.0 for each in parts
+    ]
     for columns in range(len(labels) if len(labels) <= 4 else 3, 1, -1):
         if sum(max(column) for column in np.array_split(widths_in, columns)) <= style.WIDTH_IN:
             return columns
@@ -176,19 +259,26 @@ _MOST_PARAMETERS = 3
 _MOST_CELLS = 10
 """Values of a parameter in a heat map."""
 _MOST_VALUES = 16
-"""A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
+"""A parameter with more values is a sampled one: its missions are drawn in so many bins of equal
+numbers at most.
+"""
 _BINS = 8
 _MOST_TICKS = 6
-"""With more swept values, or where two are closer than so many would be, the axis has round numbers instead."""
+"""With more swept values, or where two are closer than so many would be, the axis has round numbers
+instead.
+"""
 _APART = 0.012
-"""Between managers at the same value, as a share of the axis, so that their intervals do not hide each other."""
+"""Between managers at the same value, as a share of the axis, so that their intervals do not hide
+each other.
+"""
 
 
 def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Picture:
-    """Draw means with their 95% intervals over each parameter, the others averaged over, a line for each manager.
+    """Draw means with their 95% intervals over each parameter, the others averaged over, a line for
+    each manager.
 
-    All points of a sweep share the random numbers of a run, so that the runs are the independent values: intervals are
-    those of the means that each run has over the points.
+    All points of a sweep share the random numbers of a run, so that the runs are the independent
+    values: intervals are those of the means that each run has over the points.
 
     Args:
         missions: of a sweep.
@@ -199,8 +289,12 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     """
     parameters = _chosen(missions, parameters)
     if len(parameters) > _MOST_PARAMETERS:
-        problem = f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
-        raise InputError(problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them")
+        problem = (
+            f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
+        )
+        raise InputError(
+            problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them"
+        )
     frame, columns = missions.frame, len(parameters)
     names = _names(frame)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
@@ -221,9 +315,14 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
     figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
     if len(missions.swept) == columns > 1:
-        _write_below(figure, f"{_averaged(counts, ())}, each averaged over the parameters of the other panels")
+        _write_below(
+            figure,
+            f"{_averaged(counts, ())}, each averaged over the parameters of the other panels",
+        )
     else:
-        _write_below(figure, _averaged(counts, [name for name in missions.swept if name not in parameters]))
+        _write_below(
+            figure, _averaged(counts, [name for name in missions.swept if name not in parameters])
+        )
     return figure
 
 
@@ -235,7 +334,8 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         parameters: across and up; empty: the two that are swept.
 
     Raises:
-        InputError: one of them is not swept, there are not two, or their values are too many for numbers.
+        InputError: one of them is not swept, there are not two, or their values are too many for
+            numbers.
     """
     parameters = _chosen(missions, parameters)
     if len(parameters) != 2:
@@ -245,9 +345,14 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     frame = missions.frame
     names = _names(frame)
     managers = list(dict.fromkeys(names))
-    means = {metric: frame.groupby([names, up, across], sort=False)[metric].mean() for metric in PAPER_METRICS}
+    means = {
+        metric: frame.groupby([names, up, across], sort=False)[metric].mean()
+        for metric in PAPER_METRICS
+    }
     columns, rows = (list(pandas.unique(frame[name])) for name in (across, up))
-    rows, columns = (sorted(each) if not isinstance(each[0], str) else each for each in (rows, columns))
+    rows, columns = (
+        sorted(each) if not isinstance(each[0], str) else each for each in (rows, columns)
+    )
     if max(len(rows), len(columns)) > _MOST_CELLS:
         problem = f"{len(columns)} by {len(rows)} means are too many for numbers"
         remedy = f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
@@ -259,7 +364,9 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         low, high = means[metric].min(), means[metric].max()
         for axes, manager in zip(of_metric, managers, strict=True):
             grid = means[metric][manager].unstack(across).reindex(index=rows, columns=columns)
-            image = axes.imshow(grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
+            image = axes.imshow(
+                grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower"
+            )
             for (row, column), value in np.ndenumerate(grid.to_numpy(float)):
                 ink = "white" if value < (low + high) / 2.0 else style.BLACK
                 number = METRICS[metric].number(value) if np.isfinite(value) else ""
@@ -269,7 +376,9 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
         of_metric[-1].set_xlabel(_folded(key_words(across)))
         for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
-            axis.set_ticks(range(len(values)), [_folded(style.text(value_words(each)), 14) for each in values])
+            axis.set_ticks(
+                range(len(values)), [_folded(style.text(value_words(each)), 14) for each in values]
+            )
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
     counts = frame.groupby([names, up, across])["run"].nunique().tolist()
     others = [name for name in missions.swept if name not in parameters]
@@ -300,7 +409,9 @@ def _write_below(figure: Figure, text: str) -> None:
 
 def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
     """Name the curve of each mission: its manager, with its source where there are several."""
-    return frame["manager"] + (" (" + frame["source"] + ")" if frame["source"].nunique() > 1 else "")
+    return frame["manager"] + (
+        " (" + frame["source"] + ")" if frame["source"].nunique() > 1 else ""
+    )
 
 
 def _draw_panel(
@@ -314,13 +425,23 @@ def _draw_panel(
     for place, (number, manager) in enumerate(zip(style.looks(managers), managers, strict=True)):
         own = names == manager
         beside = (place - (len(managers) - 1) / 2) * apart
-        counts += _draw_means(axes, frame[own].assign(place=places[own]), metric, beside, number, manager)
+        counts += _draw_means(
+            axes, frame[own].assign(place=places[own]), metric, beside, number, manager
+        )
     if words:
         shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
         long = max(map(len, words)) > 6 and len(words) > 2
-        axes.set_xticks(range(len(words)), shown_words, rotation=30 if long else 0, ha="right" if long else "center")
+        axes.set_xticks(
+            range(len(words)),
+            shown_words,
+            rotation=30 if long else 0,
+            ha="right" if long else "center",
+        )
         axes.set_xlim(-0.5, len(words) - 0.5)
-    elif 1 < len(values := np.unique(places)) <= _MOST_TICKS and np.diff(values).min() > np.ptp(values) / _MOST_TICKS:
+    elif (
+        1 < len(values := np.unique(places)) <= _MOST_TICKS
+        and np.diff(values).min() > np.ptp(values) / _MOST_TICKS
+    ):
         axes.set_xticks(values, [f"{value:g}" for value in values])
     else:
         axes.xaxis.set_major_locator(MaxNLocator(4))
@@ -328,29 +449,46 @@ def _draw_panel(
 
 
 def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
-    """Place missions on the horizontal axis: at the value, or at the number of the word in the order of the sweep."""
-    if pandas.api.types.is_numeric_dtype(parameter) and not pandas.api.types.is_bool_dtype(parameter):
+    """Place missions on the horizontal axis: at the value, or at the number of the word in the
+    order of the sweep.
+    """
+    if pandas.api.types.is_numeric_dtype(parameter) and not pandas.api.types.is_bool_dtype(
+        parameter
+    ):
         return parameter.astype(float), []
     codes, words = pandas.factorize(parameter)
     return pandas.Series(codes, parameter.index, dtype=float), [str(word) for word in words]
 
 
-def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str) -> list[int]:
-    """Draw the mean at each place; of very many places, those of equally many missions at their mean place."""
+def _draw_means(
+    axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str
+) -> list[int]:
+    """Draw the mean at each place; of very many places, those of equally many missions at their
+    mean place.
+    """
     key = frame["place"]
     if key.nunique() > _MOST_VALUES:
         key = pandas.qcut(key.rank(method="first"), _BINS, labels=False)
     found, middles, counts = [], [], []
     for _, part in frame.groupby(key):
         has_runs = part["run"].notna().all()
-        by_run = part.groupby(["seed", first_alike(part)])[metric].mean() if has_runs else part[metric]
+        by_run = (
+            part.groupby(["seed", first_alike(part)])[metric].mean() if has_runs else part[metric]
+        )
         found.append(mean_of(by_run.dropna().tolist()))
         counts.append(int(by_run.count()))
         middles.append(float(part["place"].mean()) + beside)
     means = np.array([each.value for each in found])
     low, high = np.array([each.interval or (each.value, each.value) for each in found]).T
-    look = style.line(number) | {"marker": style.marker(number), "ms": 3.2, "capsize": 2, "elinewidth": 0.8}
-    axes.errorbar(middles, means, yerr=(means - low, high - means), label=style.text(folded(label)), **look)
+    look = style.line(number) | {
+        "marker": style.marker(number),
+        "ms": 3.2,
+        "capsize": 2,
+        "elinewidth": 0.8,
+    }
+    axes.errorbar(
+        middles, means, yerr=(means - low, high - means), label=style.text(folded(label)), **look
+    )
     return counts
 
 
@@ -380,21 +518,29 @@ def draw_results(
     Args:
         folders: one of a mission (trajectory.csv), or of campaigns (runs.csv) and files like these.
         out: picture to write, .png, .pdf or .svg.
-        kind: of the figure; "auto": of a mission its map, of a campaign the distributions, of a sweep the means.
+        kind: of the figure; "auto": of a mission its map, of a campaign the distributions, of a
+            sweep the means.
         parameters: of a sweep: those to draw; empty: all.
         rules_of: finds the rules behind the adaptations of a mission, for its timeline.
 
     Raises:
-        InputError: there are no results of that kind in the folders, or the picture cannot be written.
+        InputError: there are no results of that kind in the folders, or the picture cannot be
+            written.
     """
     check_picture(out)
     if not (folders[0] / TRAJECTORY_FILE).is_file():
         figure = draw_missions(read_missions(folders), kind, parameters)
     elif len(folders) > 1:
-        raise InputError("has a mission, of which one is drawn at a time", file=folders[0], remedy="give one folder")
+        raise InputError(
+            "has a mission, of which one is drawn at a time",
+            file=folders[0],
+            remedy="give one folder",
+        )
     else:
         record = read_mission(folders[0])
-        figure = draw_mission(record, MAP if kind == AUTO else kind, rules_of(record) if kind == TIMELINE else {})
+        figure = draw_mission(
+            record, MAP if kind == AUTO else kind, rules_of(record) if kind == TIMELINE else {}
+        )
     write_picture(figure, out)
 
 
@@ -406,41 +552,59 @@ def check_picture(out: Path) -> None:
 
 
 def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) -> None:
-    """Write a figure atomically, and without the time of writing; bbox_inches "tight" trims it to what is drawn.
+    """Write a figure atomically, and without the time of writing; bbox_inches "tight" trims it to
+    what is drawn.
 
     Raises:
         InputError: it cannot be written.
     """
     picture, metadata = io.BytesIO(), _UNDATED.get(out.suffix.lower())
-    figure.savefig(picture, format=out.suffix[1:].lower(), bbox_inches=bbox_inches, metadata=metadata)
+    figure.savefig(
+        picture, format=out.suffix[1:].lower(), bbox_inches=bbox_inches, metadata=metadata
+    )
     write_files(out.parent, {out.name: picture.getvalue()})
 
 
 @style.publication()
-def draw_mission(record: MissionRecord, kind: str = MAP, rules: Rules = MappingProxyType({})) -> Figure:
+def draw_mission(
+    record: MissionRecord, kind: str = MAP, rules: Rules = MappingProxyType({})
+) -> Figure:
     """Draw a mission's MAP or TIMELINE, with the rules behind its adaptations.
 
     Raises:
         InputError: there is no such figure of a mission.
     """
     if kind not in (MAP, TIMELINE):
-        raise unknown(f"there is no figure {shown(kind)} of a mission", kind, (MAP, TIMELINE), place="kind")
+        raise unknown(
+            f"there is no figure {shown(kind)} of a mission", kind, (MAP, TIMELINE), place="kind"
+        )
     return draw_timeline(record, rules) if kind == TIMELINE else draw_map(record)
 
 
 @style.publication()
 def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str] = ()) -> Figure:
-    """Draw missions: the means of a sweep, or of others the distributions, unless another kind is asked for.
+    """Draw missions: the means of a sweep, or of others the distributions, unless another kind is
+    asked for.
 
     Raises:
         InputError: there is no such figure of a campaign, or the missions lack what it needs.
     """
     if kind in (SWEEP, HEAT_MAP) or (kind == AUTO and missions.swept):
         if not missions.swept:
-            raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")
-        return draw_heat_map(missions, parameters) if kind == HEAT_MAP else draw_sweep(missions, parameters)
+            raise InputError(
+                "nothing is swept in these results",
+                place="kind",
+                remedy="give a campaign with a sweep",
+            )
+        return (
+            draw_heat_map(missions, parameters)
+            if kind == HEAT_MAP
+            else draw_sweep(missions, parameters)
+        )
     if parameters:
-        raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
+        raise InputError(
+            "parameters are those of a sweep", place="parameters", remedy="leave them out"
+        )
     if kind not in (AUTO, DISTRIBUTIONS, DIFFERENCES):
         known = (DISTRIBUTIONS, DIFFERENCES, SWEEP, HEAT_MAP)
         raise unknown(f"there is no figure {shown(kind)} of a campaign", kind, known, place="kind")

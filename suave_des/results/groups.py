@@ -10,7 +10,15 @@ import numpy as np
 import pandas
 
 from suave_des.errors import InputError, shown, unknown
-from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
+from suave_des.records.metrics import (
+    FOUND,
+    METRICS,
+    PAPER_METRICS,
+    REACTION_TIME,
+    SEARCH_TIME,
+    Metric,
+    metric_of,
+)
 from suave_des.records.missions import SHARING, Missions
 from suave_des.results.real import matched
 
@@ -31,11 +39,12 @@ class Group:
 
     Attributes:
         name: the manager's, with its source or its value of a sweep where several have the same.
-        frame: a row for each independent value: for each mission, or, where points of a sweep are averaged, for each
-            run, whose random numbers all points share; or for each draw that several runs share. Where seed and run are
-            known, they are its index.
+        frame: a row for each independent value: for each mission, or, where points of a sweep are
+            averaged, for each run, whose random numbers all points share; or for each draw that
+            several runs share. Where seed and run are known, they are its index.
         is_of_missions: whether each row is one mission.
-        point: the end of the name that tells the value of a sweep; empty if all values are in the group.
+        point: the end of the name that tells the value of a sweep; empty if all values are in the
+            group.
     """
 
     name: str
@@ -45,7 +54,9 @@ class Group:
 
     @property
     def has_runs(self) -> bool:
-        """Whether seed and run of each row are known, so that it can be paired with those of others."""
+        """Whether seed and run of each row are known, so that it can be paired with those of
+        others.
+        """
         return self.frame.index.nlevels > 1
 
 
@@ -56,12 +67,16 @@ class Groups:
     Attributes:
         groups: in the order of their first missions.
         notes: what a reader should know about the groups.
-        counted: what the rows of groups are: "mission", "run", "draw", or "value" where they differ.
-        time_limit_s: whole seconds that missions of every group had; where all found the pipeline, the longest search.
-            Of real missions that simulated ones assist, the limit of all; infinite if it is not known.
-        lost: by name of a group that did not find the pipeline in most of its missions, in how many.
-        sides: real missions and those simulated under the same conditions, with the numbers of these, and those
-            simulated under many, with the numbers of their draws; empty if no simulated ones assist them.
+        counted: what the rows of groups are: "mission", "run", "draw", or "value" where they
+            differ.
+        time_limit_s: whole seconds that missions of every group had; where all found the pipeline,
+            the longest search. Of real missions that simulated ones assist, the limit of all;
+            infinite if it is not known.
+        lost: by name of a group that did not find the pipeline in most of its missions, in how
+            many.
+        sides: real missions and those simulated under the same conditions, with the numbers of
+            these, and those simulated under many, with the numbers of their draws; empty if no
+            simulated ones assist them.
     """
 
     missions: Missions
@@ -88,17 +103,18 @@ def grouped(
     Args:
         missions: of all sources.
         managers: names of those to include; empty: all.
-        metrics: columns of runs.csv; empty: those of the usual ones that at least one mission has; with simulated
-            missions, those of the paper.
+        metrics: columns of runs.csv; empty: those of the usual ones that at least one mission has;
+            with simulated missions, those of the paper.
         by: swept parameters each of whose values is a separate group.
         averages: whether a run's values are averaged over the other swept parameters.
-        simulated: what assists real missions: a campaign that sweeps their conditions, and one under many, drawn as
-            theirs were. Conditions follow from columns named like what is swept, a column `condition` with numbers from
-            1, or the order.
+        simulated: what assists real missions: a campaign that sweeps their conditions, and one
+            under many, drawn as theirs were. Conditions follow from columns named like what is
+            swept, a column `condition` with numbers from 1, or the order.
 
     Raises:
-        InputError: a name is not there, no mission has a metric, or there are too many groups; or simulated missions
-            lack a manager or a metric, have a number that is none or another time limit, or are of other conditions.
+        InputError: a name is not there, no mission has a metric, or there are too many groups; or
+            simulated missions lack a manager or a metric, have a number that is none or another
+            time limit, or are of other conditions.
     """
     frame = missions.frame.assign(source="") if simulated else missions.frame
     known = list(dict.fromkeys(frame["manager"]))
@@ -134,22 +150,34 @@ def grouped(
         if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
             lacking.append(f"{name} {left} of {left + len(rows)}")
         if (sharing := alike.get(source, 1)) > 1:
-            whole = frame[frame["source"] == source]  # how many runs of a draw there are under any manager
-            draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)["run"].nunique()
+            whole = frame[
+                frame["source"] == source
+            ]  # how many runs of a draw there are under any manager
+            draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)[
+                "run"
+            ].nunique()
             rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
         if rows["run"].notna().all() and (rows["seed"] != "").all():
             rows = rows.set_axis(pandas.MultiIndex.from_frame(rows[["seed", "run"]]))
         groups.append(Group(name, rows, number == sharing == 1, end))
     if lacking and not any(len(group.frame) for group in groups):
         remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
-        raise InputError("no manager has a run with missions at all points of the sweep", remedy=remedy)
+        raise InputError(
+            "no manager has a run with missions at all points of the sweep", remedy=remedy
+        )
     chosen = _chosen_metrics(metrics or (PAPER_METRICS if simulated else ()), groups)
     notes = list(_notes(groups, averaged, frame, alike))
     if lacking:
         notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
-    by_source = [part[averaged].drop_duplicates() for _, part in frame.groupby("source", observed=True) if averaged]
+    by_source = [
+        part[averaged].drop_duplicates()
+        for _, part in frame.groupby("source", observed=True)
+        if averaged
+    ]
     if len({repr(sorted(map(repr, part.to_numpy().tolist()))) for part in by_source}) > 1:
-        notes.append(f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}")
+        notes.append(
+            f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
+        )
     for metric in chosen:
         notes += _never_found(groups) if metric.name == SEARCH_TIME else _left_out(groups, metric)
     counted, lost = _counted(groups), dict(_mostly_lost(groups))
@@ -158,7 +186,10 @@ def grouped(
     same, population = simulated
     notes = [*same.notes, *population.notes, *notes]
     real = pandas.concat([group.frame for group in groups], ignore_index=True)
-    limit_s, drawn = _common_limit_s((real, same.frame, population.frame), chosen), _with_draws(population)
+    limit_s, drawn = (
+        _common_limit_s((real, same.frame, population.frame), chosen),
+        _with_draws(population),
+    )
     sides = (*matched(real, same.frame, same.swept), drawn)
     return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, sides)
 
@@ -166,14 +197,25 @@ def grouped(
 def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
     """Return the least and the greatest of values by (seed, run), each with its run."""
     runs = values.index.get_level_values("run")
-    return [(float(values.iloc[at]), int(runs[at])) for at in (int(values.argmin()), int(values.argmax()))]
+    return [
+        (float(values.iloc[at]), int(runs[at]))
+        for at in (int(values.argmin()), int(values.argmax()))
+    ]
 
 
 def check_swept(missions: Missions, names: Sequence[str], place: str) -> None:
-    """Raise an InputError if a sweep does not vary one of these columns; `place` says where that was asked for."""
+    """Raise an InputError if a sweep does not vary one of these columns; `place` says where that
+    was asked for.
+    """
     for name in names:
         if name not in missions.swept:
-            raise unknown(f"{shown(name)} is not what a sweep varies here", name, missions.swept, "swept are", place)
+            raise unknown(
+                f"{shown(name)} is not what a sweep varies here",
+                name,
+                missions.swept,
+                "swept are",
+                place,
+            )
 
 
 def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[str, str]]:
@@ -183,8 +225,15 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[
         sources.setdefault(manager, set()).add(source)
     ends = [name.rpartition(".")[2] for name in by]
     labels = ends if len(set(ends)) == len(ends) else by
-    numbers = {value for _, _, *values in keys for value in values if isinstance(value, float) and value == value}
-    form = "g" if len({f"{number:g}" for number in numbers}) == len(numbers) else ""  # or all digits
+    numbers = {
+        value
+        for _, _, *values in keys
+        for value in values
+        if isinstance(value, float) and value == value
+    }
+    form = (
+        "g" if len({f"{number:g}" for number in numbers}) == len(numbers) else ""
+    )  # or all digits
 
     def text(value: object) -> str:
         if value != value:
@@ -193,7 +242,9 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[
 
     names = []
     for manager, source, *values in keys:
-        point = "".join(f", {label} {text}" for label, text in zip(labels, map(text, values), strict=True))
+        point = "".join(
+            f", {label} {text}" for label, text in zip(labels, map(text, values), strict=True)
+        )
         of_source = f" ({printable(str(source))})" if len(sources[manager]) > 1 else ""
         names.append((f"{printable(str(manager))}{of_source}{point}", point))
     return names
@@ -205,11 +256,15 @@ def _chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Met
     for name in dict.fromkeys(wanted or _USUAL):
         metric = metric_of(name)
         if metric is None:
-            raise unknown(f"there is no metric {shown(name)}", name, METRICS, "there are", "metrics")
+            raise unknown(
+                f"there is no metric {shown(name)}", name, METRICS, "there are", "metrics"
+            )
         if any(name in group.frame and group.frame[name].notna().any() for group in groups):
             found.append(metric)
         elif wanted:
-            raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
+            raise InputError(
+                f"no mission has a value of {name}", place="metrics", remedy="leave it out"
+            )
     return tuple(found)
 
 
@@ -223,13 +278,19 @@ def _counted(groups: Sequence[Group]) -> str:
 def _time_limit_s(groups: Sequence[Group]) -> int:
     lost = [group.frame.loc[group.frame[FOUND] == 0.0, SEARCH_TIME] for group in groups]
     limits_s = [float(times.max()) for times in lost if times.notna().any()]
-    ends_s = [float(times_s.max()) for group in groups if (times_s := group.frame[SEARCH_TIME]).notna().any()]
+    ends_s = [
+        float(times_s.max())
+        for group in groups
+        if (times_s := group.frame[SEARCH_TIME]).notna().any()
+    ]
     limit_s = min(limits_s) if limits_s else max(ends_s, default=0.0)
     return math.floor(limit_s) or math.ceil(limit_s)
 
 
 def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric]) -> float:
-    """Check the numbers in real missions and those that assist them, and return the time limit of all."""
+    """Check the numbers in real missions and those that assist them, and return the time limit of
+    all.
+    """
     limits_s: list[float] = []
     for place, frame in zip(_PLACES, frames, strict=True):
         for metric in metrics:
@@ -238,7 +299,8 @@ def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric
             if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
                 problem = f"{metric.name} has a value that is no number, or no value at all"
                 raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
-        # Real missions may not say how long they lasted, and simulated ones may all have found the pipeline.
+        # Real missions may not say how long they lasted, and simulated ones may all have found the
+        # pipeline.
         ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
         limit_s = float(ends_s.max())
         if abs(limit_s - min(limits_s, default=limit_s)) > _SAME_LIMIT_S:
@@ -252,12 +314,16 @@ def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric
 
 
 def runs_sharing_draw(frame: pandas.DataFrame) -> int:
-    """Return how many runs in a row share their draws; of several campaigns, as many as have whole draws of each."""
+    """Return how many runs in a row share their draws; of several campaigns, as many as have whole
+    draws of each.
+    """
     return math.lcm(*frame[SHARING].dropna().astype(int).unique()) if SHARING in frame else 1
 
 
 def first_alike(frame: pandas.DataFrame, alike: int = 0) -> pandas.Series[float]:
-    """Return of each mission the first run that shares its draws; `alike` of them do, by default runs_sharing_draw."""
+    """Return of each mission the first run that shares its draws; `alike` of them do, by default
+    runs_sharing_draw.
+    """
     alike = alike or runs_sharing_draw(frame)
     return (frame["run"] - 1) // alike * alike + 1
 
@@ -265,25 +331,33 @@ def first_alike(frame: pandas.DataFrame, alike: int = 0) -> pandas.Series[float]
 def _with_draws(population: Missions) -> pandas.DataFrame:
     """Return simulated missions, which must be of no sweep, with the numbers of their draws."""
     if population.swept:
-        problem = f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
-        raise InputError(problem, place="population", remedy="draw the conditions, as perturbations")
+        problem = (
+            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
+        )
+        raise InputError(
+            problem, place="population", remedy="draw the conditions, as perturbations"
+        )
     frame = population.frame
     drawn = frame.assign(draw=first_alike(frame))
     return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 
 def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
-    """Return by source how many runs are averaged, because some share a draw; of sources without runs nothing is."""
-    are_runs = (frame["run"].notna() & (frame["seed"] != "")).groupby(frame["source"], observed=True).all()
+    """Return by source how many runs are averaged, because some share a draw; of sources without
+    runs nothing is.
+    """
+    are_runs = (
+        (frame["run"].notna() & (frame["seed"] != "")).groupby(frame["source"], observed=True).all()
+    )
     return dict.fromkeys(map(str, are_runs.index[are_runs]), runs_sharing_draw(frame))
 
 
 def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.DataFrame:
     """Average rows of the same seed and run.
 
-    A mean over other points, or other runs of a draw, than that of another manager would compare these points and not
-    the managers. So a metric is missing where fewer rows of a run than wanted have a value; a row is left out where a
-    whole mission is missing.
+    A mean over other points, or other runs of a draw, than that of another manager would compare
+    these points and not the managers. So a metric is missing where fewer rows of a run than wanted
+    have a value; a row is left out where a whole mission is missing.
     """
     numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
     by_run = frame.groupby(["seed", "run"], sort=False, observed=True)
@@ -297,11 +371,18 @@ def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.
 
 
 def _notes(
-    groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame, alike_by_source: Mapping[str, int]
+    groups: Sequence[Group],
+    averaged: Sequence[str],
+    frame: pandas.DataFrame,
+    alike_by_source: Mapping[str, int],
 ) -> Iterator[str]:
     if (alike := max(alike_by_source.values(), default=1)) > 1:
         is_one = frame.loc[frame["source"].isin(list(alike_by_source)), SHARING].eq(alike).all()
-        what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs, of which some share a draw"
+        what = (
+            f"the {alike} runs that share each draw"
+            if is_one
+            else f"every {alike} runs, of which some share a draw"
+        )
         others = len(alike_by_source) < frame["source"].nunique()
         of = f" of {', '.join(map(printable, alike_by_source))}" if others else ""
         yield (
@@ -328,11 +409,17 @@ def _notes(
 
 
 def _mostly_lost(groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
-    """Yield the groups that did not find the pipeline in most of their missions, and in how many."""
+    """Yield the groups that did not find the pipeline in most of their missions, and in how
+    many.
+    """
     for group in groups:
         lost = 1.0 - group.frame[FOUND].dropna()
         if len(lost) and lost.mean() > 0.5:
-            share = f"{lost.sum():.0f} of {len(lost)}" if group.is_of_missions else f"{lost.mean():.0%} of its"
+            share = (
+                f"{lost.sum():.0f} of {len(lost)}"
+                if group.is_of_missions
+                else f"{lost.mean():.0%} of its"
+            )
             yield group.name, f"{share} missions"
 
 
@@ -348,7 +435,10 @@ def _never_found(groups: Sequence[Group]) -> Iterator[str]:
             counts.append(f"{group.name} {1.0 - group.frame[FOUND].mean():.1%}")
     ended = f"the search time of missions that never found the pipeline ({listed(counts)}) is the time at which they"
     if ends and max(high for *_, high in ends) - min(low for _, low, _ in ends) > _SAME_LIMIT_S:
-        times = [f"{name} after {low:.0f}{f' to {high:.0f}' if high > low else ''} s" for name, low, high in ends]
+        times = [
+            f"{name} after {low:.0f}{f' to {high:.0f}' if high > low else ''} s"
+            for name, low, high in ends
+        ]
         yield (
             f"{ended} ended, which differs ({listed(times)}): a mission that ends early counts as a short search, and"
             " means, differences and tests of the search time do not compare it; compare the share that found it"
@@ -362,7 +452,11 @@ def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:
     lacking = [(group, int(group.frame[metric.name].isna().sum())) for group in groups]
     counts = [f"{group.name} {n} of {len(group.frame)}" for group, n in lacking if n]
     if counts and metric.name != FOUND:
-        what = "missions" if all(group.is_of_missions for group in groups) else "missions, or averages over missions,"
+        what = (
+            "missions"
+            if all(group.is_of_missions for group in groups)
+            else "missions, or averages over missions,"
+        )
         why = ", as no reaction was completed or recorded" if metric.name == REACTION_TIME else ""
         without = f"{what} without a {metric.title} ({listed(counts)})"
         yield f"{without} are left out of it{why}; they may be the ones that went worst"

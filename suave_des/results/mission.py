@@ -1,4 +1,6 @@
-"""What the record of a mission says over time, and its figures: a map with altitude, and all that happened."""
+"""What the record of a mission says over time, and its figures: a map with altitude, and all that
+happened.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,24 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SEA_BED_Z_M, SURFACE, UNGROUND_MODE
+from suave_des.domain import (
+    FOLLOW_PIPELINE,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    SEA_BED_Z_M,
+    SURFACE,
+    UNGROUND_MODE,
+)
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.records.mission_folder import MissionRecord
 from suave_des.results import style
-from suave_des.results.style import component_words, function_mode_words, function_words, mode_words, plain
+from suave_des.results.style import (
+    component_words,
+    function_mode_words,
+    function_words,
+    mode_words,
+    plain,
+)
 
 _LATEST_REACTION_S = 5.0
 """What was reported earlier is not taken as the cause of an adaptation."""
@@ -40,7 +55,9 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Adaptation:
-    """A change of the mode of a function in use; its cause is in words, empty if it is not known."""
+    """A change of the mode of a function in use; its cause is in words, empty if it is not
+    known.
+    """
 
     t_s: float
     function: str
@@ -56,12 +73,18 @@ def details(record: MissionRecord, event: str) -> list[tuple[float, str]]:
 
 
 def _spans(changes: Iterable[tuple[float, str, str]], end_s: float) -> dict[str, list[Span]]:
-    """Return the spans between changes, each with its time, of what it is, and to what, if to anything."""
+    """Return the spans between changes, each with its time, of what it is, and to what, if to
+    anything.
+    """
     by_name: dict[str, list[tuple[float, str]]] = {}
     for t_s, name, what in changes:
         by_name.setdefault(name, []).append((t_s, what))
     return {
-        name: [Span(begin_s, until_s, what) for (begin_s, what), (until_s, _) in pairwise([*own, (end_s, "")]) if what]
+        name: [
+            Span(begin_s, until_s, what)
+            for (begin_s, what), (until_s, _) in pairwise([*own, (end_s, "")])
+            if what
+        ]
         for name, own in by_name.items()
     }
 
@@ -73,7 +96,9 @@ def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
 
 
 def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]]:
-    """Yield when a component was reported as failed, or as working after a failure: time, its name, whether failed."""
+    """Yield when a component was reported as failed, or as working after a failure: time, its name,
+    whether failed.
+    """
     failed: set[str] = set()
     for t_s, detail in details(record, "component_status"):
         component, _, status = detail.partition(" ")
@@ -84,28 +109,51 @@ def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]
 
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of failures, by failed component."""
-    changes = ((t_s, name, FAILED if is_failed else "") for t_s, name, is_failed in component_changes(record))
+    changes = (
+        (t_s, name, FAILED if is_failed else "")
+        for t_s, name, is_failed in component_changes(record)
+    )
     return _spans(changes, record.end_s)
 
 
 def task_spans(record: MissionRecord) -> list[Span]:
     """Return the spans of the tasks, one after the other."""
-    events = record.events[record.events["event"].isin(["task_requested", "task_done", "task_cancelled"])]
+    events = record.events[
+        record.events["event"].isin(["task_requested", "task_done", "task_cancelled"])
+    ]
     tasks = events["detail"].where(events["event"] == "task_requested", "")
-    return _spans(zip(events["t_s"], cycle(["task"]), tasks, strict=False), record.end_s).get("task", [])
+    return _spans(zip(events["t_s"], cycle(["task"]), tasks, strict=False), record.end_s).get(
+        "task", []
+    )
 
 
 def adaptations(record: MissionRecord) -> list[Adaptation]:
-    """Return the changes of modes that the metric of this name counts, in order of the times at which they took effect.
+    """Return the changes of modes that the metric of this name counts, in order of the times at
+    which they took effect.
 
-    The first mode of a function in a task is none, nor is what is requested between a task's end and that.
+    The first mode of a function in a task is none, nor is what is requested between a task's end
+    and that.
     """
-    mode_set, in_use, modes, found = details(record, "mode_set"), set[str](), dict[str, str](), list[Adaptation]()
-    for t_s, event, detail in zip(*(record.events[name] for name in ("t_s", "event", "detail")), strict=True):
+    mode_set, in_use, modes, found = (
+        details(record, "mode_set"),
+        set[str](),
+        dict[str, str](),
+        list[Adaptation](),
+    )
+    for t_s, event, detail in zip(
+        *(record.events[name] for name in ("t_s", "event", "detail")), strict=True
+    ):
         if event == "mode_requested":
             function, _, mode = detail.partition(" -> ")
             if function in in_use:
-                effect_s = next((at_s for at_s, new in mode_set if at_s >= t_s and new == f"{function} = {mode}"), t_s)
+                effect_s = next(
+                    (
+                        at_s
+                        for at_s, new in mode_set
+                        if at_s >= t_s and new == f"{function} = {mode}"
+                    ),
+                    t_s,
+                )
                 cause = _cause(record, function, modes[function], Span(effect_s, effect_s, mode))
                 found.append(Adaptation(effect_s, function, modes[function], mode, cause))
             in_use |= {function} if mode != UNGROUND_MODE else set()
@@ -119,8 +167,14 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
 
 def _functions_of(record: MissionRecord, task: str) -> set[str]:
     revision, mission = (record.scenario.get(key, {}) for key in ("revision", "mission"))
-    shared = {MAINTAIN_MOTION} if revision.get("coordinator", {}).get("maintain_motion_per_task") else set()
-    own = {"search_pipeline": GENERATE_SEARCH_PATH, "inspect_pipeline": FOLLOW_PIPELINE}.get(task, SURFACE)
+    shared = (
+        {MAINTAIN_MOTION}
+        if revision.get("coordinator", {}).get("maintain_motion_per_task")
+        else set()
+    )
+    own = {"search_pipeline": GENERATE_SEARCH_PATH, "inspect_pipeline": FOLLOW_PIPELINE}.get(
+        task, SURFACE
+    )
     return {own, *shared, *mission.get("functions", {}).get(task, ())}
 
 
@@ -128,13 +182,17 @@ def _cause(record: MissionRecord, function: str, before: str, after: Span) -> st
     """Return what was reported shortly before a change of mode and concerns its function."""
     if function == MAINTAIN_MOTION:
         words, changes = {True: "failed", False: "recovered"}, component_changes(record)
-        causes = [(t_s, f"{component_words(name)} {words[is_failed]}") for t_s, name, is_failed in changes]
+        causes = [
+            (t_s, f"{component_words(name)} {words[is_failed]}") for t_s, name, is_failed in changes
+        ]
     elif cause := _battery_cause(record, before, after):
         return cause
     else:
         crossings = details(record, "visibility_crossing")
         causes = [(t_s, f"visibility {detail.split(' (')[0]}") for t_s, detail in crossings]
-    recent = [(t_s, text) for t_s, text in causes if 0.0 <= after.begin_s - t_s <= _LATEST_REACTION_S]
+    recent = [
+        (t_s, text) for t_s, text in causes if 0.0 <= after.begin_s - t_s <= _LATEST_REACTION_S
+    ]
     return max(recent)[1] if recent else ""
 
 
@@ -143,7 +201,9 @@ def _battery_cause(record: MissionRecord, before: str, after: Span) -> str:
     level = battery_level(record)
     if level is None or UNGROUND_MODE not in (before, after.what):
         return ""
-    times = np.searchsorted(record.trajectory["t_s"], (after.begin_s - _LATEST_REACTION_S, after.begin_s))
+    times = np.searchsorted(
+        record.trajectory["t_s"], (after.begin_s - _LATEST_REACTION_S, after.begin_s)
+    )
     earlier, now = level.iloc[np.minimum(times, len(level) - 1)].astype(float)
     if now - earlier > _RECHARGED:
         return "battery recharged"
@@ -152,7 +212,9 @@ def _battery_cause(record: MissionRecord, before: str, after: Span) -> str:
 
 
 def battery_level(record: MissionRecord) -> pandas.Series[float] | None:
-    """Return the battery's level, 0 to 1, at each point of the trajectory; None without a battery."""
+    """Return the battery's level, 0 to 1, at each point of the trajectory; None without a
+    battery.
+    """
     return record.trajectory.get("battery_level")
 
 
@@ -163,7 +225,18 @@ _ZOOM_MARGIN_M = 0.6
 _PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
 _VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
 _BATTERY_COLOUR = style.GREEN
-_LETTER_OFFSETS = ((4, 4), (-9, 4), (4, -10), (-9, -10), (0, 9), (0, -14), (12, 0), (-16, 0), (12, 10), (-16, 10))
+_LETTER_OFFSETS = (
+    (4, 4),
+    (-9, 4),
+    (4, -10),
+    (-9, -10),
+    (0, 9),
+    (0, -14),
+    (12, 0),
+    (-16, 0),
+    (12, 10),
+    (-16, 10),
+)
 """Where a letter may stand beside its point, in points; the first that is free is taken."""
 _LETTER_POINTS = 9.0
 _LETTER_ROW_SHARE = 0.075
@@ -190,8 +263,18 @@ def draw_map(record: MissionRecord) -> style.Picture:
     whole, zoom, time = panels["a"], panels["b"], panels["c"]
     frame = _search_frame(record)
     _draw_plan(whole, record, colours)
-    whole.add_patch(Rectangle(frame.p0, frame.width, frame.height, fill=False, ec=style.GREY, lw=0.7))
-    whole.annotate("b", (frame.x0, frame.y1), (-3, 0), textcoords="offset points", ha="right", va="top", fontsize=7.5)
+    whole.add_patch(
+        Rectangle(frame.p0, frame.width, frame.height, fill=False, ec=style.GREY, lw=0.7)
+    )
+    whole.annotate(
+        "b",
+        (frame.x0, frame.y1),
+        (-3, 0),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=7.5,
+    )
     whole.yaxis.set_major_locator(MultipleLocator(5.0))
     _draw_plan(zoom, record, colours)
     _draw_adaptations(zoom, record, colours, "x_m", "y_m")
@@ -213,46 +296,66 @@ def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) 
     yield Line2D([], [], **_VISIBILITY, label="visibility; dotted: thresholds (c)")
     if battery_level(record) is not None:
         yield Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)")
-        yield Line2D([], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station")
+        yield Line2D(
+            [], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station"
+        )
     yield Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=4, label="start")
     if adaptations(record):
-        yield Line2D([], [], color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation")
+        yield Line2D(
+            [], [], color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation"
+        )
     for mark in marks:
         symbol = rf"$\mathbf{{{mark.letter}}}$"
         yield Line2D([], [], lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text)
 
 
 def mode_colours(record: MissionRecord) -> dict[str, str]:
-    """Return a colour for each mode, in the order of appearance; what does not move the vehicle is grey."""
+    """Return a colour for each mode, in the order of appearance; what does not move the vehicle is
+    grey.
+    """
     modes = list(dict.fromkeys(record.trajectory["mode"]))
     known = style.MODE_COLOURS | dict.fromkeys(_IDLE_MODES, style.GREY)
-    others = zip([mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False)
+    others = zip(
+        [mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False
+    )
     colours = known | dict(others)
     return {mode: colours[mode] for mode in modes}
 
 
 def _marks(record: MissionRecord) -> Iterator[_Mark]:
-    """Yield the events that are marked: the detection, failures, recoveries from these, and the battery's limits."""
-    found = [(t_s, "pipeline detected", style.BLACK) for t_s, _ in details(record, "pipeline_detected")]
+    """Yield the events that are marked: the detection, failures, recoveries from these, and the
+    battery's limits.
+    """
+    found = [
+        (t_s, "pipeline detected", style.BLACK) for t_s, _ in details(record, "pipeline_detected")
+    ]
     for t_s, detail in details(record, "battery_crossing"):
-        found.append((t_s, "battery low" if detail.startswith("falls") else "recharged", _BATTERY_COLOUR))
+        found.append(
+            (t_s, "battery low" if detail.startswith("falls") else "recharged", _BATTERY_COLOUR)
+        )
     for t_s, component, is_failed in component_changes(record):
         what, colour = ("failed", style.VERMILION) if is_failed else ("recovered", style.BLACK)
         found.append((t_s, f"{component_words(component)} {what}", colour))
     way = record.trajectory
-    for letter, (t_s, text, colour) in zip(ascii_uppercase, sorted(found, key=lambda each: each[0]), strict=False):
+    for letter, (t_s, text, colour) in zip(
+        ascii_uppercase, sorted(found, key=lambda each: each[0]), strict=False
+    ):
         x_m, y_m = (float(np.interp(t_s, way["t_s"], way[axis])) for axis in ("x_m", "y_m"))
         yield _Mark(letter, t_s, x_m, y_m, f"{text}, {t_s:.0f} s", colour)
 
 
 def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
-    """Return the style of a stretch of the path: line widths distinguish the search altitudes without colours."""
+    """Return the style of a stretch of the path: line widths distinguish the search altitudes
+    without colours.
+    """
     is_own = mode not in style.MODE_COLOURS and mode not in _IDLE_MODES
     width = style.MODE_WIDTHS.get(mode, 1.2)
     return {"color": colours.get(mode, style.GREY), "lw": width, "ls": "--" if is_own else "-"}
 
 
-def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: NDArray[np.float64]) -> None:
+def _draw_way(
+    axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: NDArray[np.float64]
+) -> None:
     """Draw the vehicle's path, each stretch in its mode's colour and joined to the next."""
     places = record.trajectory[across].to_numpy()
     first = 0
@@ -271,7 +374,14 @@ def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> No
     start = record.trajectory.iloc[0]
     axes.plot(start["x_m"], start["y_m"], "o", color=style.BLACK, ms=4)
     if battery := record.scenario.get("battery"):
-        axes.plot(battery["station_x_m"], battery["station_y_m"], "P", color=_BATTERY_COLOUR, ms=5, zorder=3)
+        axes.plot(
+            battery["station_x_m"],
+            battery["station_y_m"],
+            "P",
+            color=_BATTERY_COLOUR,
+            ms=5,
+            zorder=3,
+        )
     axes.set(xlabel="x, east (m)", ylabel="y, north (m)")
 
 
@@ -281,26 +391,38 @@ def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5, integer=True))
     points_per_m = 72.0 * axes.get_position().width * style.WIDTH_IN / frame.width
-    # In points: the lower left corners of letters, and of boxes around the markers that are drawn already.
-    markers = np.concatenate([each.get_xydata() for each in axes.lines if each.get_marker() in ("o", "v")])
+    # In points: the lower left corners of letters, and of boxes around the markers that are drawn
+    # already.
+    markers = np.concatenate(
+        [each.get_xydata() for each in axes.lines if each.get_marker() in ("o", "v")]
+    )
     taken = [(x - _LETTER_POINTS / 3, y - _LETTER_POINTS / 3) for x, y in markers * points_per_m]
 
     def is_free(x: float, y: float) -> bool:
-        return all(abs(x - other[0]) > _LETTER_POINTS or abs(y - other[1]) > _LETTER_POINTS for other in taken)
+        return all(
+            abs(x - other[0]) > _LETTER_POINTS or abs(y - other[1]) > _LETTER_POINTS
+            for other in taken
+        )
 
     for mark in marks:
         if frame.contains(mark.x_m, mark.y_m):
-            axes.plot(mark.x_m, mark.y_m, "o", color=mark.colour, ms=3.5, mec="white", mew=0.6, zorder=4)
+            axes.plot(
+                mark.x_m, mark.y_m, "o", color=mark.colour, ms=3.5, mec="white", mew=0.6, zorder=4
+            )
             x, y = mark.x_m * points_per_m, mark.y_m * points_per_m
             free = (offset for offset in _LETTER_OFFSETS if is_free(x + offset[0], y + offset[1]))
             offset = next(free, _LETTER_OFFSETS[0])
             taken.append((x + offset[0], y + offset[1]))
             look = {"color": mark.colour, "zorder": 5, **_LETTER}
-            axes.annotate(mark.letter, (mark.x_m, mark.y_m), offset, textcoords="offset points", **look)
+            axes.annotate(
+                mark.letter, (mark.x_m, mark.y_m), offset, textcoords="offset points", **look
+            )
 
 
 def _search_frame(record: MissionRecord) -> Bbox:
-    """Return the frame around the vehicle's path until detection and the detected point, with a margin."""
+    """Return the frame around the vehicle's path until detection and the detected point, with a
+    margin.
+    """
     way, metrics = record.trajectory, record.metrics
     search = way.loc[way["t_s"] <= metrics["search_time_s"], ["x_m", "y_m"]].to_numpy(float)
     if metrics["pipeline_found"]:
@@ -308,15 +430,28 @@ def _search_frame(record: MissionRecord) -> Bbox:
     return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
 
 
-def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str) -> None:
+def _draw_adaptations(
+    axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str
+) -> None:
     """Mark where or when modes changed, in the colour of the new one."""
     way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - SEA_BED_Z_M)
     for each in adaptations(record):
         x, y = (float(np.interp(each.t_s, way["t_s"], way[name])) for name in (across, up))
-        axes.plot(x, y, "v", color=style.BLACK, mfc=colours.get(each.after, "white"), ms=4.5, mew=0.7, zorder=3.5)
+        axes.plot(
+            x,
+            y,
+            "v",
+            color=style.BLACK,
+            mfc=colours.get(each.after, "white"),
+            ms=4.5,
+            mew=0.7,
+            zorder=3.5,
+        )
 
 
-def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
+def _draw_over_time(
+    axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]
+) -> None:
     way = record.trajectory
     altitude_m = way["z_m"].to_numpy() - SEA_BED_Z_M
     _draw_visibility(axes, record)
@@ -328,26 +463,45 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
     for mark, row in zip(marks, rows, strict=True):
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
         box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-        look: dict[str, Any] = {"color": mark.colour, "ha": "center", "va": "top", "bbox": box, **_LETTER}
+        look: dict[str, Any] = {
+            "color": mark.colour,
+            "ha": "center",
+            "va": "top",
+            "bbox": box,
+            **_LETTER,
+        }
         axes.text(mark.t_s, top * (1.0 - _LETTER_ROW_SHARE * row), mark.letter, **look)
-    axes.set(ylim=(0.0, top), xlim=(0.0, record.end_s), xlabel="mission time (s)", ylabel="altitude; visibility (m)")
+    axes.set(
+        ylim=(0.0, top),
+        xlim=(0.0, record.end_s),
+        xlabel="mission time (s)",
+        ylabel="altitude; visibility (m)",
+    )
     if (level := battery_level(record)) is not None:
         beside = axes.twinx()
         beside.plot(way["t_s"], 100.0 * level, color=_BATTERY_COLOUR, lw=1.0, ls="--")
-        beside.set(ylim=(0.0, 100.0 * top / tallest), yticks=(0, 25, 50, 75, 100), ylabel="battery (%)")
+        beside.set(
+            ylim=(0.0, 100.0 * top / tallest), yticks=(0, 25, 50, 75, 100), ylabel="battery (%)"
+        )
         beside.grid(False)
         beside.spines["right"].set_visible(True)
 
 
 def _draw_visibility(axes: Axes, record: MissionRecord) -> None:
-    for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
+    for threshold_m in record.scenario.get("reaction_metric", {}).get(
+        "visibility_thresholds_m", ()
+    ):
         axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
     way = record.trajectory
-    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY, label="visibility; dotted: thresholds")
+    axes.plot(
+        way["t_s"], way["visibility_m"], **_VISIBILITY, label="visibility; dotted: thresholds"
+    )
 
 
 def _letter_rows(times_s: Sequence[float], near_s: float) -> list[int]:
-    """Return the row of each letter over time: one that would touch another goes into the next row."""
+    """Return the row of each letter over time: one that would touch another goes into the next
+    row.
+    """
     last_s: list[float] = []
     rows = []
     for time_s in times_s:
@@ -410,26 +564,45 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
 
 
 def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptation]) -> None:
-    """Draw visibility and its thresholds, the requested altitude and that flown, and letters for adaptations."""
+    """Draw visibility and its thresholds, the requested altitude and that flown, and letters for
+    adaptations.
+    """
     way = record.trajectory
     _draw_visibility(axes, record)
     times_s, asked_m = _altitude_asked_for(record)
     axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, label="requested altitude")
-    axes.plot(way["t_s"], way["z_m"] - SEA_BED_Z_M, color=style.BLUE, lw=1.3, label="altitude flown")
+    axes.plot(
+        way["t_s"], way["z_m"] - SEA_BED_Z_M, color=style.BLUE, lw=1.3, label="altitude flown"
+    )
     found_s = record.metrics["search_time_s"]
     if record.metrics["pipeline_found"]:
         axes.axvline(found_s, color=style.BLACK, lw=0.9)
         is_late = found_s > 0.8 * record.end_s
-        look: dict[str, Any] = {"textcoords": "offset points", "ha": "right" if is_late else "left", "fontsize": 7}
+        look: dict[str, Any] = {
+            "textcoords": "offset points",
+            "ha": "right" if is_late else "left",
+            "fontsize": 7,
+        }
         axes.annotate("pipeline found", (found_s, 0.0), (-3 if is_late else 3, 3), **look)
     axes.set_ylabel("altitude; visibility (m)")
     axes.set_ylim(0.0, axes.get_ylim()[1] * 1.12)  # with room for the letters above the curves
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=2.4)
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=2.4
+    )
     rows = _letter_rows([each.t_s for each in listed], 0.022 * record.end_s)
     for letter, each, row in zip(ascii_uppercase, listed, rows, strict=False):
-        place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
-        place |= {"ha": "center", "va": "top", "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5}}
-        axes.annotate(letter, (each.t_s, 1.0), (0, -2 - 8 * row), fontsize=7, weight="bold", **place)
+        place: dict[str, Any] = {
+            "xycoords": ("data", "axes fraction"),
+            "textcoords": "offset points",
+        }
+        place |= {
+            "ha": "center",
+            "va": "top",
+            "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        }
+        axes.annotate(
+            letter, (each.t_s, 1.0), (0, -2 - 8 * row), fontsize=7, weight="bold", **place
+        )
 
 
 def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]]:
@@ -437,7 +610,11 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
     follow_m = record.scenario.get("revision", {}).get("follow", {}).get("altitude_m", np.nan)
     asked: dict[str, float] = {}
     times_s, altitudes_m = [0.0], [np.nan]
-    changes = [(span.begin_s, function, span.what) for function, spans in mode_spans(record).items() for span in spans]
+    changes = [
+        (span.begin_s, function, span.what)
+        for function, spans in mode_spans(record).items()
+        for span in spans
+    ]
     for t_s, function, mode in sorted(changes):
         if function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
             asked.pop(function, None)
@@ -457,8 +634,17 @@ def _lines(record: MissionRecord) -> Iterator[_Line]:
         bars = []
         for span in spans:
             if function_mode_words(function, span.what) != "off":
-                is_moving = span.what in colours and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
-                colour = colours[span.what] if is_moving else _ON if "recover" not in span.what else style.ORANGE
+                is_moving = span.what in colours and function in (
+                    GENERATE_SEARCH_PATH,
+                    FOLLOW_PIPELINE,
+                )
+                colour = (
+                    colours[span.what]
+                    if is_moving
+                    else _ON
+                    if "recover" not in span.what
+                    else style.ORANGE
+                )
                 bars.append((span, colour, function_mode_words(function, span.what)))
         yield function_words(function), bars
     for component, spans in sorted(failure_spans(record).items()):
@@ -466,7 +652,9 @@ def _lines(record: MissionRecord) -> Iterator[_Line]:
 
 
 def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
-    """Draw a bar for each span; its text is in it or behind it, or in a legend where there is no room for any."""
+    """Draw a bar for each span; its text is in it or behind it, or in a legend where there is no
+    room for any.
+    """
     end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
     letter_s = _LETTER_IN / _LINES_IN * end_s
     named, unnamed = set[tuple[int, str]](), dict[tuple[int, str], str]()
@@ -474,7 +662,9 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
         ends_s = [*(span.begin_s for span, _, _ in bars[1:]), end_s]
         for (span, colour, text), next_s in zip(bars, ends_s, strict=True):
             width_s = span.end_s - span.begin_s
-            axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
+            axes.barh(
+                row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2
+            )
             label = style.text(text)
             if 0.0 < width_s >= len(label) * letter_s:
                 luminance = np.dot((0.299, 0.587, 0.114), to_rgb(colour))
@@ -493,7 +683,11 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
         if (row, label) not in named
     ]
     if legend:
-        place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+        place: dict[str, Any] = {
+            "loc": "lower right",
+            "bbox_to_anchor": (1.0, 1.0),
+            "borderaxespad": 0.2,
+        }
         axes.legend(handles=legend, ncols=4, handlelength=1.2, **place)
     axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
@@ -513,4 +707,6 @@ def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:
 def _sentence(each: Adaptation, rules: Sequence[str]) -> str:
     before, after = (function_mode_words(each.function, mode) for mode in (each.before, each.after))
     cause = f"rule {', '.join(rules)}" if rules else each.cause
-    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}" + (f" ({cause})" if cause else "")
+    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}" + (
+        f" ({cause})" if cause else ""
+    )

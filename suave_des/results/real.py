@@ -1,9 +1,11 @@
-"""Real missions from one or several files, each with its condition, and what a faithful simulation must be near.
+"""Real missions from one or several files, each with its condition, and what a faithful simulation
+must be near.
 
-The conditions of a campaign are the points of its sweep: start, time of a failure, shift of the visibility. A real
-mission is compared with simulated ones of its own condition, so that what differs between conditions is not taken for
-chance. Missions come in clusters: a file of targets names regions of search time, distance and place of detection, and
-the share of missions that there may be in them.
+The conditions of a campaign are the points of its sweep: start, time of a failure, shift of the
+visibility. A real mission is compared with simulated ones of its own condition, so that what
+differs between conditions is not taken for chance. Missions come in clusters: a file of targets
+names regions of search time, distance and place of detection, and the share of missions that there
+may be in them.
 """
 
 from __future__ import annotations
@@ -42,10 +44,18 @@ _TOLERANCE = 1e-6
 
 # Targets
 
-Column = Literal["search_time_s", "distance_inspected_m", "detection_x_m", "pipeline_found", "mean_reaction_time_s"]
+Column = Literal[
+    "search_time_s",
+    "distance_inspected_m",
+    "detection_x_m",
+    "pipeline_found",
+    "mean_reaction_time_s",
+]
 Bounds = Annotated[tuple[Number, Number], AfterValidator(in_order)]
 Region = dict[Column, Annotated[tuple[Bounds, ...], Field(min_length=1)]]
-"""By column the intervals, ends included, one of which must contain the value; an unknown place is in none."""
+"""By column the intervals, ends included, one of which must contain the value; an unknown place is
+in none.
+"""
 
 
 class Share(Strict):
@@ -61,7 +71,9 @@ class Share(Strict):
     where: Annotated[Region, Field(min_length=1)]
     """The region whose share is taken."""
     target: Bounds | None = None
-    """Least and greatest share that a faithful simulation may have; left out: the share is only printed."""
+    """Least and greatest share that a faithful simulation may have; left out: the share is only
+    printed.
+    """
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -74,9 +86,13 @@ class ConditionLimits(Strict):
     """How near a metric must come where the conditions of the real missions are known."""
 
     median_difference: Number | None = None
-    """Greatest median over the conditions of |simulated - real median|, in the metric's unit; left out: any."""
+    """Greatest median over the conditions of |simulated - real median|, in the metric's unit; left
+    out: any.
+    """
     std_ratio: Number | None = None
-    """Greatest simulated / real standard deviation within a condition, each a median over the conditions."""
+    """Greatest simulated / real standard deviation within a condition, each a median over the
+    conditions.
+    """
 
 
 class Targets(Strict):
@@ -84,14 +100,16 @@ class Targets(Strict):
 
     shares: tuple[Share, ...] = ()
     """In the order in which they are printed."""
-    conditions: dict[Literal["search_time_s", "distance_inspected_m", "mean_reaction_time_s"], ConditionLimits] = Field(
-        default_factory=dict
-    )
+    conditions: dict[
+        Literal["search_time_s", "distance_inspected_m", "mean_reaction_time_s"], ConditionLimits
+    ] = Field(default_factory=dict)
     """By metric, over all managers."""
 
 
 def count(share: Share, runs: pandas.DataFrame) -> tuple[int, int]:
-    """Count the missions in a share, and those that it is a share of; runs have the columns of records.runs.COLUMNS."""
+    """Count the missions in a share, and those that it is a share of; runs have the columns of
+    records.runs.COLUMNS.
+    """
     own = runs[runs["manager"] == share.manager]
     if share.of == "detections":
         own = own[own["detection_x_m"].notna()]
@@ -115,7 +133,8 @@ def conditions_of(sweep: Sweep) -> pandas.DataFrame:
     """Return the points of a sweep as conditions: a row for each, with a column for each parameter.
 
     Example:
-        conditions = conditions_of(Sweep(zip={"start.y_m": [2.5, 2.8], "thruster_events.0.time_s": [146.4, 91.2]}))
+        conditions = conditions_of(Sweep(zip={"start.y_m": [2.5, 2.8], "thruster_events.0.time_s":
+        [146.4, 91.2]}))
     """
     points = [[*map(cell_of, sweep.values(point).values())] for point in range(sweep.points)]
     return pandas.DataFrame(points, columns=list(sweep.parameters), dtype=object)
@@ -127,14 +146,16 @@ def _condition_text(conditions: pandas.DataFrame, number: int) -> str:
 
 
 def numbered(runs: pandas.DataFrame, conditions: pandas.DataFrame) -> pandas.DataFrame:
-    """Return missions with a column `condition`, the number of each one's condition, from 1; as they are without any.
+    """Return missions with a column `condition`, the number of each one's condition, from 1; as
+    they are without any.
 
-    Of columns named like the parameters, those that are there must agree; without any, one of NUMBER_COLUMNS has the
-    numbers; without that, missions are in order, as the exemplar's runner makes them: equally many of each condition.
+    Of columns named like the parameters, those that are there must agree; without any, one of
+    NUMBER_COLUMNS has the numbers; without that, missions are in order, as the exemplar's runner
+    makes them: equally many of each condition.
 
     Raises:
-        InputError: about a row, counted from 0 as its place: it is of no condition, or of several; or, without a place,
-            a manager's missions do not divide evenly.
+        InputError: about a row, counted from 0 as its place: it is of no condition, or of several;
+            or, without a place, a manager's missions do not divide evenly.
     """
     if not len(conditions):
         return runs
@@ -146,17 +167,25 @@ def numbered(runs: pandas.DataFrame, conditions: pandas.DataFrame) -> pandas.Dat
     numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
     for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(conditions) + 1)))[:1]:
         problem = f"{column}: there is no condition {runs[column].iloc[row]}"
-        raise InputError(problem, place=str(row), remedy=f"the campaign has {len(conditions)}, counted from 1")
+        raise InputError(
+            problem, place=str(row), remedy=f"the campaign has {len(conditions)}, counted from 1"
+        )
     return runs.assign(**{CONDITION: numbers.astype(np.int64)})
 
 
-def _by_values(conditions: pandas.DataFrame, runs: pandas.DataFrame, named: Sequence[str]) -> NDArray[np.int64]:
+def _by_values(
+    conditions: pandas.DataFrame, runs: pandas.DataFrame, named: Sequence[str]
+) -> NDArray[np.int64]:
     points = conditions[named].itertuples(index=False, name=None)
-    fits = np.array([np.all([*map(_same, (runs[name] for name in named), values)], axis=0) for values in points])
+    fits = np.array(
+        [np.all([*map(_same, (runs[name] for name in named), values)], axis=0) for values in points]
+    )
     for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
         given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
         fitting = ", ".join(str(number) for number in 1 + np.flatnonzero(fits[:, row])) or "none"
-        shown = "; ".join(_condition_text(conditions, number) for number in range(1, min(len(conditions), 8) + 1))
+        shown = "; ".join(
+            _condition_text(conditions, number) for number in range(1, min(len(conditions), 8) + 1)
+        )
         problem = f"conditions of the campaign that have {given}: {fitting}"
         raise InputError(problem, place=str(row), remedy=f"name one; the campaign has {shown}")
     return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
@@ -168,14 +197,18 @@ def _in_order(managers: pandas.Series[str], conditions: int) -> NDArray[np.int64
     for row in np.flatnonzero(sizes % conditions)[:1]:
         own = f"{number_of(int(sizes[row]), 'mission')} of manager {managers.iloc[row]}"
         remedy = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
-        raise InputError(f"has {own}, which {conditions} conditions do not share evenly", remedy=remedy)
+        raise InputError(
+            f"has {own}, which {conditions} conditions do not share evenly", remedy=remedy
+        )
     return np.asarray(1 + places // (sizes // conditions), dtype=np.int64)
 
 
 def _same(column: pandas.Series[Any], value: Any) -> NDArray[np.bool_]:
     if isinstance(value, int | float) and not isinstance(value, bool):
         numbers = pandas.to_numeric(column, errors="coerce").to_numpy(float)
-        return np.asarray(np.isclose(numbers, value, rtol=_RELATIVE, atol=_ABSOLUTE), dtype=np.bool_)
+        return np.asarray(
+            np.isclose(numbers, value, rtol=_RELATIVE, atol=_ABSOLUTE), dtype=np.bool_
+        )
     return (column.astype(str) == ("" if value is None else str(value))).to_numpy(bool)
 
 
@@ -192,33 +225,47 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
 
     Args:
         paths: of files such as read_runs takes; the exemplar writes one for each manager.
-        conditions: of the campaign in which the missions were made, as of conditions_of. Which one a mission is of
-            follows from columns that are named like the campaign's parameters, or `condition` or `block` with its
-            number from 1, or else by order: equally many missions of each, one condition after the other, as the
-            exemplar's runner makes them.
+        conditions: of the campaign in which the missions were made, as of conditions_of. Which one
+            a mission is of follows from columns that are named like the campaign's parameters, or
+            `condition` or `block` with its number from 1, or else by order: equally many missions
+            of each, one condition after the other, as the exemplar's runner makes them.
 
     Raises:
-        InputError: with file and line: a file cannot be read, two are the same, or a condition cannot be determined.
+        InputError: with file and line: a file cannot be read, two are the same, or a condition
+            cannot be determined.
     """
     read, files = [read_runs(path) for path in paths], dict[Path, str]()
     for path, digest in (item for runs in read for item in runs.files.items()):
         if same := next((other for other in files if files[other] == digest), None):
-            raise InputError(f"has the same content as {same}", file=path, remedy="give each file once")
+            raise InputError(
+                f"has the same content as {same}", file=path, remedy="give each file once"
+            )
         files[path] = digest
     notes = [f"{note}." for runs in read for note in runs.notes]
     frame = pandas.concat([runs.frame for runs in read], ignore_index=True)
     if conditions is not None and len(conditions):
         named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
         try:
-            frame = numbered(frame, conditions).drop(columns=[name for name in named if name != CONDITION])
+            frame = numbered(frame, conditions).drop(
+                columns=[name for name in named if name != CONDITION]
+            )
         except InputError as error:
             if error.place is not None:
-                lines = [(path, int(line)) for runs in read for path in runs.files for line in runs.frame.index]
+                lines = [
+                    (path, int(line))
+                    for runs in read
+                    for path in runs.files
+                    for line in runs.frame.index
+                ]
                 raise line_error(*lines[int(error.place)], error.problem, error.remedy) from None
-            raise InputError(error.problem, file=", ".join(map(str, files)), remedy=error.remedy) from None
+            raise InputError(
+                error.problem, file=", ".join(map(str, files)), remedy=error.remedy
+            ) from None
         if not named:
             each = f"one after the other, as many missions of each of the {len(conditions)}"
-            notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}.")
+            notes.append(
+                f"The data do not name the conditions of their missions: they are taken in order, {each}."
+            )
         texts = (_condition_text(conditions, number) for number in range(1, len(conditions) + 1))
         notes += (f"Condition {number}: {text}" for number, text in enumerate(texts, 1))
     return Runs(files, frame, tuple(notes))
@@ -227,21 +274,27 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
 def matched(
     real: pandas.DataFrame, simulated: pandas.DataFrame, names: Sequence[str]
 ) -> tuple[pandas.DataFrame, pandas.DataFrame]:
-    """Return real and simulated missions with the numbers of their conditions, the points of a sweep of these names.
+    """Return real and simulated missions with the numbers of their conditions, the points of a
+    sweep of these names.
 
-    Conditions of real missions are found as by `numbered`; simulated ones are in the order of the points.
+    Conditions of real missions are found as by `numbered`; simulated ones are in the order of the
+    points.
 
     Raises:
         InputError: nothing is swept, or the real missions are not of these conditions.
     """
     if not names:
-        remedy = "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
+        remedy = (
+            "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
+        )
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
     with located(place="real missions"):
         real = numbered(real, simulated[list(names)].drop_duplicates().astype(object))
     own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
     simulated = simulated.assign(**{CONDITION: own})
-    for name in real.columns.intersection(simulated.columns).intersection(["initial_x_m", "initial_y_m"]):
+    for name in real.columns.intersection(simulated.columns).intersection(
+        ["initial_x_m", "initial_y_m"]
+    ):
         off = real.groupby(CONDITION)[name].mean() - simulated.groupby(CONDITION)[name].mean()
         if ((off - off.median()).abs() > _START_M).any():
             worst = int((off - off.median()).abs().to_numpy().argmax())
@@ -252,7 +305,8 @@ def matched(
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:
-    """Read the conditions that a campaign file sweeps, as of conditions_of; none if it sweeps none, or is a scenario.
+    """Read the conditions that a campaign file sweeps, as of conditions_of; none if it sweeps none,
+    or is a scenario.
 
     Raises:
         InputError: a file cannot be used.
@@ -270,15 +324,21 @@ def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) 
 
 
 def published_for(scenario: str | Path) -> Path | None:
-    """Return the file of the real missions that were published for a scenario or campaign file, if there are any."""
-    own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
+    """Return the file of the real missions that were published for a scenario or campaign file, if
+    there are any.
+    """
+    own = (
+        shipped_folder("scenarios/published")
+        / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
+    )
     return own if own.is_file() else None
 
 
 def targets_of(
     real: Runs, given: Path | None = None
 ) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
-    """Read the shares and limits of the file given, or of NAME.targets.yaml beside each NAME.csv, and name the files.
+    """Read the shares and limits of the file given, or of NAME.targets.yaml beside each NAME.csv,
+    and name the files.
 
     Raises:
         InputError: with file and line: one cannot be read, or is not valid.
@@ -289,5 +349,7 @@ def targets_of(
     shares: list[Share] = []
     for each in lists:
         shares += [share for share in each.shares if share not in shares]
-    limits: dict[str, ConditionLimits] = {metric: limit for each in lists for metric, limit in each.conditions.items()}
+    limits: dict[str, ConditionLimits] = {
+        metric: limit for each in lists for metric, limit in each.conditions.items()
+    }
     return tuple(shares), limits, paths

@@ -1,7 +1,7 @@
 """Statistics of comparisons, from SciPy and statsmodels, in the form in which tables use them.
 
-A sample is a float array of shape (n,) without missing values. Intervals are 95% intervals. What draws takes a
-generator, and is repeatable with its seed.
+A sample is a float array of shape (n,) without missing values. Intervals are 95% intervals. What
+draws takes a generator, and is repeatable with its seed.
 """
 
 from __future__ import annotations
@@ -33,7 +33,11 @@ PERMUTATIONS, SUBSAMPLES = 999, 2_000
 _MOST_RUNS = 10_000_000
 _ROUNDING = 1e-9
 """A share left of one half is often a little more after rounding."""
-_ALTERNATIVES: tuple[Literal["two-sided", "less", "greater"], ...] = ("two-sided", "less", "greater")
+_ALTERNATIVES: tuple[Literal["two-sided", "less", "greater"], ...] = (
+    "two-sided",
+    "less",
+    "greater",
+)
 
 
 def library(module: str = "") -> Any:
@@ -70,7 +74,9 @@ def mean_interval(sample: Sample) -> Estimate:
 
 
 def difference_interval(first: Sample, second: Sample) -> Estimate:
-    """Estimate the difference of two independent samples' means, first - second, with its interval by Welch (1947)."""
+    """Estimate the difference of two independent samples' means, first - second, with its interval
+    by Welch (1947).
+    """
     from scipy.stats import ttest_ind
 
     difference = math.fsum(first) / len(first) - math.fsum(second) / len(second)
@@ -84,14 +90,19 @@ def difference_interval(first: Sample, second: Sample) -> Estimate:
 def _with_interval(value: float, low: float, high: float, method: str) -> Estimate:
     """Return an estimate, without an interval if an end of it is not finite."""
     is_known = math.isfinite(low) and math.isfinite(high)
-    return Estimate(value, float(low), float(high), method) if is_known else Estimate(value, method=method)
+    return (
+        Estimate(value, float(low), float(high), method)
+        if is_known
+        else Estimate(value, method=method)
+    )
 
 
 def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Estimate:
     """Estimate simulated / published standard deviation, with its percentile bootstrap interval.
 
-    Both samples are resampled independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16). There
-    is no value where the published values have no spread to divide by, and no interval where those of a resample do.
+    Both samples are resampled independently and with replacement (Efron and Tibshirani 1993,
+    chapters 13 and 16). There is no value where the published values have no spread to divide by,
+    and no interval where those of a resample do.
     """
     from scipy.stats import bootstrap
 
@@ -112,7 +123,9 @@ def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generato
         )
     if not np.isfinite(found.bootstrap_distribution).all():
         return Estimate(ratio)
-    return _with_interval(ratio, found.confidence_interval.low, found.confidence_interval.high, "percentile bootstrap")
+    return _with_interval(
+        ratio, found.confidence_interval.low, found.confidence_interval.high, "percentile bootstrap"
+    )
 
 
 def _std(sample: Sample, axis: int) -> Sample:
@@ -124,7 +137,9 @@ def _std(sample: Sample, axis: int) -> Sample:
 
 
 def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimate:
-    """Estimate the difference of two independent shares (count, n), with its interval by Newcombe (1998)."""
+    """Estimate the difference of two independent shares (count, n), with its interval by Newcombe
+    (1998).
+    """
     proportion = library(".stats.proportion")
     low, high = proportion.confint_proportions_2indep(
         *first, *second, method="newcomb", compare="diff", alpha=1.0 - CONFIDENCE
@@ -133,35 +148,48 @@ def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimat
 
 
 def paired_share_difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimate:
-    """Estimate the difference of two shares of the same runs, with its interval by Bonett and Price (2012).
+    """Estimate the difference of two shares of the same runs, with its interval by Bonett and Price
+    (2012).
 
-    It is Wald's with a run more of each kind in which the two differ, so that there is one if no run differs, too.
+    It is Wald's with a run more of each kind in which the two differ, so that there is one if no
+    run differs, too.
     """
     from scipy.special import ndtri
 
     n = len(first)
     change = first.astype(float) - second.astype(float)
     extended = np.append(change, (1.0, -1.0))
-    middle, half = float(extended.mean()), float(ndtri((1.0 + CONFIDENCE) / 2.0) * extended.std()) / math.sqrt(n + 2)
-    return Estimate(math.fsum(change) / n, middle - half, middle + half, BONETT_PRICE).cut(-1.0, 1.0)
+    middle, half = (
+        float(extended.mean()),
+        float(ndtri((1.0 + CONFIDENCE) / 2.0) * extended.std()) / math.sqrt(n + 2),
+    )
+    return Estimate(math.fsum(change) / n, middle - half, middle + half, BONETT_PRICE).cut(
+        -1.0, 1.0
+    )
 
 
-def search_times(times_s: Sample, found: NDArray[np.bool_], horizon_s: float) -> tuple[Estimate, Estimate]:
-    """Estimate times until the pipeline is found, missions without it being censored (Kaplan and Meier 1958).
+def search_times(
+    times_s: Sample, found: NDArray[np.bool_], horizon_s: float
+) -> tuple[Estimate, Estimate]:
+    """Estimate times until the pipeline is found, missions without it being censored (Kaplan and
+    Meier 1958).
 
     Args:
         times_s: when it was found, or, where `found` is false, the mission ended without.
-        horizon_s: to which the restricted mean reaches: the shortest time limit of all that is compared.
+        horizon_s: to which the restricted mean reaches: the shortest time limit of all that is
+            compared.
 
     Returns:
-        The mean of the time until found or `horizon_s`, whichever is less; and the time by which half of the missions
-        have found it, infinite if less than half do.
+        The mean of the time until found or `horizon_s`, whichever is less; and the time by which
+        half of the missions have found it, infinite if less than half do.
     """
     with _quiet():
         fitted = library(".duration.survfunc").SurvfuncRight(times_s, found)
         half = 0.5 - _ROUNDING
         median_s = float(np.nanmin([fitted.quantile(half), math.inf]))  # nan: less than half
-        ends_s = fitted.quantile_ci(half, 1.0 - CONFIDENCE, method="cloglog")  # nan: no step is in it
+        ends_s = fitted.quantile_ci(
+            half, 1.0 - CONFIDENCE, method="cloglog"
+        )  # nan: no step is in it
     is_before = fitted.surv_times < horizon_s
     steps_s = np.diff([0.0, *fitted.surv_times[is_before], horizon_s])
     restricted = Estimate(float(np.append(1.0, fitted.surv_prob[is_before]) @ steps_s))
@@ -175,8 +203,9 @@ def search_times(times_s: Sample, found: NDArray[np.bool_], horizon_s: float) ->
 # Tests
 
 Test = dict[str, Any]
-"""Columns of a comparison: test, p (two-sided), p_less (one-sided: that the first is not less than the second),
-p_greater, effect_name, and effect with the ends of its interval; None for what a test does not have."""
+"""Columns of a comparison: test, p (two-sided), p_less (one-sided: that the first is not less than
+the second), p_greater, effect_name, and effect with the ends of its interval; None for what a test
+does not have."""
 
 _PS_OF_EQUAL = (1.0, 1.0, 1.0)
 
@@ -190,13 +219,15 @@ def _test(name: str, ps: Sequence[float], effect: Estimate) -> Test:
 def signed_rank_test(first: Sample, second: Sample) -> Test:
     """Test paired samples by Wilcoxon's signed ranks, as scipy.stats.wilcoxon does by default.
 
-    The effect is the matched-pairs rank-biserial correlation (Kerby 2014): 1 if the first is greater in all pairs, -1
-    if it is less in all. Pairs without a difference do not count.
+    The effect is the matched-pairs rank-biserial correlation (Kerby 2014): 1 if the first is
+    greater in all pairs, -1 if it is less in all. Pairs without a difference do not count.
     """
     from scipy.stats import wilcoxon
 
     scale = max(float(np.abs([first, second]).max()), math.ulp(0.0))
-    difference = np.round((first - second) / scale, 9)  # means that are equal but for rounding errors are ties
+    difference = np.round(
+        (first - second) / scale, 9
+    )  # means that are equal but for rounding errors are ties
     differing = int(np.count_nonzero(difference))
     if differing == 0:
         return _test(WILCOXON, _PS_OF_EQUAL, Estimate(0.0, method=RANK_BISERIAL))
@@ -206,11 +237,14 @@ def signed_rank_test(first: Sample, second: Sample) -> Test:
     return _test(WILCOXON, [each.pvalue for each in found], Estimate(effect, method=RANK_BISERIAL))
 
 
-def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asymptotic"] = "auto") -> Test:
-    """Test independent samples by Mann and Whitney, as scipy.stats.mannwhitneyu does with that method.
+def mann_whitney(
+    first: Sample, second: Sample, method: Literal["auto", "asymptotic"] = "auto"
+) -> Test:
+    """Test independent samples by Mann and Whitney, as scipy.stats.mannwhitneyu does with that
+    method.
 
-    The effect is A12 (Vargha and Delaney 2000): the probability that a value of the first is greater than one of the
-    second, ties counted half.
+    The effect is A12 (Vargha and Delaney 2000): the probability that a value of the first is
+    greater than one of the second, ties counted half.
     """
     from scipy.stats import mannwhitneyu
 
@@ -222,12 +256,16 @@ def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asympto
 
 
 def rank_sum_test(first: Sample, second: Sample) -> Test:
-    """Return the test of mann_whitney with the interval of its effect, by Brunner and Munzel (2000)."""
+    """Return the test of mann_whitney with the interval of its effect, by Brunner and Munzel
+    (2000).
+    """
     found = mann_whitney(first, second)
     with _quiet():
         ranks = library(".stats.nonparametric").rank_compare_2indep(first, second)
         low, high = ranks.conf_int(alpha=1.0 - CONFIDENCE)
-    effect = _with_interval(found["effect"], low, high, A12).cut(0.0, 1.0)  # none of one value, or without overlap
+    effect = _with_interval(found["effect"], low, high, A12).cut(
+        0.0, 1.0
+    )  # none of one value, or without overlap
     return found | effect.columns("effect")
 
 
@@ -236,12 +274,19 @@ def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Test:
     from scipy.stats import fisher_exact
 
     table = [[count, n - count] for count, n in (first, second)]
-    return _test(FISHER, [fisher_exact(table, alternative=each).pvalue for each in _ALTERNATIVES], Estimate())
+    return _test(
+        FISHER, [fisher_exact(table, alternative=each).pvalue for each in _ALTERNATIVES], Estimate()
+    )
 
 
 def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Test:
-    """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the two differ."""
-    both = [[int(np.sum((first == row) & (second == column))) for column in (True, False)] for row in (True, False)]
+    """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the
+    two differ.
+    """
+    both = [
+        [int(np.sum((first == row) & (second == column))) for column in (True, False)]
+        for row in (True, False)
+    ]
     found = library(".stats.contingency_tables").mcnemar(both, exact=True)
     return {"test": MCNEMAR, "p": min(1.0, float(found.pvalue)), "effect_name": "", "effect": None}
 
@@ -255,10 +300,12 @@ def holm(ps: Sequence[float]) -> list[float]:
 
 
 def runs_for(spread: float, half_width: float) -> int | None:
-    """Return how many runs make half the 95% interval of a mean that narrow; None for more than ten million.
+    """Return how many runs make half the 95% interval of a mean that narrow; None for more than ten
+    million.
 
     Args:
-        spread: standard deviation of a run's value; of a difference of two means, the root of the sum of squares.
+        spread: standard deviation of a run's value; of a difference of two means, the root of the
+            sum of squares.
         half_width: wanted, above 0.
     """
 
@@ -275,10 +322,11 @@ def runs_for(spread: float, half_width: float) -> int | None:
 def anderson_darling(
     first: Sample, second: Sample, rng: np.random.Generator, permutations: int = PERMUTATIONS
 ) -> tuple[float, float]:
-    """Return statistic and p of the two-sample Anderson-Darling test (Scholz and Stephens 1987, equation 7).
+    """Return statistic and p of the two-sample Anderson-Darling test (Scholz and Stephens 1987,
+    equation 7).
 
-    Ties have midranks. The statistic is normalised; p is that of a permutation test, which ties do not disturb. Both
-    are nan for a sample of one.
+    Ties have midranks. The statistic is normalised; p is that of a permutation test, which ties do
+    not disturb. Both are nan for a sample of one.
     """
     from scipy.stats import PermutationMethod, anderson_ksamp
 
@@ -292,17 +340,24 @@ def anderson_darling(
 
 
 def sign_of(p_less: float, p_greater: float) -> int:
-    """Return what one-sided tests show: 1: the first is greater; -1: it is less; 0: neither is shown."""
+    """Return what one-sided tests show: 1: the first is greater; -1: it is less; 0: neither is
+    shown.
+    """
     return int(p_greater < SIGNIFICANCE) - int(p_less < SIGNIFICANCE)
 
 
 def agreement(
-    sign: int, samples: Sequence[Sample], sizes: Sequence[int], rng: np.random.Generator, subsamples: int = SUBSAMPLES
+    sign: int,
+    samples: Sequence[Sample],
+    sizes: Sequence[int],
+    rng: np.random.Generator,
+    subsamples: int = SUBSAMPLES,
 ) -> float:
-    """Return the share of random subsamples of two samples that lead to a conclusion, a sign as of sign_of.
+    """Return the share of random subsamples of two samples that lead to a conclusion, a sign as of
+    sign_of.
 
-    They are drawn without replacement, and tested by one-sided Mann-Whitney tests by the normal approximation, with
-    ties corrected. The share is nan if a sample is too small to draw from.
+    They are drawn without replacement, and tested by one-sided Mann-Whitney tests by the normal
+    approximation, with ties corrected. The share is nan if a sample is too small to draw from.
     """
     from scipy.stats import mannwhitneyu
 
@@ -312,9 +367,12 @@ def agreement(
         np.array([rng.choice(sample, size, replace=False) for _ in range(subsamples)])
         for sample, size in zip(samples, sizes, strict=True)
     ]
-    with np.errstate(divide="ignore", invalid="ignore"):  # all values equal: p is nan, and no evidence
+    with np.errstate(
+        divide="ignore", invalid="ignore"
+    ):  # all values equal: p is nan, and no evidence
         less, greater = (
-            mannwhitneyu(*drawn, axis=-1, alternative=each, method="asymptotic").pvalue < SIGNIFICANCE
+            mannwhitneyu(*drawn, axis=-1, alternative=each, method="asymptotic").pvalue
+            < SIGNIFICANCE
             for each in _ALTERNATIVES[1:]
         )
     return float(np.mean(greater.astype(int) - less.astype(int) == sign))

@@ -1,4 +1,6 @@
-"""The look and the words of all figures: small type, colours that colour-blind readers tell apart, words and units."""
+"""The look and the words of all figures: small type, colours that colour-blind readers tell apart,
+words and units.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,13 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
 """For what has no colour of its own, in this order."""
 _KNOWN_MANAGERS = ("none", "random", "metacontrol", "bt")
 """They have the same look in every figure: that of their place here."""
-_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+_DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (1, 1)),
+    (0, (6, 1.5, 1, 1.5)),
+    (0, (3, 1, 1, 1, 1, 1)),
+)
 _MARKERS = "osD^v<>PX"
 
 MODE_COLOURS = {
@@ -38,17 +46,27 @@ MODE_COLOURS = {
     "__DEFAULT__": PURPLE,
     "normal": GREEN,
 }
-"""The shipped modes: the higher the search, the darker the blue. A user's mode gets one of OTHER_MODES."""
-MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 2.0, "fd_follow_pipeline": 1.2}
-"""Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
+"""The shipped modes: the higher the search, the darker the blue. A user's mode gets one of
+OTHER_MODES.
+"""
+MODE_WIDTHS = {
+    "fd_spiral_low": 0.8,
+    "fd_spiral_medium": 1.4,
+    "fd_spiral_high": 2.0,
+    "fd_follow_pipeline": 1.2,
+}
+"""Widths of lines, in points: the higher the search, the wider, so that they differ in print
+without colours, too.
+"""
 OTHER_MODES = ("#6A3D9A", "#8C510A", "#B8860B")
 
 
 def looks(names: Sequence[str]) -> list[int]:
     """Return for each name the number of its look, which `line` and `marker` take.
 
-    Managers of the exemplar keep theirs whoever is shown, and no other has one of these. Of a manager with several
-    sources, whose names follow it in parentheses, the first has it; each of the others has a look of its own.
+    Managers of the exemplar keep theirs whoever is shown, and no other has one of these. Of a
+    manager with several sources, whose names follow it in parentheses, the first has it; each of
+    the others has a look of its own.
     """
     places = {name: place for place, name in enumerate(_KNOWN_MANAGERS)}
     found: list[int] = []
@@ -59,7 +77,9 @@ def looks(names: Sequence[str]) -> list[int]:
 
 
 def line(number: int) -> dict[str, Any]:
-    """Return the look of the curve of a manager, by its number from 0: no two of thirty are alike, nor six in grey."""
+    """Return the look of the curve of a manager, by its number from 0: no two of thirty are alike,
+    nor six in grey.
+    """
     return {"color": CYCLE[number % len(CYCLE)], "linestyle": _DASHES[number % len(_DASHES)]}
 
 
@@ -69,7 +89,9 @@ def marker(number: int) -> str:
 
 
 def text(name: str) -> str:
-    """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a leading underscore."""
+    """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a
+    leading underscore.
+    """
     return (f" {name}" if name.startswith("_") else name).replace("$", r"\$")
 
 
@@ -143,7 +165,10 @@ def key_words(key: str) -> str:
     words = []
     for part in parts:
         name, _, index = part.partition("[")
-        words.append(_FUNCTIONS.get(name, name).replace("_", " ") + (f" {int(index[:-1]) + 1}" if index else ""))
+        words.append(
+            _FUNCTIONS.get(name, name).replace("_", " ")
+            + (f" {int(index[:-1]) + 1}" if index else "")
+        )
         if part.isdecimal():
             words[-1] = str(int(part) + 1)
     text = re.sub(r": (\d+)(?=:|$)", r" \1", ": ".join(words))
@@ -184,10 +209,14 @@ def component_words(component: str) -> str:
 
 
 def plain(name: str) -> str:
-    """Return a name from a file as words, without what LaTeX or a terminal would take for commands."""
+    """Return a name from a file as words, without what LaTeX or a terminal would take for
+    commands.
+    """
     return printable(name.removeprefix("fd_").strip("_").replace("_", " ") or name)
 
 
 def folded(name: str, width: int = 40) -> str:
-    """Break a long name of a manager into lines, so that it leaves room for the figure beside it."""
+    """Break a long name of a manager into lines, so that it leaves room for the figure beside
+    it.
+    """
     return broken_name(name, width, "")

@@ -1,4 +1,6 @@
-"""Compare simulated missions with real ones: samples, pairs, clusters, targets, and the paper's table (SEAMS 2023)."""
+"""Compare simulated missions with real ones: samples, pairs, clusters, targets, and the paper's
+table (SEAMS 2023).
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,14 @@ from suave_des.arguments import plain_arguments
 from suave_des.draws import Streams
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import interval_names, mean_of, percent, share_of, std_of
-from suave_des.records.metrics import DISTANCE, FOUND, METRICS, PAPER_METRICS, REACTION_TIME, SEARCH_TIME
+from suave_des.records.metrics import (
+    DISTANCE,
+    FOUND,
+    METRICS,
+    PAPER_METRICS,
+    REACTION_TIME,
+    SEARCH_TIME,
+)
 from suave_des.records.missions import in_papers_order
 from suave_des.records.runs import read_runs
 from suave_des.resources import find
@@ -36,7 +45,9 @@ _TARGET = ("kind", "subject", "what", "value", "low", "high")
 _SIGNIFICANT_DIGITS = 8
 
 _Generators = Callable[[str], np.random.Generator]
-"""Makes the random generator of each use of chance, by a name of its own: no result depends on the others."""
+"""Makes the random generator of each use of chance, by a name of its own: no result depends on the
+others.
+"""
 
 TABLES = {"cells": "validation.csv"}
 TABLES |= {name: f"validation_{name}.csv" for name in ("pairs", "shares", "conditions", "targets")}
@@ -47,15 +58,18 @@ FILES = (*TABLES.values(), JSON_FILE)
 
 @dataclass(frozen=True)
 class Validation:
-    """The result of a comparison with real missions: data frames with the columns of the files that TABLES names.
+    """The result of a comparison with real missions: data frames with the columns of the files that
+    TABLES names.
 
     Attributes:
         cells: a row for each metric and manager: both samples, their difference and its tests.
         pairs: a row for each metric and pair of managers.
         shares: a row for each cluster or other region, and manager.
-        conditions: a row for each metric, manager and condition, where conditions are known; else empty.
+        conditions: a row for each metric, manager and condition, where conditions are known; else
+            empty.
         targets: a row for each requirement; `met` is True, False, or None if it cannot be judged.
-        not_found_s: search time that counts for missions that never found the pipeline; none if there are none.
+        not_found_s: search time that counts for missions that never found the pipeline; none if
+            there are none.
     """
 
     managers: tuple[str, ...]
@@ -72,12 +86,18 @@ class Validation:
         return all(met is True for met in self.targets["met"])
 
     def texts(self, provenance: Mapping[str, object]) -> dict[str, str]:
-        """Write each text file, by its name; the JSON file says from what the validation comes (provenance)."""
+        """Write each text file, by its name; the JSON file says from what the validation comes
+        (provenance).
+        """
         frames = {name: getattr(self, name).map(_rounded) for name in TABLES}
         met = self.targets["met"].tolist()
         content = {
             "provenance": dict(provenance),
-            "targets_summary": {"met": met.count(True), "not_met": met.count(False), "not_judged": met.count(None)},
+            "targets_summary": {
+                "met": met.count(True),
+                "not_met": met.count(False),
+                "not_judged": met.count(None),
+            },
             "not_found_counts_as_s": self.not_found_s,
             **{name: rows_of(frame) for name, frame in frames.items()},
         }
@@ -86,10 +106,15 @@ class Validation:
             for name, file in TABLES.items()
             if len(frames[name]) or name != "conditions"
         }
-        return {**files, JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"}
+        return {
+            **files,
+            JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        }
 
     def tables(self, real: str) -> Iterator[Table]:
-        """Yield every table that has rows; `real` is what the real missions are called: "published" or "real"."""
+        """Yield every table that has rows; `real` is what the real missions are called: "published"
+        or "real".
+        """
         yield from (table for table in _tables(self, real) if table.rows)
 
     def remarks(self, real: str) -> Iterator[str]:
@@ -111,7 +136,9 @@ class Validation:
 
 
 def _rounded(value: Any) -> Any:
-    """Round to eight digits, which hides the last ones, in which machines differ; p values of 1e-12 keep theirs."""
+    """Round to eight digits, which hides the last ones, in which machines differ; p values of 1e-12
+    keep theirs.
+    """
     return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if isinstance(value, float) else value
 
 
@@ -125,10 +152,12 @@ def validate(
     limits: Mapping[str, ConditionLimits] = MappingProxyType({}),
     seed: int = 1,
 ) -> Validation:
-    """Compare simulated missions with published ones; the result depends on nothing but the arguments.
+    """Compare simulated missions with published ones; the result depends on nothing but the
+    arguments.
 
-    Where both have a column `condition`, a manager's missions are compared condition by condition, too, and simulated
-    ones are left out as needed for the conditions to have the same proportions on both sides.
+    Where both have a column `condition`, a manager's missions are compared condition by condition,
+    too, and simulated ones are left out as needed for the conditions to have the same proportions
+    on both sides.
 
     Example:
         real = read_runs("my_real_runs.csv")
@@ -136,7 +165,8 @@ def validate(
         print(found.targets[found.targets["met"] != True])
 
     Args:
-        published: a row for each mission, with at least the columns of records.runs.COLUMNS; likewise simulated.
+        published: a row for each mission, with at least the columns of records.runs.COLUMNS;
+            likewise simulated.
         managers: those to compare; each must have missions on both sides.
         shares: regions to count.
         limits: targets by metric for what is compared condition by condition.
@@ -162,34 +192,52 @@ def validate(
         if all(map(len, both := [sample(side, manager, metric) for side in sides]))
     }
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
-    cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")  # so narrow that none needs it
+    cells = cells.drop(
+        columns=list(interval_names("simulated_std")), errors="ignore"
+    )  # so narrow that none needs it
     of_one_metric = [both for both in combinations(samples, 2) if both[0][0] == both[1][0]]
-    pairs = pandas.DataFrame([_pair(*both, [samples[each] for each in both], generators) for both in of_one_metric])
+    pairs = pandas.DataFrame(
+        [_pair(*both, [samples[each] for each in both], generators) for both in of_one_metric]
+    )
     counted = compare_shares(shares, real, ours, managers)
     conditions = compare_conditions(real, ours, managers, COMPARED)
     required = _targets(cells, pairs, counted, over_conditions(conditions), limits)
     targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
-    value, low, high = targets["value"], targets["low"].fillna(-math.inf), targets["high"].fillna(math.inf)
+    value, low, high = (
+        targets["value"],
+        targets["low"].fillna(-math.inf),
+        targets["high"].fillna(math.inf),
+    )
     targets["met"] = value.between(low, high).astype(object).where(value.notna(), None)
     return Validation(tuple(managers), cells, pairs, counted, conditions, targets, not_found_s)
 
 
-def _with_common_limit(sides: list[pandas.DataFrame]) -> tuple[float | None, list[pandas.DataFrame]]:
-    """Give all missions that are known not to have found the pipeline one search time; none if there are none.
+def _with_common_limit(
+    sides: list[pandas.DataFrame],
+) -> tuple[float | None, list[pandas.DataFrame]]:
+    """Give all missions that are known not to have found the pipeline one search time; none if
+    there are none.
 
-    Programs write different numbers for them, such as 250 and 251 s with a limit of 250 s, which a test of
-    distributions would take for a difference. It is the median of those numbers on the last side that has some, but
-    at least as great as every search time with success.
+    Programs write different numbers for them, such as 250 and 251 s with a limit of 250 s, which a
+    test of distributions would take for a difference. It is the median of those numbers on the last
+    side that has some, but at least as great as every search time with success.
     """
     found = [side[FOUND].astype("Float64").fillna(1.0) != 0.0 for side in sides]
     lost = [side.loc[~is_found, SEARCH_TIME] for side, is_found in zip(sides, found, strict=True)]
     numbers = next((each for each in reversed(lost) if len(each)), None)
     if numbers is None:
         return None, sides
-    longest_s = [side.loc[is_found, SEARCH_TIME].max() for side, is_found in zip(sides, found, strict=True)]
+    longest_s = [
+        side.loc[is_found, SEARCH_TIME].max() for side, is_found in zip(sides, found, strict=True)
+    ]
     limit_s = max(float(numbers.median()), *map(float, longest_s))
-    times_s = [side[SEARCH_TIME].where(is_found, limit_s) for side, is_found in zip(sides, found, strict=True)]
-    return limit_s, [side.assign(**{SEARCH_TIME: each}) for side, each in zip(sides, times_s, strict=True)]
+    times_s = [
+        side[SEARCH_TIME].where(is_found, limit_s)
+        for side, is_found in zip(sides, found, strict=True)
+    ]
+    return limit_s, [
+        side.assign(**{SEARCH_TIME: each}) for side, each in zip(sides, times_s, strict=True)
+    ]
 
 
 def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
@@ -198,13 +246,21 @@ def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
 
 
 def _described(name: str, sample: Sample) -> dict[str, Any]:
-    """Describe a sample by columns that begin with a name: n, mean and std with their intervals, and median."""
+    """Describe a sample by columns that begin with a name: n, mean and std with their intervals,
+    and median.
+    """
     values = sample.tolist()
     row = mean_of(values).columns(f"{name}_mean") | std_of(values).columns(f"{name}_std")
-    return {f"{name}_n": len(values), **row, f"{name}_median": float(np.median(sample)) if values else None}
+    return {
+        f"{name}_n": len(values),
+        **row,
+        f"{name}_median": float(np.median(sample)) if values else None,
+    }
 
 
-def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Generators) -> dict[str, Any]:
+def _cell(
+    metric: str, manager: str, samples: Sequence[Sample], generators: _Generators
+) -> dict[str, Any]:
     """Compare the real and the simulated sample of a manager."""
     real, ours = samples
     from scipy.stats import ks_2samp  # with ties its p is too high
@@ -224,12 +280,19 @@ def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Gen
 
 
 def _pair(
-    one: tuple[str, str], other: tuple[str, str], samples: Sequence[Sequence[Sample]], generators: _Generators
+    one: tuple[str, str],
+    other: tuple[str, str],
+    samples: Sequence[Sequence[Sample]],
+    generators: _Generators,
 ) -> dict[str, Any]:
-    """Compare two managers in a metric (metric, manager), each with its real and its simulated sample."""
+    """Compare two managers in a metric (metric, manager), each with its real and its simulated
+    sample.
+    """
     metric, pair = one[0], (one[1], other[1])
     (real, ours), (other_real, other_ours) = samples
-    test = statistics.mann_whitney(real, other_real, "asymptotic")  # as the subsamples below are tested
+    test = statistics.mann_whitney(
+        real, other_real, "asymptotic"
+    )  # as the subsamples below are tested
     sign = statistics.sign_of(test["p_less"], test["p_greater"])
     is_less_better = METRICS[metric].better < 0  # as the exemplar's own one-sided tests have it
     sizes = len(real), len(other_real)
@@ -249,12 +312,23 @@ def _pair(
 
 
 def compare_shares(
-    shares: Sequence[Share], published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
+    shares: Sequence[Share],
+    published: pandas.DataFrame,
+    simulated: pandas.DataFrame,
+    managers: Sequence[str],
 ) -> pandas.DataFrame:
-    """Count shares, and that of missions that found the pipeline, where known: columns of validation_shares.csv."""
+    """Count shares, and that of missions that found the pipeline, where known: columns of
+    validation_shares.csv.
+    """
     sides = published, simulated
-    known, where = Region({"pipeline_found": ((0.0, 1.0),)}), Region({"pipeline_found": ((1.0, 1.0),)})
-    found = [Share(manager=manager, name="pipeline found", among=known, where=where) for manager in managers]
+    known, where = (
+        Region({"pipeline_found": ((0.0, 1.0),)}),
+        Region({"pipeline_found": ((1.0, 1.0),)}),
+    )
+    found = [
+        Share(manager=manager, name="pipeline found", among=known, where=where)
+        for manager in managers
+    ]
     rows = []
     for share in (*(each for each in shares if each.manager in managers), *found):
         counts = [count(share, side) for side in sides]
@@ -272,8 +346,11 @@ def compare_shares(
 # Conditions
 
 
-def balanced(real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]) -> pandas.DataFrame:
-    """Leave out simulated missions so that each manager has them in the real missions' proportions of conditions.
+def balanced(
+    real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
+) -> pandas.DataFrame:
+    """Leave out simulated missions so that each manager has them in the real missions' proportions
+    of conditions.
 
     Raises:
         InputError: a manager has real missions under a condition, and no simulated one.
@@ -289,14 +366,21 @@ def balanced(real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequ
         factor = float((counts / theirs).min())
         factor = math.floor(factor) or factor  # fewer simulated than real ones: as nearly as can be
         wanted = (factor * theirs // 1.0).clip(lower=1.0)
-        kept.append(ours[ours.groupby(CONDITION).cumcount() < ours[CONDITION].map(wanted).fillna(0)])
+        kept.append(
+            ours[ours.groupby(CONDITION).cumcount() < ours[CONDITION].map(wanted).fillna(0)]
+        )
     return pandas.concat(kept)
 
 
 def compare_conditions(
-    real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str], metrics: Sequence[str]
+    real: pandas.DataFrame,
+    simulated: pandas.DataFrame,
+    managers: Sequence[str],
+    metrics: Sequence[str],
 ) -> pandas.DataFrame:
-    """Compare missions condition by condition: columns of validation_conditions.csv; empty without conditions."""
+    """Compare missions condition by condition: columns of validation_conditions.csv; empty without
+    conditions.
+    """
     if CONDITION not in real or CONDITION not in simulated:
         return pandas.DataFrame()
     parts = []
@@ -305,7 +389,11 @@ def compare_conditions(
         for name, side in (("real", real), ("simulated", simulated)):
             by = side[side[metric].notna()].groupby(["manager", CONDITION], observed=True)[metric]
             statistics_of = by.agg(["count", "mean", "std", "median"])
-            sides.append(statistics_of.set_axis([f"{name}_{each}" for each in ("n", "mean", "std", "median")], axis=1))
+            sides.append(
+                statistics_of.set_axis(
+                    [f"{name}_{each}" for each in ("n", "mean", "std", "median")], axis=1
+                )
+            )
         both = pandas.concat(sides, axis=1, join="inner").sort_index().reset_index()
         both.insert(1, "metric", metric)
         parts += [both[both["manager"] == manager] for manager in managers]
@@ -314,17 +402,23 @@ def compare_conditions(
 
 
 def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
-    """Summarise a comparison condition by condition: for each metric and manager, and for "all" of them.
+    """Summarise a comparison condition by condition: for each metric and manager, and for "all" of
+    them.
 
-    Rows have the number of `conditions`, and medians over these: `difference` (|simulated - real median|), `real_std`
-    and `simulated_std` (within a condition), and their ratio `std_ratio`, simulated / real; nan for what is not known.
+    Rows have the number of `conditions`, and medians over these: `difference` (|simulated - real
+    median|), `real_std` and `simulated_std` (within a condition), and their ratio `std_ratio`,
+    simulated / real; nan for what is not known.
     """
     rows = []
     for metric, of_metric in compared.groupby("metric", sort=False) if len(compared) else ():
         for manager, own in [*of_metric.groupby("manager", sort=False), ("all", of_metric)]:
             real, ours = own[["real_std", "simulated_std"]].astype(float).dropna().median().tolist()
             row = {"manager": manager, "metric": metric, "conditions": len(own)}
-            row |= {"difference": own["difference_of_medians"].abs().median(), "real_std": real, "simulated_std": ours}
+            row |= {
+                "difference": own["difference_of_medians"].abs().median(),
+                "real_std": real,
+                "simulated_std": ours,
+            }
             rows.append({**row, "std_ratio": ours / real if real else math.nan})
     return pandas.DataFrame(rows)
 
@@ -341,9 +435,9 @@ def _targets(
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the requirements, with the columns of _TARGET.
 
-    The mean lies in the 95% t interval of the published one, the std in its chi-square interval; the KS p is 0.05 or
-    more; at least half the subsamples as large as the published samples lead to the published conclusion; shares and
-    figures over conditions are within the limits of a file.
+    The mean lies in the 95% t interval of the published one, the std in its chi-square interval;
+    the KS p is 0.05 or more; at least half the subsamples as large as the published samples lead to
+    the published conclusion; shares and figures over conditions are within the limits of a file.
     """
     for each in cells.to_dict("records"):
         for kind in ("mean", "std"):
@@ -356,11 +450,20 @@ def _targets(
         yield "conclusion", pair, each["metric"], each["agreement"], _LEAST_AGREEMENT, None
     for each in shares.to_dict("records"):
         if (low := each["target_low"]) == low:
-            yield "share", each["manager"], each["name"], each["simulated_share"], low, each["target_high"]
+            yield (
+                "share",
+                each["manager"],
+                each["name"],
+                each["simulated_share"],
+                low,
+                each["target_high"],
+            )
     for each in within.to_dict("records"):
         if each["manager"] == "all" and (limit := limits.get(each["metric"])) is not None:
             most = (limit.median_difference, limit.std_ratio)
-            for kind, name, high in zip(("median", "std"), ("difference", "std_ratio"), most, strict=True):
+            for kind, name, high in zip(
+                ("median", "std"), ("difference", "std_ratio"), most, strict=True
+            ):
                 if high is not None:
                     yield f"condition_{kind}", "all", each["metric"], each[name], None, high
 
@@ -377,7 +480,9 @@ _KINDS = {
 
 
 class _Cells(Formatter):
-    """Writes values of a row into a template: nothing for a missing one; the styles "p" and "share" are our own."""
+    """Writes values of a row into a template: nothing for a missing one; the styles "p" and "share"
+    are our own.
+    """
 
     def format_field(self, value: Any, style: str) -> str:
         """Write a value."""
@@ -392,7 +497,9 @@ _CELLS = _Cells()
 
 
 def _table(frame: pandas.DataFrame, title: str, align: str, *columns: tuple[str, str]) -> Table:
-    """Fill a table with the rows of a frame; each column has a heading and a template for its cells."""
+    """Fill a table with the rows of a frame; each column has a heading and a template for its
+    cells.
+    """
     rows = []
     for row in rows_of(frame):
         values = {"of": METRICS.get(row.get("metric", "")), **row}
@@ -410,20 +517,28 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
     runs = "real runs" if real == "real" else real
     head = ("metric", "{of.brief}"), ("manager", "{manager}")
     numbers = [
-        [(name, f"{{{side}_{name}:{'.0f' if name == 'n' else '.2f'}}}") for name in ("n", "mean", "std", "median")]
+        [
+            (name, f"{{{side}_{name}:{'.0f' if name == 'n' else '.2f'}}}")
+            for name in ("n", "mean", "std", "median")
+        ]
         for side in ("published", "simulated")
     ]
     title = f"Samples: {runs}, then simulated"
     yield _table(validation.cells, title, "ll", *head, *numbers[0], *numbers[1])
     title = f"Simulated compared with {runs} (difference = simulated - {real})"
-    apart = ("difference of means", "{difference_of_means:+.2f}"), _interval("difference_of_means", "+.1f")
+    apart = (
+        ("difference of means", "{difference_of_means:+.2f}"),
+        _interval("difference_of_means", "+.1f"),
+    )
     ratio = ("std ratio", "{std_ratio:.2f}"), _interval("std_ratio", ".2f")
     tests = ("KS p", "{ks_p:p}"), ("AD p", "{ad_p:p}")
     yield _table(validation.cells, title, "ll", *head, *apart, *ratio, *tests)
     title = f"Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size"
     pair = head[0], ("first, second", "{first}, {second}"), (real, "{published_superiority:.2f}")
     better = (f"{real}: better", "{published_better}"), ("simulated agrees", "{agreement:share}")
-    yield _table(validation.pairs, title, "ll", *pair, ("simulated", "{simulated_superiority:.2f}"), *better)
+    yield _table(
+        validation.pairs, title, "ll", *pair, ("simulated", "{simulated_superiority:.2f}"), *better
+    )
     title = f"Shares of missions (* the simulated one is outside the {real} one's 95% interval)"
     shares = validation.shares
     if len(shares):
@@ -434,7 +549,11 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
     simulated = ("simulated", "{simulated_share:share}"), ("", "{mark}")
     interval = _interval("published_share", ".0%")
     yield _table(shares, title, "llrrrl", head[1], ("share", "{name}"), count, interval, *simulated)
-    stds = (f"std: {real}", "{real_std:.2f}"), ("simulated", "{simulated_std:.2f}"), ("ratio", "{std_ratio:.2f}")
+    stds = (
+        (f"std: {real}", "{real_std:.2f}"),
+        ("simulated", "{simulated_std:.2f}"),
+        ("ratio", "{std_ratio:.2f}"),
+    )
     off, within = ("|difference|", "{difference:.2f}"), over_conditions(validation.conditions)
     yield _table(within, "Within conditions: medians over the conditions", "ll", *head, off, *stds)
     rows = [_target(each) for each in rows_of(validation.targets)]
@@ -443,10 +562,22 @@ def _tables(validation: Validation, real: str) -> Iterator[Table]:
 
 def _target(each: Row) -> tuple[str, ...]:
     kind = each["kind"]
-    what = each["what"] if kind == "share" else f"{METRICS[each['what']].brief}: {_KINDS.get(kind, kind)}"
+    what = (
+        each["what"]
+        if kind == "share"
+        else f"{METRICS[each['what']].brief}: {_KINDS.get(kind, kind)}"
+    )
     style = ".0%" if kind in ("conclusion", "share") else ".2f"
     value, low, high = (_CELLS.format_field(each[name], style) for name in ("value", "low", "high"))
-    must_be = f"{low} to {high}" if low and high else f"at least {low}" if low else f"at most {high}" if high else ""
+    must_be = (
+        f"{low} to {high}"
+        if low and high
+        else f"at least {low}"
+        if low
+        else f"at most {high}"
+        if high
+        else ""
+    )
     return each["subject"], what, value, must_be, _VERDICTS[each["met"]]
 
 
@@ -464,9 +595,10 @@ class PaperComparison:
     """The paper's table beside ours, from the missions published and ours.
 
     Attributes:
-        figures: a row for each manager, in the order of the paper's table, metric, and statistic ("mean" or "std"): the
-            paper's figure (paper) and ours (here), each with the ends of its 95% interval, and difference (here -
-            paper); nan where there are too few missions; mark: whether ours is outside the paper's interval.
+        figures: a row for each manager, in the order of the paper's table, metric, and statistic
+            ("mean" or "std"): the paper's figure (paper) and ours (here), each with the ends of its
+            95% interval, and difference (here - paper); nan where there are too few missions; mark:
+            whether ours is outside the paper's interval.
     """
 
     figures: pandas.DataFrame
@@ -511,12 +643,18 @@ class PaperComparison:
         return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
 
     def _claim(self, metric: str, claim: str) -> Iterator[str]:
-        samples = {name: each for name in self.managers if len(each := sample(self.ours, name, metric))}
+        samples = {
+            name: each for name in self.managers if len(each := sample(self.ours, name, metric))
+        }
         best = samples.pop("metacontrol", None)
         if best is None or not samples:
             return
-        apart = {name: statistics.difference_interval(best, other) for name, other in samples.items()}
-        chance = [name for name, each in apart.items() if not each.has_interval or each.contains(0.0)]
+        apart = {
+            name: statistics.difference_interval(best, other) for name, other in samples.items()
+        }
+        chance = [
+            name for name, each in apart.items() if not each.has_interval or each.contains(0.0)
+        ]
         rest = f"; the difference from {' and '.join(chance)} could be chance" if chance else ""
         if all(METRICS[metric].better * each.value > 0.0 for each in apart.values()):
             verb, _, what = claim.partition(" ")
@@ -535,7 +673,8 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
 
     Args:
         runs: with the columns of runs.csv.
-        published: file of the published runs; managers that are not in it are left out. None: the shipped one.
+        published: file of the published runs; managers that are not in it are left out. None: the
+            shipped one.
 
     Raises:
         InputError: the file cannot be read, or has fewer than two runs of a manager.
@@ -544,7 +683,9 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
     rows = []
     for manager, metric in product(theirs["manager"].unique(), PAPER_METRICS):
         for statistic, estimate in (("mean", mean_of), ("std", std_of)):
-            paper, here = (estimate(sample(side, manager, metric).tolist()) for side in (theirs, runs))
+            paper, here = (
+                estimate(sample(side, manager, metric).tolist()) for side in (theirs, runs)
+            )
             if not paper.has_interval:
                 problem = f"fewer than two published runs of {manager}"
                 raise InputError(problem, place=metric, remedy="an interval needs two or more")
@@ -553,5 +694,7 @@ def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) ->
     figures = pandas.DataFrame(rows)
     ours = figures["here"].astype(float)
     is_outside = (ours < figures["paper_ci95_low"]) | (ours > figures["paper_ci95_high"])
-    figures = figures.assign(difference=ours - figures["paper"], mark=np.where(is_outside, MARK, ""))
+    figures = figures.assign(
+        difference=ours - figures["paper"], mark=np.where(is_outside, MARK, "")
+    )
     return PaperComparison(figures, theirs, runs)

@@ -13,7 +13,14 @@ from suave_des.errors import InputError, did_you_mean, shown, unknown
 from suave_des.resources import hashes, shown_name
 from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
-from suave_des.scenario.yamlfile import Layer, Location, find_named, read_input, scenario_layer, validated
+from suave_des.scenario.yamlfile import (
+    Layer,
+    Location,
+    find_named,
+    read_input,
+    scenario_layer,
+    validated,
+)
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,8 @@ class LoadedScenario:
     def manager_file(self, manager: str, name: str) -> Path:
         """Where a file is that a manager reads, by its name as given.
 
-        It is looked for where the command is given; if the scenario has settings for the manager, beside that first.
+        It is looked for where the command is given; if the scenario has settings for the manager,
+        beside that first.
 
         Raises:
             InputError: there is none.
@@ -63,11 +71,15 @@ class LoadedScenario:
         if found := next((place for place in places if place.is_file()), None):
             return found
         problem = f"manager {manager} reads this file, and it is not there"
-        raise InputError(problem, file=name, remedy="give its path from here, or from the scenario that names it")
+        raise InputError(
+            problem, file=name, remedy="give its path from here, or from the scenario that names it"
+        )
 
 
 class Replacements(TypedDict, total=False):
-    """Replacements of a scenario's own files and settings, and additions to them, as `load_scenario` describes them."""
+    """Replacements of a scenario's own files and settings, and additions to them, as
+    `load_scenario` describes them.
+    """
 
     ontologies: Sequence[str | Path]
     modes_file: str | Path | None
@@ -80,7 +92,10 @@ class Replacements(TypedDict, total=False):
 
 @plain_arguments
 def load_scenario(
-    name: str | Path | LoadedScenario, *, over: Layer | None = None, **replacements: Unpack[Replacements]
+    name: str | Path | LoadedScenario,
+    *,
+    over: Layer | None = None,
+    **replacements: Unpack[Replacements],
 ) -> LoadedScenario:
     """Read and check a scenario and the files that it names.
 
@@ -89,24 +104,29 @@ def load_scenario(
         loaded = load_scenario("seams2023", reasoner="pellet")
 
     Args:
-        name: path of a scenario file, or name of a shipped one with or without ".yaml"; a loaded scenario comes back
-            unchanged, and its files cannot be replaced.
+        name: path of a scenario file, or name of a shipped one with or without ".yaml"; a loaded
+            scenario comes back unchanged, and its files cannot be replaced.
         over: content that goes over the file's, as that of a file of which it is the base.
-        replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
-            text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path, as of
-            with_values, and manager_options (settings by manager and key) over all that.
+        replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules
+            (files of rules as text) and disabled_rules (names of rules to switch off) besides the
+            scenario's; values by key path, as of with_values, and manager_options (settings by
+            manager and key) over all that.
 
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.
     """
     if isinstance(name, LoadedScenario):
         if given := [each for each, value in replacements.items() if value]:
-            problem = f"{given[0]}: the scenario {name.scenario.name} is loaded already, with its files"
+            problem = (
+                f"{given[0]}: the scenario {name.scenario.name} is loaded already, with its files"
+            )
             raise InputError(problem, remedy=f"give {given[0]} to load_scenario")
         return name
     reasoner, modes_file = replacements.get("reasoner"), replacements.get("modes_file")
     if reasoner is not None and reasoner not in REASONERS:
-        raise unknown(f"there is no reasoner {shown(reasoner)}", reasoner, REASONERS, place="--reasoner")
+        raise unknown(
+            f"there is no reasoner {shown(reasoner)}", reasoner, REASONERS, place="--reasoner"
+        )
     inputs: dict[str, str] = {}
     layer = scenario_layer(inputs, name, over)
     scenario = validated(layer, Scenario)
@@ -118,7 +138,10 @@ def load_scenario(
 
     def in_scenario(key: str, remedy: str | None = None) -> list[Path]:
         names = enumerate(getattr(knowledge, key))
-        return [find_named(each, "ontology", layer, ("knowledge", key, index), remedy) for index, each in names]
+        return [
+            find_named(each, "ontology", layer, ("knowledge", key, index), remedy)
+            for index, each in names
+        ]
 
     replaced = [find_named(each, "ontology") for each in replacements.get("ontologies", ())]
     ontologies = tuple(replaced or in_scenario("ontologies"))
@@ -129,7 +152,9 @@ def load_scenario(
     remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):
-            path = find_named(signal.file, "scenarios", layer, ("signals", signal_name, "file"), remedy)
+            path = find_named(
+                signal.file, "scenarios", layer, ("signals", signal_name, "file"), remedy
+            )
             tables[signal_name], inputs[shown_name(path)] = read_table(path)
 
     changed = {
@@ -138,13 +163,20 @@ def load_scenario(
         "disabled_rules": (*knowledge.disabled_rules, *replacements.get("disabled_rules", ())),
         "reasoner": reasoner or knowledge.reasoner,
     }
-    update = {"knowledge": knowledge.model_copy(update=changed), "modes_file": str(modes_file or scenario.modes_file)}
+    update = {
+        "knowledge": knowledge.model_copy(update=changed),
+        "modes_file": str(modes_file or scenario.modes_file),
+    }
     scenario = scenario.model_copy(update=update)
-    loaded = LoadedScenario(scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, (*rules,))
+    loaded = LoadedScenario(
+        scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, (*rules,)
+    )
     loaded = _set(loaded, replacements.get("values") or {}, "--set")
     if options := replacements.get("manager_options"):
         managers = loaded.scenario.managers.model_dump(mode="json")
-        managers |= {name: {**managers.get(name, {}), **settings} for name, settings in options.items()}
+        managers |= {
+            name: {**managers.get(name, {}), **settings} for name, settings in options.items()
+        }
         loaded = _set(loaded, {"managers": managers}, "--manager-option")
     return loaded
 
@@ -169,9 +201,10 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
 
     Args:
         loaded: is left as it is.
-        values: new values by key path, such as "signals.water_visibility.period_s" or "thruster_events.0.time_s"; the
-            path of a distribution's own parameter ("calibration.altitude_error_m.mean") works where the scenario has
-            one, and a whole distribution (a mapping) may stand for a number.
+        values: new values by key path, such as "signals.water_visibility.period_s" or
+            "thruster_events.0.time_s"; the path of a distribution's own parameter
+            ("calibration.altitude_error_m.mean") works where the scenario has one, and a whole
+            distribution (a mapping) may stand for a number.
 
     Raises:
         InputError: a path leads nowhere, or a value is not allowed there or names another file.
@@ -190,12 +223,16 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
 
 
 def _named_files(scenario: Scenario) -> tuple[object, ...]:
-    tables = tuple((name, getattr(signal, "file", None)) for name, signal in sorted(scenario.signals.items()))
+    tables = tuple(
+        (name, getattr(signal, "file", None)) for name, signal in sorted(scenario.signals.items())
+    )
     return scenario.knowledge.ontologies, scenario.knowledge.rules, scenario.modes_file, tables
 
 
 def value_at(loaded: LoadedScenario, path: str) -> Any:
-    """Return the value at a key path, as plain data; it is an InputError if the path leads nowhere."""
+    """Return the value at a key path, as plain data; it is an InputError if the path leads
+    nowhere.
+    """
     holder, key = holder_of(loaded.scenario.model_dump(mode="json"), path)
     return holder[key]
 
@@ -204,14 +241,22 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
 
 
 def full_path(data: Mapping[str, Any], path: str) -> str:
-    """Return a key path of a scenario in full: a signal needs no `signals.`, and visibility is water_visibility."""
+    """Return a key path of a scenario in full: a signal needs no `signals.`, and visibility is
+    water_visibility.
+    """
     first, *rest = path.split(".")
     signal = WATER_VISIBILITY if first == "visibility" else first
-    return ".".join(("signals", signal, *rest)) if first not in data and signal in data.get("signals", ()) else path
+    return (
+        ".".join(("signals", signal, *rest))
+        if first not in data and signal in data.get("signals", ())
+        else path
+    )
 
 
 def _keys(data: dict[str, Any], path: str) -> list[str]:
-    """The keys of a key path; names of managers may contain dots, and their settings may be missing."""
+    """The keys of a key path; names of managers may contain dots, and their settings may be
+    missing.
+    """
     path = full_path(data, path)
     first, _, rest = path.partition(".")
     if first != "managers" or ":" not in rest:
@@ -229,17 +274,30 @@ def _keys(data: dict[str, Any], path: str) -> list[str]:
 
 
 def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
-    """The mapping or list with the value at a key path of plain data, and its key; an InputError if there is none."""
+    """The mapping or list with the value at a key path of plain data, and its key; an InputError if
+    there is none.
+    """
     here, parts = data, _keys(data, path)
     for depth, part in enumerate(parts):
         if isinstance(here, list):
             if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):
-                raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
+                raise InputError(
+                    f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}"
+                )
         elif not isinstance(here, dict):
-            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")
+            raise InputError(
+                f"{path}: {'.'.join(parts[:depth])} is a plain value",
+                remedy="leave out what follows it",
+            )
         elif part not in here:
-            named = (*here, "visibility", *here["signals"]) if here is data and "signals" in here else here
-            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, named))))
+            named = (
+                (*here, "visibility", *here["signals"])
+                if here is data and "signals" in here
+                else here
+            )
+            raise InputError(
+                f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, named)))
+            )
         holder, key = here, int(part) if isinstance(here, list) else part
         here = here[key]
     return holder, key

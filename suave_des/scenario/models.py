@@ -1,10 +1,12 @@
-"""The validated description of a mission: everything that determines its result except manager, run and seed.
+"""The validated description of a mission: everything that determines its result except manager, run
+and seed.
 
-Values of vehicles and of the exemplar's revisions, with their sources: scenarios/vehicles, scenarios/revisions.
+Values of vehicles and of the exemplar's revisions, with their sources: scenarios/vehicles,
+scenarios/revisions.
 
-Bounds are generous; a value beyond them can only be a slip, or in a different unit: 10 km around the origin where the
-pipeline is 60 m away, a current three times that of the strongest tides, a heading of once round either way, so that
-degrees are noticed.
+Bounds are generous; a value beyond them can only be a slip, or in a different unit: 10 km around
+the origin where the pipeline is 60 m away, a current three times that of the strongest tides, a
+heading of once round either way, so that degrees are noticed.
 """
 
 from __future__ import annotations
@@ -36,21 +38,31 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from suave_des import domain
-from suave_des.domain import BATTERY_LEVEL, FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, SURFACE, WATER_VISIBILITY
+from suave_des.domain import (
+    BATTERY_LEVEL,
+    FOLLOW_PIPELINE,
+    GENERATE_SEARCH_PATH,
+    SURFACE,
+    WATER_VISIBILITY,
+)
 from suave_des.errors import did_you_mean, line_error, shown
 from suave_des.files import read_csv
 
 # Numbers with bounds, and distributions that may replace them.
 
 LARGEST = 1e12
-"""Greatest magnitude of a number without bounds of its own, such as a measured value in a unit of the user's."""
+"""Greatest magnitude of a number without bounds of its own, such as a measured value in a unit of
+the user's.
+"""
 LONGEST_S = 1e9
 """Longest time: 31 years, in other words never."""
 FARTHEST_M = 10_000.0
 
 
 class Strict(BaseModel):
-    """Base of every part of a scenario: unknown keys and infinite numbers are errors, values never change."""
+    """Base of every part of a scenario: unknown keys and infinite numbers are errors, values never
+    change.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -58,12 +70,16 @@ class Strict(BaseModel):
 def wrong(problem: str, remedy: str, *keys: str) -> PydanticCustomError:
     """A validation error with its remedy; `keys` are those below that do not fit together."""
     return PydanticCustomError(
-        "wrong", "{problem} ({remedy})", {"problem": problem, "remedy": remedy, "keys": " ".join(keys)}
+        "wrong",
+        "{problem} ({remedy})",
+        {"problem": problem, "remedy": remedy, "keys": " ".join(keys)},
     )
 
 
 def ordered(low: float, high: float, low_key: str = "minimum", high_key: str = "maximum") -> None:
-    """Raise an error, in the words of the keys, if the lower of two bounds is above the other one."""
+    """Raise an error, in the words of the keys, if the lower of two bounds is above the other
+    one.
+    """
     if low > high:
         problem = f"{low_key} {low:g} is above {high_key} {high:g}"
         raise wrong(problem, f"give the smaller one as {low_key}", low_key, high_key)
@@ -77,11 +93,13 @@ def in_order(interval: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Within:
-    """Bounds of a number or of what a distribution in its place states; its spread is at most their distance.
+    """Bounds of a number or of what a distribution in its place states; its spread is at most their
+    distance.
 
     Attributes:
         is_floor: whether a distribution must not be able to give values below `ge` either.
-        draws_are_cut: whether values that are drawn below `ge` count as `ge`, so that they may be stated.
+        draws_are_cut: whether values that are drawn below `ge` count as `ge`, so that they may be
+            stated.
     """
 
     ge: float
@@ -89,11 +107,15 @@ class Within:
     is_floor: bool = False
     draws_are_cut: bool = False
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         """Check what the type's own checks have passed."""
         return core_schema.no_info_after_validator_function(self._check, handler(source))
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
         """Bounds of a plain number; JSON Schema does not apply them to mappings."""
         return {**handler(schema), "minimum": self.ge, "maximum": self.le}
 
@@ -101,15 +123,26 @@ class Within:
         low, high = self.ge, self.le
         for key, part in _stated(value):
             # A normal distribution that is cut at the floor may have its mean below.
-            least = -high if key and (self.draws_are_cut or (self.is_floor and key == "mean")) else low
+            least = (
+                -high if key and (self.draws_are_cut or (self.is_floor and key == "mean")) else low
+            )
             if not least <= part <= high:
-                raise wrong(f"{part:.12g} is out of range", f"must be at least {low:.12g} and at most {high:.12g}", key)
+                raise wrong(
+                    f"{part:.12g} is out of range",
+                    f"must be at least {low:.12g} and at most {high:.12g}",
+                    key,
+                )
         if isinstance(value, Normal) and value.std > high - low:
             raise wrong(f"{value.std:g} is out of range", f"must be at most {high - low:g}", "std")
         if self.is_floor and support(value)[0] < low:
-            raise wrong(f"values below {low:g} can be drawn", f"give a minimum that is at least {low:g}")
+            raise wrong(
+                f"values below {low:g} can be drawn", f"give a minimum that is at least {low:g}"
+            )
         if self.draws_are_cut and support(value)[1] < low:
-            raise wrong(f"only values below {low:g} can be drawn", f"give a greatest value that is at least {low:g}")
+            raise wrong(
+                f"only values below {low:g} can be drawn",
+                f"give a greatest value that is at least {low:g}",
+            )
         return value
 
 
@@ -123,14 +156,18 @@ Coordinate = Annotated[Real, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Length = Annotated[Real, Field(gt=0, le=FARTHEST_M)]
 Duration = Annotated[Real, Field(gt=0, le=LONGEST_S)]
 Period = Annotated[Real, Field(ge=0.001, le=LONGEST_S)]
-"""Period of something that happens in mission time; the lower limit keeps a slip from stopping the clock."""
+"""Period of something that happens in mission time; the lower limit keeps a slip from stopping the
+clock.
+"""
 
 
 class Drawn(Strict):
     """Base of distributions."""
 
     shared: Name | None = None
-    """Name of a draw that several keys share: distributions of the same kind and width are then shifted alike."""
+    """Name of a draw that several keys share: distributions of the same kind and width are then
+    shifted alike.
+    """
 
 
 class Normal(Drawn):
@@ -158,9 +195,13 @@ class Normal(Drawn):
         low, high = self.interval
         ordered(low, high)
         likely = NormalDist(self.mean, self.std or 1e-300)
-        if likely.cdf(high) - likely.cdf(low) < 0.001 and not (self.std == 0 and low <= self.mean <= high):
+        if likely.cdf(high) - likely.cdf(low) < 0.001 and not (
+            self.std == 0 and low <= self.mean <= high
+        ):
             problem = f"[{low:g}, {high:g}] leaves next to nothing of the distribution"
-            raise wrong(problem, "move or widen it, or use distribution: uniform", "minimum", "maximum")
+            raise wrong(
+                problem, "move or widen it, or use distribution: uniform", "minimum", "maximum"
+            )
         return self
 
     def draw(self, stream: random.Random) -> float:
@@ -259,7 +300,9 @@ ValueDistribution = Annotated[Distribution, Within(-LARGEST, LARGEST)]
 
 
 def draw(distribution: AnyDistribution, stream: random.Random) -> float:
-    """One value of a distribution; a plain number is its own value and draws nothing from the stream."""
+    """One value of a distribution; a plain number is its own value and draws nothing from the
+    stream.
+    """
     return distribution if isinstance(distribution, float | int) else distribution.draw(stream)
 
 
@@ -271,7 +314,9 @@ def mean(distribution: AnyDistribution) -> float:
 
 
 def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
-    """The values that a scenario states for a distribution, with their keys: itself, its mean, bounds, choices."""
+    """The values that a scenario states for a distribution, with their keys: itself, its mean,
+    bounds, choices.
+    """
     match distribution:
         case Normal(mean=middle, minimum=low, maximum=high):
             stated = (("mean", middle), ("minimum", low), ("maximum", high))
@@ -287,14 +332,19 @@ def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
 
 
 def support(distribution: AnyDistribution) -> tuple[float, float]:
-    """Smallest and greatest value that a distribution can give, infinite where nothing limits it."""
+    """Smallest and greatest value that a distribution can give, infinite where nothing limits
+    it.
+    """
     match distribution:
         case Normal(std=0):
             return distribution.mean, distribution.mean
         case Normal():
             return distribution.interval
         case Exponential():
-            return distribution.minimum, distribution.minimum if distribution.mean == 0 else math.inf
+            return (
+                distribution.minimum,
+                distribution.minimum if distribution.mean == 0 else math.inf,
+            )
         case _:
             values = [value for _, value in _stated(distribution)]
             return min(values), max(values)
@@ -316,10 +366,14 @@ class Monitor(Strict):
 
     @field_validator("outages_s", mode="after")
     @classmethod
-    def _are_in_order(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    def _are_in_order(
+        cls, value: tuple[tuple[float, float], ...]
+    ) -> tuple[tuple[float, float], ...]:
         for since_s, to_s in value:
             if since_s > to_s:
-                raise wrong(f"the outage [{since_s:g}, {to_s:g}] ends before it begins", "give [from, to]")
+                raise wrong(
+                    f"the outage [{since_s:g}, {to_s:g}] ends before it begins", "give [from, to]"
+                )
         return value
 
     @property
@@ -340,7 +394,8 @@ class _Signal(Monitor):
 class SinusoidSignal(_Signal):
     """A cosine that starts at its maximum.
 
-    a cos(2 pi (t + shift) / period) + a + minimum, with a = (maximum - minimum) / 2, as in the exemplar.
+    a cos(2 pi (t + shift) / period) + a + minimum, with a = (maximum - minimum) / 2, as in the
+    exemplar.
     """
 
     kind: Literal["sinusoid"]
@@ -393,14 +448,18 @@ class TableSignal(_Signal):
     """Between two rows: the earlier row's value, or a straight line."""
 
 
-SignalDescription = Annotated[SinusoidSignal | ConstantSignal | StepSignal | TableSignal, Field(discriminator="kind")]
+SignalDescription = Annotated[
+    SinusoidSignal | ConstantSignal | StepSignal | TableSignal, Field(discriminator="kind")
+]
 
 
 class Camera(Strict):
     """The camera, which looks straight down."""
 
     field_of_view_deg: Annotated[Real, Field(gt=0, lt=180)]
-    """Full angle of view in x and y; it also determines the spacing of the search spiral's turns."""
+    """Full angle of view in x and y; it also determines the spacing of the search spiral's
+    turns.
+    """
 
     @property
     def tangent(self) -> float:
@@ -441,7 +500,9 @@ class VehicleDescription(Strict):
     centre_of_buoyancy_m: Coordinate
     """Height above the centre of mass at which buoyancy acts."""
     quadratic_drag: tuple[Positive, Positive, Positive, Positive, Positive, Positive]
-    """Coefficients c of the drag -c |v| v: surge, sway, heave (N s^2/m^2), roll, pitch, yaw (N m s^2)."""
+    """Coefficients c of the drag -c |v| v: surge, sway, heave (N s^2/m^2), roll, pitch, yaw (N m
+    s^2).
+    """
     thrust_limit_n: Positive
     """Greatest thrust of each thruster, in both directions."""
     thrusters: Annotated[tuple[ThrusterDescription, ...], Field(min_length=6, max_length=6)]
@@ -451,7 +512,9 @@ class VehicleDescription(Strict):
 
 
 class CurrentWaveDescription(Strict):
-    """A current whose speed oscillates: mean + amplitude sin(2 pi (t + shift) / period), in one direction."""
+    """A current whose speed oscillates: mean + amplitude sin(2 pi (t + shift) / period), in one
+    direction.
+    """
 
     mean_m_per_s: CurrentDistribution = 0.0
     """Mean speed."""
@@ -466,7 +529,9 @@ class CurrentWaveDescription(Strict):
 
 
 class Current(Strict):
-    """Velocity of the water in the world frame: a constant part, drawn once per run, and one that varies over time."""
+    """Velocity of the water in the world frame: a constant part, drawn once per run, and one that
+    varies over time.
+    """
 
     x_m_per_s: CurrentDistribution = 0.0
     """Towards east."""
@@ -486,7 +551,9 @@ class Leak(Strict):
 
 
 class Start(Strict):
-    """Where the vehicle is placed, in the world frame (x east, y north, z up; the sea bed is the plane z = -20)."""
+    """Where the vehicle is placed, in the world frame (x east, y north, z up; the sea bed is the
+    plane z = -20).
+    """
 
     x_m: CoordinateDistribution = -17.0
     """East."""
@@ -521,7 +588,9 @@ _EVENT_TEXT = re.compile(rf"\(\s*([0-9]{{1,9}})\s*,\s*(\w+)\s*,\s*({_TIME})\s*\)
 
 
 class ThrusterEvent(Strict):
-    """A failure or recovery of one thruster; also given as the exemplar writes it: "(1,failure,35)"."""
+    """A failure or recovery of one thruster; also given as the exemplar writes it:
+    "(1,failure,35)".
+    """
 
     thruster: Annotated[int, Field(strict=True, ge=1, le=len(domain.THRUSTER_NAMES))]
     """1 to 4: front right, front left, rear right, rear left; 5 and 6: vertical, right and left."""
@@ -582,8 +651,8 @@ def read_table(path: Path) -> tuple[SignalTable, str]:
     """Read the CSV file of a table signal: its times and values, and the SHA-256 of the file.
 
     Raises:
-        InputError: with file and line: another header, a value that is not a finite number, times that do not
-            increase, no row.
+        InputError: with file and line: another header, a value that is not a finite number, times
+            that do not increase, no row.
     """
     remedy = f"write lines of two numbers, under the first line {','.join(_LARGEST)}"
     header, rows, digest = read_csv(path, _SIZE_LIMIT_BYTES, remedy)
@@ -594,13 +663,22 @@ def read_table(path: Path) -> tuple[SignalTable, str]:
         try:
             cells = dict(zip(header, map(float, row), strict=True))
         except ValueError:
-            raise line_error(path, line, f"{shown(','.join(row))} is not two numbers", remedy) from None
+            raise line_error(
+                path, line, f"{shown(','.join(row))} is not two numbers", remedy
+            ) from None
         for column, largest in _LARGEST.items():
             if not abs(cells[column]) <= largest:  # or nan
                 problem = f"{column} {cells[column]:g} is out of range"
-                raise line_error(path, line, problem, f"must be at least {-largest:g} and at most {largest:g}")
+                raise line_error(
+                    path, line, problem, f"must be at least {-largest:g} and at most {largest:g}"
+                )
         if table and cells["t_s"] <= table[-1][0]:
-            raise line_error(path, line, f"t_s {cells['t_s']:g} does not come after {table[-1][0]:g}", "sort the rows")
+            raise line_error(
+                path,
+                line,
+                f"t_s {cells['t_s']:g} does not come after {table[-1][0]:g}",
+                "sort the rows",
+            )
         table.append((cells["t_s"], cells["value"]))
     if not table:
         raise line_error(path, 1, "has no row under its header", remedy)
@@ -621,7 +699,9 @@ class CoordinatorRevision(Strict):
     limit_check_period_s: Annotated[Real, Field(ge=0.001, le=1000)]
     """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
-    """Time of the poll that saw the detection, or of the detection itself; truncated to whole seconds."""
+    """Time of the poll that saw the detection, or of the detection itself; truncated to whole
+    seconds.
+    """
     maintain_motion_per_task: bool
     """Whether maintain_motion is cancelled with each task and requested again with the next."""
 
@@ -634,7 +714,9 @@ class SpiralRevision(Strict):
     restarts_on_activation: bool
     """Whether each activation restarts the spiral."""
     resends_on_activation: bool = False
-    """Whether a spiral that continues sends its way-point at once, not after ticks_before_resending only."""
+    """Whether a spiral that continues sends its way-point at once, not after ticks_before_resending
+    only.
+    """
     tick_period_s: Period
     """Period of its timer; at most one way-point is reached per tick."""
     angle_step_rad: Annotated[Real, Field(gt=0, le=6.3)]
@@ -700,7 +782,9 @@ class ThrusterFailureRevision(Strict):
     """How thrusters fail; a failure is published in any case."""
 
     failure_mode: Literal["frozen", "dead"] = "frozen"
-    """What a failed thruster does, unless its event says so: `frozen` keeps its last thrust, `dead` gives none."""
+    """What a failed thruster does, unless its event says so: `frozen` keeps its last thrust, `dead`
+    gives none.
+    """
     effective_from_s: NotNegative = 0.0
     """Before this mission time, failures have no effect."""
 
@@ -742,15 +826,21 @@ class MetacontrolRevision(Strict):
     objectives_at_launch: tuple[Name, ...]
     """Functions whose objectives exist from launch, besides those of the whole mission."""
     waits_for_first_measurement: bool
-    """Whether reasoning waits for the first measurement of each attribute of which a design expects a value."""
+    """Whether reasoning waits for the first measurement of each attribute of which a design expects
+    a value.
+    """
     always_improve: tuple[Name, ...]
     """Functions whose objectives have o_always_improve (1.5); see improve_when_exceeded."""
     improve_when_exceeded: bool
-    """Whether an objective is also adapted when a measured value exceeds what its current design expects."""
+    """Whether an objective is also adapted when a measured value exceeds what its current design
+    expects.
+    """
     ignores_diagnostics_without_objective: bool
     """Whether diagnostics are ignored while there is no objective."""
     executes_plans_of_removed_objectives: bool = False
-    """Whether a cycle that is under way when objectives are removed requests their modes all the same."""
+    """Whether a cycle that is under way when objectives are removed requests their modes all the
+    same.
+    """
 
 
 class Revision(Strict):
@@ -777,7 +867,9 @@ class Revision(Strict):
     random: RandomRevision
     """The random manager."""
     comparison_operators: dict[str, Literal["<", "<=", ">", ">="]]
-    """By attribute to which the ontology gives none: when a measured value is worse than an expected one."""
+    """By attribute to which the ontology gives none: when a measured value is worse than an
+    expected one.
+    """
     metacontrol: MetacontrolRevision
     """The metacontrol manager."""
 
@@ -832,7 +924,9 @@ class Latencies(Strict):
 
 
 class Calibration(Strict):
-    """Parameters of vehicle, autopilot and simulator that the sources do not give, the same for every manager."""
+    """Parameters of vehicle, autopilot and simulator that the sources do not give, the same for
+    every manager.
+    """
 
     position_gain_per_s: Annotated[Real, Field(gt=0, le=100)] = 1.0
     """Horizontal velocity for each metre of position error."""
@@ -903,7 +997,12 @@ def paired(part: Strict, one: str, other: str) -> None:
     """Raise an error unless two lists of a part have the same length."""
     lengths = len(getattr(part, one)), len(getattr(part, other))
     if lengths[0] != lengths[1]:
-        raise wrong(f"{one} has {lengths[0]} entries, {other} {lengths[1]}", "give as many of both", other, one)
+        raise wrong(
+            f"{one} has {lengths[0]} entries, {other} {lengths[1]}",
+            "give as many of both",
+            other,
+            one,
+        )
 
 
 class RandomSettings(Strict):
@@ -943,7 +1042,9 @@ class BehaviourTreeSettings(Strict):
 
 
 class ManagerSettings(Strict):
-    """Settings of managing subsystems by name; an outside manager finds its own under its own name."""
+    """Settings of managing subsystems by name; an outside manager finds its own under its own
+    name.
+    """
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, dict[str, JsonValue]] = Field(init=False)
@@ -958,10 +1059,16 @@ class ManagerSettings(Strict):
     @model_validator(mode="after")
     def _are_for_managers(self) -> Self:
         others = [name for name in self.model_extra or {} if ":" not in name]
-        registered = sorted(point.name for point in entry_points(group=domain.MANAGER_GROUP)) if others else []
+        registered = (
+            sorted(point.name for point in entry_points(group=domain.MANAGER_GROUP))
+            if others
+            else []
+        )
         for name in others:
             if name not in registered:
-                remedy = f"{did_you_mean(name, [*type(self).model_fields, *registered])}, module:Class"
+                remedy = (
+                    f"{did_you_mean(name, [*type(self).model_fields, *registered])}, module:Class"
+                )
                 raise wrong(f"there is no manager {shown(name)} with settings", remedy, name)
         return self
 
@@ -991,10 +1098,11 @@ Metric = (
 
 
 class Requirement(Strict):
-    """A requirement that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15, 2010).
+    """A requirement that may be partially satisfied, as in RELAX (Whittle et al., Requirements
+    Engineering 15, 2010).
 
-    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required, and falls
-    linearly to 0 when it is off by the tolerance.
+    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required,
+    and falls linearly to 0 when it is off by the tolerance.
     """
 
     metric: Metric | None = None
@@ -1011,7 +1119,9 @@ class Requirement(Strict):
     @model_validator(mode="after")
     def _is_about_one_thing(self) -> Self:
         if (self.metric is None) == (self.attribute is None):
-            raise wrong("is about no value, or about two", "give either metric or attribute", "metric")
+            raise wrong(
+                "is about no value, or about two", "give either metric or attribute", "metric"
+            )
         return self
 
     def satisfaction(self, value: float) -> float:
@@ -1074,14 +1184,18 @@ class Scenario(Strict):
     metrics: Annotated[tuple[FurtherMetric, ...], Field(max_length=len(FURTHER_METRICS))] = ()
     """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
-    """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15,
-    2010). The column requirement_NAME falls from 1 to 0 where the value is off by the tolerance."""
+    """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements
+    Engineering 15, 2010). The column requirement_NAME falls from 1 to 0 where the value is off by
+    the tolerance."""
 
     @field_validator("signals", mode="after")
     @classmethod
     def _visibility_is_there(cls, value: dict[str, Any]) -> dict[str, Any]:
         if WATER_VISIBILITY not in value:
-            raise wrong("there is no signal named water_visibility", "add it: the pipeline's detection needs it")
+            raise wrong(
+                "there is no signal named water_visibility",
+                "add it: the pipeline's detection needs it",
+            )
         return value
 
     @field_validator("default_modes", mode="after")
@@ -1091,16 +1205,22 @@ class Scenario(Strict):
 
     def default_mode(self, function: str) -> str | None:
         """The mode that the manager none sets for a function."""
-        return self.default_modes.get(function, domain.SURFACE_MODE if function == SURFACE else None)
+        return self.default_modes.get(
+            function, domain.SURFACE_MODE if function == SURFACE else None
+        )
 
     def needed_functions(self) -> tuple[str, ...]:
         """The functions that the mission needs."""
         own, surface = self.mission.functions, (SURFACE,) if self.leak is not None else ()
         tasks = *own.search_pipeline, *own.inspect_pipeline
-        return tuple(dict.fromkeys((*domain.MISSION_FUNCTIONS, *own.mission_wide, *tasks, *surface)))
+        return tuple(
+            dict.fromkeys((*domain.MISSION_FUNCTIONS, *own.mission_wide, *tasks, *surface))
+        )
 
     def without_effect(self) -> Iterator[str]:
-        """Yield what changes no mission, and why, in words: a failure that comes too early, or what comes too late."""
+        """Yield what changes no mission, and why, in words: a failure that comes too early, or what
+        comes too late.
+        """
         monitors, earliest_s, latest_s = self.revision.monitors, 0.0, 0.0
         effective_s = self.revision.thruster_failures.effective_from_s
         times_s: dict[str, float] = {}
@@ -1114,7 +1234,11 @@ class Scenario(Strict):
             if event.event == "failure" and latest_s <= effective_s:
                 key = "revision.thruster_failures.effective_from_s"
                 yield f"thruster_events.{number}: failures have no effect before {effective_s:g} s ({key})"
-        later = {f"signals.{name}": each.time_s for name, each in self.signals.items() if each.kind == "step"}
+        later = {
+            f"signals.{name}": each.time_s
+            for name, each in self.signals.items()
+            if each.kind == "step"
+        }
         later |= {} if self.leak is None else {"leak": self.leak.time_s}
         times_s |= {key: support(time_s)[0] for key, time_s in later.items()}
         for key, time_s in times_s.items():
@@ -1123,8 +1247,12 @@ class Scenario(Strict):
                 yield f"{key}: {time_s:g} s is after the end of each mission ({limit})"
 
     def reasoning_share(self) -> float:
-        """Share of the time in which metacontrol's reasoner runs: one inference in each of its periods."""
-        return min(1.0, mean(self.latencies.inference_s) / self.managers.metacontrol.reasoning_period_s)
+        """Share of the time in which metacontrol's reasoner runs: one inference in each of its
+        periods.
+        """
+        return min(
+            1.0, mean(self.latencies.inference_s) / self.managers.metacontrol.reasoning_period_s
+        )
 
     @property
     def further_columns(self) -> tuple[str, ...]:
@@ -1139,12 +1267,20 @@ class Scenario(Strict):
         needed = {*self.metrics, *(each.metric for each in self.requirements.values())}
         if self.leak is None and "surfacing_time_s" in needed:
             raise wrong("surfacing_time_s needs a leak", "add leak: {time_s: 100}", "metrics")
-        if self.battery is None and (missing := [each for each in (BATTERY_LEVEL, "recharges") if each in needed]):
+        if self.battery is None and (
+            missing := [each for each in (BATTERY_LEVEL, "recharges") if each in needed]
+        ):
             raise wrong(f"{missing[0]} needs a battery", "add battery: {}", "metrics")
         measured = {*self.signals, *((BATTERY_LEVEL,) if self.battery is not None else ())}
         for name, each in self.requirements.items():
             if each.attribute is not None and each.attribute not in measured:
-                raise wrong(f"nothing measures {each.attribute} ({name})", "add a signal of that name", "requirements")
+                raise wrong(
+                    f"nothing measures {each.attribute} ({name})",
+                    "add a signal of that name",
+                    "requirements",
+                )
         if self.battery is not None and BATTERY_LEVEL in self.signals:
-            raise wrong("there are a battery and a signal battery_level", "remove one of them", "battery")
+            raise wrong(
+                "there are a battery and a signal battery_level", "remove one of them", "battery"
+            )
         return self

@@ -1,4 +1,6 @@
-"""The System Modes file: the modes of each function, and the parameters that they set on its lifecycle node."""
+"""The System Modes file: the modes of each function, and the parameters that they set on its
+lifecycle node.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 
-from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MODE
+from suave_des.domain import (
+    DEFAULT_MODE,
+    GENERATE_SEARCH_PATH,
+    SEA_BED_Z_M,
+    SURFACE_Z_M,
+    UNGROUND_MODE,
+)
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown, similar
 from suave_des.scenario.models import Real, Scenario, Strict, wrong
 from suave_des.scenario.yamlfile import Layer, validated
@@ -21,7 +29,9 @@ _STATES = "inactive, active or active.NODE_MODE"
 
 
 def grounding_modes(modes: Iterable[str]) -> tuple[str, ...]:
-    """Return those of a function's modes that ground it by a design: all but fd_unground and __DEFAULT__."""
+    """Return those of a function's modes that ground it by a design: all but fd_unground and
+    __DEFAULT__.
+    """
     return tuple(mode for mode in modes if mode not in (UNGROUND_MODE, DEFAULT_MODE))
 
 
@@ -30,7 +40,8 @@ class Mode:
     """One mode of a function.
 
     Attributes:
-        parameters: what it sets on the function's node, such as spiral_altitude in m; empty when that is inactive.
+        parameters: what it sets on the function's node, such as spiral_altitude in m; empty when
+            that is inactive.
     """
 
     name: str
@@ -61,36 +72,56 @@ class ModeTable:
         return {each.name: float(each.parameters[key]) for each in modes if key in each.parameters}
 
     def get(self, function: str, mode: str) -> Mode | None:
-        """Return one mode of a function; None if there is no such function, or it has no such mode."""
+        """Return one mode of a function; None if there is no such function, or it has no such
+        mode.
+        """
         return self.table.get(function, {}).get(mode)
 
     def modes(self, function: str) -> tuple[str, ...]:
-        """Return the names of a function's modes, with __DEFAULT__; an InputError if there is no such function."""
+        """Return the names of a function's modes, with __DEFAULT__; an InputError if there is no
+        such function.
+        """
         if function not in self.table:
             remedy = did_you_mean(function, self.table, f"functions in {self.source}")
-            raise InputError(f"there is no function {shown(function)}", file=self.source, remedy=remedy)
+            raise InputError(
+                f"there is no function {shown(function)}", file=self.source, remedy=remedy
+            )
         return tuple(self.table[function])
 
     def mode(self, function: str, mode: str) -> Mode:
-        """Return one mode of a function; an InputError if there is no such function, or it has no such mode."""
+        """Return one mode of a function; an InputError if there is no such function, or it has no
+        such mode.
+        """
         known = self.modes(function)
         if mode not in known:
             remedy = did_you_mean(mode, known, f"its modes in {self.source}")
-            raise InputError(f"function {function} has no mode {shown(mode)}", file=self.source, remedy=remedy)
+            raise InputError(
+                f"function {function} has no mode {shown(mode)}", file=self.source, remedy=remedy
+            )
         return self.table[function][mode]
 
     def check(self, scenario: Scenario, layer: Layer) -> None:
-        """Raise an InputError, with its line in the scenario (layer), if a mission uses a mode that is not there."""
+        """Raise an InputError, with its line in the scenario (layer), if a mission uses a mode that
+        is not there.
+        """
         for function in scenario.needed_functions():
             if UNGROUND_MODE not in self.modes(function):
                 remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
-                raise InputError(f"function {function} has no mode {UNGROUND_MODE}", file=self.source, remedy=remedy)
+                raise InputError(
+                    f"function {function} has no mode {UNGROUND_MODE}",
+                    file=self.source,
+                    remedy=remedy,
+                )
         used: list[tuple[KeyPath, str, str]] = [
             *((("functions", function), function, DEFAULT_MODE) for function in scenario.functions),
-            *((("default_modes", function), function, mode) for function, mode in scenario.default_modes.items()),
+            *(
+                (("default_modes", function), function, mode)
+                for function, mode in scenario.default_modes.items()
+            ),
         ]
         for index, mode in enumerate(scenario.managers.bt.search_modes):
-            # The default names the shipped modes, which another modes file need not have: it matters only to bt.
+            # The default names the shipped modes, which another modes file need not have: it
+            # matters only to bt.
             if (path := ("managers", "bt", "search_modes", index)) in layer.places:
                 used.append((path, GENERATE_SEARCH_PATH, mode))
         for key_path, function, mode in used:
@@ -107,7 +138,9 @@ def _value(value: Any) -> ParameterValue:
     if isinstance(value, bool | str):
         return value
     if not isinstance(value, int | float) or not math.isfinite(value):
-        raise wrong(f"{shown(value)} is not a value", "a finite number, text, true or false is needed")
+        raise wrong(
+            f"{shown(value)} is not a value", "a finite number, text, true or false is needed"
+        )
     return float(value)
 
 
@@ -139,14 +172,19 @@ class _Node(Strict):
     def parameters(self) -> _NodeModes:
         """Parameters of each mode; each has those of __DEFAULT__ that it does not set itself."""
         own = {
-            name: {} if mode.ros__parameters is None else mode.ros__parameters.model_dump(exclude_unset=True)
+            name: {}
+            if mode.ros__parameters is None
+            else mode.ros__parameters.model_dump(exclude_unset=True)
             for name, mode in (self.modes or {}).items()
         }
-        return {name: {**own.get(DEFAULT_MODE, {}), **parameters} for name, parameters in own.items()}
+        return {
+            name: {**own.get(DEFAULT_MODE, {}), **parameters} for name, parameters in own.items()
+        }
 
 
 def _split(value: Any) -> Any:
-    # The exemplar writes several parts on lines without dashes, which YAML reads as one text with spaces.
+    # The exemplar writes several parts on lines without dashes, which YAML reads as one text with
+    # spaces.
     return value.split() if isinstance(value, str) else value
 
 
@@ -163,8 +201,9 @@ class _Entry(Strict):
 def modes_of(document: Layer) -> ModeTable:
     """Make the table of a System Modes YAML file.
 
-    A function is an entry `type: system` whose parts are nodes; a system of systems only groups functions and
-    is ignored. A function without a mode __DEFAULT__ gets one that is inactive, as its node is at first.
+    A function is an entry `type: system` whose parts are nodes; a system of systems only groups
+    functions and is ignored. A function without a mode __DEFAULT__ gets one that is inactive, as
+    its node is at first.
 
     Raises:
         InputError: with file and line: an entry or mode of another form, an unknown part,
@@ -174,11 +213,15 @@ def modes_of(document: Layer) -> ModeTable:
     for key in document.data:
         name = key.removeprefix("/")
         if name in keys:
-            raise document.error(f"{name} appears twice, once with a leading slash", (key,), "keep one entry")
+            raise document.error(
+                f"{name} appears twice, once with a leading slash", (key,), "keep one entry"
+            )
         keys[name] = key
     content = validated(document, dict[str, _Entry])
     entries = {name: content[key].ros__parameters for name, key in keys.items()}
-    nodes = {name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)}
+    nodes = {
+        name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)
+    }
     functions: dict[str, Mapping[str, Mode]] = {}
     for name, system in entries.items():
         if isinstance(system, _Node):
@@ -187,23 +230,34 @@ def modes_of(document: Layer) -> ModeTable:
         parts = [part.removeprefix("/") for part in system.parts]
         if unknown := [part for part in parts if part not in keys]:
             remedy = did_you_mean(unknown[0], keys, "defined")
-            raise document.error(f"unknown part {shown(unknown[0])} of {name}", (*path, "parts"), remedy)
+            raise document.error(
+                f"unknown part {shown(unknown[0])} of {name}", (*path, "parts"), remedy
+            )
         if all(part in nodes for part in parts):
             known = {part: nodes[part] for part in parts}
             functions[name] = {DEFAULT_MODE: Mode(DEFAULT_MODE, False, {})} | {
-                mode: _mode(document, (*path, "modes", mode), states, known) for mode, states in system.modes.items()
+                mode: _mode(document, (*path, "modes", mode), states, known)
+                for mode, states in system.modes.items()
             }
     if not functions:
-        raise document.error("defines no function", (), "a function is an entry with type: system, parts and modes")
+        raise document.error(
+            "defines no function", (), "a function is an entry with type: system, parts and modes"
+        )
     return ModeTable(str(document.path), functions)
 
 
-def _mode(document: Layer, path: KeyPath, states: Mapping[str, Any], nodes: Mapping[str, _NodeModes]) -> Mode:
-    """A mode of a function: the parameters that it sets on each of the function's nodes that are active in it."""
+def _mode(
+    document: Layer, path: KeyPath, states: Mapping[str, Any], nodes: Mapping[str, _NodeModes]
+) -> Mode:
+    """A mode of a function: the parameters that it sets on each of the function's nodes that are
+    active in it.
+    """
     keys = {key.removeprefix("/"): key for key in states}
     for part, key in keys.items():
         if part not in nodes:
-            raise document.error(f"{shown(part)} is not a part", (*path, key), did_you_mean(part, nodes, "its parts"))
+            raise document.error(
+                f"{shown(part)} is not a part", (*path, key), did_you_mean(part, nodes, "its parts")
+            )
     active, parameters = False, dict[str, ParameterValue]()
     for node, modes in nodes.items():
         if node not in keys:
@@ -213,7 +267,9 @@ def _mode(document: Layer, path: KeyPath, states: Mapping[str, Any], nodes: Mapp
             continue
         kind, _, node_mode = str(state).partition(".")
         if kind != "active":
-            raise document.error(f"{shown(state)} is not a state of a node", below, f"write {_STATES}")
+            raise document.error(
+                f"{shown(state)} is not a state of a node", below, f"write {_STATES}"
+            )
         node_mode = node_mode or DEFAULT_MODE
         if node_mode not in (*modes, DEFAULT_MODE):
             remedy = did_you_mean(node_mode, modes, "its modes")

@@ -20,8 +20,8 @@ _EVENT_TEXT = r"^\s*\(\s*[1-6]\s*,\s*(failure|recovery)\s*,[^,]+\)\s*$"
 def scenario_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a scenario file.
 
-    What a mapping needs may stand in the base that it differs from: the loader alone checks that, and relations
-    between values, such as a minimum that must not be above its maximum.
+    What a mapping needs may stand in the base that it differs from: the loader alone checks that,
+    and relations between values, such as a minimum that must not be above its maximum.
     """
     whole = Scenario.model_json_schema()
     definitions: dict[str, Any] = whole.pop("$defs")
@@ -33,8 +33,13 @@ def scenario_schema() -> dict[str, Any]:
     event = {"anyOf": [definitions["ThrusterEvent"], {"type": "string", "pattern": _EVENT_TEXT}]}
     definitions["ThrusterEvent"] = event
     for named in ("signals", "default_modes"):
-        definitions["Scenario"]["properties"][named]["additionalProperties"] = False  # other names than are allowed
-    for name, key in (("Scenario", "signals"), ("KnowledgeSettings", "values")):  # over a base, a null removes an entry
+        definitions["Scenario"]["properties"][named]["additionalProperties"] = (
+            False  # other names than are allowed
+        )
+    for name, key in (
+        ("Scenario", "signals"),
+        ("KnowledgeSettings", "values"),
+    ):  # over a base, a null removes an entry
         entries = definitions[name]["properties"][key]
         allowed = entries.get("patternProperties", entries)
         for each in ("additionalProperties",) if allowed is entries else tuple(allowed):
@@ -43,7 +48,10 @@ def scenario_schema() -> dict[str, Any]:
     for key, model_name in (("revision", "Revision"), ("vehicle", "VehicleDescription")):
         definitions[model_name]["properties"]["base"] = base
         part = definitions["Scenario"]["properties"][key]
-        definitions["Scenario"]["properties"][key] = {"anyOf": [base, part], "description": part["description"]}
+        definitions["Scenario"]["properties"][key] = {
+            "anyOf": [base, part],
+            "description": part["description"],
+        }
     definitions["Scenario"]["properties"]["base"] = base
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -72,7 +80,9 @@ def field_docs(model: type[BaseModel]) -> dict[str, str]:
             continue
         for field, text in pairwise(_classes(part.__module__)[part.__name__].body):
             match field, text:
-                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(meaning))):
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
+                    value=ast.Constant(value=str(meaning))
+                ):
                     texts[name] = inspect.cleandoc(meaning)
     return texts
 

@@ -1,7 +1,8 @@
-"""YAML files as plain data with the line of every key, merged over the files that they build on, and validated.
+"""YAML files as plain data with the line of every key, merged over the files that they build on,
+and validated.
 
-Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and
-`2023-02-04` are text. No constructor of PyYAML is involved, so no tag can build an object.
+Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30`
+and `2023-02-04` are text. No constructor of PyYAML is involved, so no tag can build an object.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ _VALUES_LIMIT = 100_000
 
 
 class Location(NamedTuple):
-    """File and line of a value; depth 0 is the file that the user named, its base is 1, and so on."""
+    """File and line of a value; depth 0 is the file that the user named, its base is 1, and so
+    on.
+    """
 
     depth: int
     line: int
@@ -63,7 +66,9 @@ class Layer:
         return self.places[key_path]
 
     def key_path(self, place: str) -> KeyPath:
-        """Split a place such as "sweep.grid.start.x_m" into existing keys, which may contain dots."""
+        """Split a place such as "sweep.grid.start.x_m" into existing keys, which may contain
+        dots.
+        """
         path: list[str | int] = []
         here: Any = self.data
         while place and isinstance(here, Mapping):
@@ -88,7 +93,9 @@ class Layer:
 
 def place_text(line: int, key_path: KeyPath) -> str:
     """Write a place for the user: "line 12, thruster_events[0].time_s"."""
-    keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(".")
+    keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(
+        "."
+    )
     return f"line {line}, {keys}" if keys else f"line {line}"
 
 
@@ -99,8 +106,8 @@ def read_yaml(path: Path | str) -> Layer:
     """Read a YAML file whose top level is a mapping.
 
     Raises:
-        InputError: with the line: the file cannot be read, is not YAML, has a tag, a duplicate key or several
-            documents, or has another top level.
+        InputError: with the line: the file cannot be read, is not YAML, has a tag, a duplicate key
+            or several documents, or has another top level.
     """
     return read_input({}, path, kind="")
 
@@ -110,17 +117,25 @@ def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
     try:
         root = _composed(text)
         if not isinstance(root, yaml.MappingNode):
-            problem, line = ("is empty", 1) if root is None else ("is not a mapping at its top level", _line(root))
+            problem, line = (
+                ("is empty", 1)
+                if root is None
+                else ("is not a mapping at its top level", _line(root))
+            )
             raise line_error(path, line, problem, "write `key: value` lines")
         reading = _Reading(path, depth)
         return Layer(reading.plain(root, ()), reading.places)
     except ReaderError as error:
         problem = f"holds {chr(error.character)!r}, which YAML does not allow"
-        raise line_error(path, text.count("\n", 0, error.position) + 1, problem, "remove it") from None
+        raise line_error(
+            path, text.count("\n", 0, error.position) + 1, problem, "remove it"
+        ) from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = f"is not valid YAML: {error.problem or error.context or 'cannot be parsed'}"
-        remedy = "check indentation, colons and quotes here and just above; indent with spaces, not tabs"
+        remedy = (
+            "check indentation, colons and quotes here and just above; indent with spaces, not tabs"
+        )
         raise line_error(path, mark.line + 1 if mark else 1, problem, remedy) from None
     except RecursionError:
         problem = "is nested too deep, or an alias stands for something that holds it"
@@ -128,13 +143,17 @@ def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
 
 
 def read_value(text: str, option: str) -> Any:
-    """Read a value of the command line as one in a file; an InputError, with the option, if it is not plain data."""
+    """Read a value of the command line as one in a file; an InputError, with the option, if it is
+    not plain data.
+    """
     try:
         root = _composed(text)
         return None if root is None else _Reading(Path(option), 0).plain(root, ())
     except (yaml.YAMLError, InputError, RecursionError) as error:
         problem = error.problem if isinstance(error, InputError) else "is not YAML"
-        raise InputError(f"{shown(text)}: {problem}", place=option, remedy="put text in quotes") from None
+        raise InputError(
+            f"{shown(text)}: {problem}", place=option, remedy="put text in quotes"
+        ) from None
 
 
 class _Composer(yaml.BaseLoader):
@@ -181,20 +200,28 @@ class _Reading:
         if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
             return dict(self._entries(node, key_path))
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
-            return [self._below(item, item, (*key_path, index)) for index, item in enumerate(node.value)]
+            return [
+                self._below(item, item, (*key_path, index)) for index, item in enumerate(node.value)
+            ]
         tag = node.tag.replace(_TAG, "!!")
         if not isinstance(node, yaml.ScalarNode) or node.tag not in _SCALARS:
-            raise self._error(node, key_path, f"the tag {shown(tag)} is not allowed", "remove the tag")
+            raise self._error(
+                node, key_path, f"the tag {shown(tag)} is not allowed", "remove the tag"
+            )
         try:
             return _SCALARS[node.tag](node.value)
         except (ValueError, KeyError):
-            raise self._error(node, key_path, f"expected {tag}, got {shown(node.value)}", "remove the tag") from None
+            raise self._error(
+                node, key_path, f"expected {tag}, got {shown(node.value)}", "remove the tag"
+            ) from None
 
     def _entries(self, node: yaml.MappingNode, key_path: KeyPath) -> Iterator[tuple[str, Any]]:
         for key_node, value_node in node.value:
             key = key_node.value
             if not isinstance(key_node, yaml.ScalarNode) or not key.isprintable() or len(key) > 200:
-                raise self._error(key_node, key_path, "a key must be short text", "write `key: value`")
+                raise self._error(
+                    key_node, key_path, "a key must be short text", "write `key: value`"
+                )
             if (*key_path, key) in self.places:
                 problem = f"the key {shown(key)} appears twice, first in line {self.places[(*key_path, key)].line}"
                 raise self._error(key_node, (*key_path, key), problem, "keep one of them")
@@ -208,22 +235,33 @@ class _Reading:
         return self.plain(node, key_path)
 
     def _error(self, node: yaml.Node, key_path: KeyPath, problem: str, remedy: str) -> InputError:
-        return InputError(problem, file=self._path, place=place_text(_line(node), key_path), remedy=remedy)
+        return InputError(
+            problem, file=self._path, place=place_text(_line(node), key_path), remedy=remedy
+        )
 
 
 # A scenario's files, merged over those that they build on.
 
 _KIND_KEYS = ("kind", "distribution")
-"""Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""
+"""Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not
+fit.
+"""
 _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 """Mappings of freely named entries, in which a null removes the base's entry."""
 _PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
-"""Parts of a scenario that may be the name of a file, or differ from one that they name as their base."""
+"""Parts of a scenario that may be the name of a file, or differ from one that they name as their
+base.
+"""
 _DEFAULT_VEHICLE = "bluerov2"
 
 
 def read_input(
-    inputs: dict[str, str], name: object, kind: str, by: Layer | None = None, key_path: KeyPath = (), depth: int = 0
+    inputs: dict[str, str],
+    name: object,
+    kind: str,
+    by: Layer | None = None,
+    key_path: KeyPath = (),
+    depth: int = 0,
 ) -> Layer:
     """Find a YAML file as find_named does, unless the kind is empty, and read it as read_yaml does.
 
@@ -238,9 +276,14 @@ def read_input(
 
 
 def find_named(
-    name: object, kind: str, by: Layer | None = None, key_path: KeyPath = (), remedy: str | None = None
+    name: object,
+    kind: str,
+    by: Layer | None = None,
+    key_path: KeyPath = (),
+    remedy: str | None = None,
 ) -> Path:
-    """Find a file that the user names, or that a layer names: beside the file in which its name is given, or shipped.
+    """Find a file that the user names, or that a layer names: beside the file in which its name is
+    given, or shipped.
 
     Args:
         name, kind: as of find.
@@ -256,15 +299,20 @@ def find_named(
     if isinstance(name, int | float) and not isinstance(name, bool):
         name = f"{name:g}"  # revisions 2023 and 1.5 need no quotes
     if not isinstance(name, str) or not name:
-        raise by.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
+        raise by.error(
+            f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file"
+        )
     try:
         return find(name, kind, beside=by.place(key_path).file.parent)
     except InputError as error:
-        raise by.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
+        raise by.error(
+            f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy
+        ) from None
 
 
 def scenario_layer(inputs: dict[str, str], name: str | Path, over: Layer | None = None) -> Layer:
-    """Read a scenario file and merge it over its bases, with its revision and its vehicle written out in full.
+    """Read a scenario file and merge it over its bases, with its revision and its vehicle written
+    out in full.
 
     Args:
         inputs: gets the SHA-256 of each file.
@@ -272,7 +320,8 @@ def scenario_layer(inputs: dict[str, str], name: str | Path, over: Layer | None 
         over: what differs from it; None: nothing.
 
     Returns:
-        The layer. Its name is its file's if it gives none: a base's would make its results look like the base's.
+        The layer. Its name is its file's if it gives none: a base's would make its results look
+        like the base's.
 
     Raises:
         InputError: a file that cannot be read, or is its own base; a revision that is not known.
@@ -285,7 +334,9 @@ def scenario_layer(inputs: dict[str, str], name: str | Path, over: Layer | None 
     title = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
     layer = _over_its_base(inputs, _with_named_parts(own), "scenarios", (own.path,))
     layer = layer if over is None else merge(layer, _with_named_parts(over))
-    layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
+    layer = merge(
+        Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer
+    )
     for part, kind in _PARTS.items():
         if "base" in (layer.data.get(part) or ()):
             whole = _over_its_base(inputs, layer.below(part), kind, (layer.place((part,)).file,))
@@ -304,16 +355,24 @@ def _with_named_parts(layer: Layer) -> Layer:
     return Layer(data, places)
 
 
-def _over_its_base(inputs: dict[str, str], layer: Layer, kind: str, chain: tuple[Path, ...]) -> Layer:
-    """Merge a layer over the file that it names as its base, if any; `chain` is how that was reached."""
+def _over_its_base(
+    inputs: dict[str, str], layer: Layer, kind: str, chain: tuple[Path, ...]
+) -> Layer:
+    """Merge a layer over the file that it names as its base, if any; `chain` is how that was
+    reached.
+    """
     if "base" not in layer.data:
         return layer
     below = read_input(inputs, layer.data["base"], kind, layer, ("base",), len(chain))
     chain = (*chain, below.path)
     if len({each.resolve() for each in chain}) < len(chain):
         names = " -> ".join(each.name for each in chain)
-        raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
-    below = _over_its_base(inputs, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
+        raise layer.error(
+            f"the bases never end: {names}", ("base",), "a file must not be its own base"
+        )
+    below = _over_its_base(
+        inputs, _with_named_parts(below) if kind == "scenarios" else below, kind, chain
+    )
     own = {key: value for key, value in layer.data.items() if key != "base"}
     return merge(below, Layer(own, layer.places))
 
@@ -330,12 +389,19 @@ def merge(base: Layer, over: Layer) -> Layer:
     return Layer(data, {**kept, **over.places})
 
 
-def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]) -> dict[str, Any]:
+def _merge(
+    base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]
+) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         below, known = (*path, key), base.get(key)
         is_whole = not path and key in _PARTS and "base" in (value or ())
-        if isinstance(known, dict) and isinstance(value, dict) and _same_kind(known, value) and not is_whole:
+        if (
+            isinstance(known, dict)
+            and isinstance(value, dict)
+            and _same_kind(known, value)
+            and not is_whole
+        ):
             merged[key] = _merge(known, value, below, replaced)
             continue
         replaced.add(below)
@@ -359,7 +425,9 @@ _T = TypeVar("_T")
 
 
 def validated(layer: Layer, model: type[_T]) -> _T:
-    """Return a layer's data as a model; an InputError has the first problem with its line, and the number of others."""
+    """Return a layer's data as a model; an InputError has the first problem with its line, and the
+    number of others.
+    """
     try:
         return TypeAdapter(model).validate_python(layer.data)
     except ValidationError as error:
@@ -369,8 +437,12 @@ def validated(layer: Layer, model: type[_T]) -> _T:
         raise layer.error(problem, path, "; ".join(filter(None, (remedy, more))) or None) from None
 
 
-def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any) -> tuple[KeyPath, str, str | None]:
-    """Return the first problem of data that are in no file: its key path, what is wrong, and what would be right."""
+def problem_and_remedy(
+    error: ValidationError, data: dict[str, Any], model: Any
+) -> tuple[KeyPath, str, str | None]:
+    """Return the first problem of data that are in no file: its key path, what is wrong, and what
+    would be right.
+    """
     path, first = _first_problem(error, Layer(data, {(): Location(0, 1, Path())}))
     path = (*path, *first.get("ctx", {}).get("keys", "").split()[:1])
     return path, *_texts(first, path, model)
@@ -379,11 +451,16 @@ def problem_and_remedy(error: ValidationError, data: dict[str, Any], model: Any)
 def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, ErrorDetails]:
     """Return the first problem in the user's own file, or else in its base, with its key path."""
     found = ((_key_path(each, layer), each) for each in error.errors(include_url=False))
-    late = {"missing": 1, "too_short": 2}  # a misspelt key is also a missing one, a list with a wrong entry too short
+    late = {
+        "missing": 1,
+        "too_short": 2,
+    }  # a misspelt key is also a missing one, a list with a wrong entry too short
     return min(found, key=lambda each: (late.get(each[1]["type"], 0), *layer.place(each[0])[:2]))
 
 
-def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
+def models_within(
+    wanted: Any, path: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
     """Yield every model that a type holds, with its key path; members of a union have the same."""
     if isinstance(wanted, type) and issubclass(wanted, BaseModel):
         yield path, wanted
@@ -396,7 +473,8 @@ def models_within(wanted: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tup
 
 
 def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
-    """The key path in the file: pydantic's location without what is no key, such as the tags of union members.
+    """The key path in the file: pydantic's location without what is no key, such as the tags of
+    union members.
 
     Of keys that do not fit together, and have a place each, it is the one in the user's own file.
     """
@@ -408,8 +486,12 @@ def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
         elif isinstance(here, list) and isinstance(key, int):
             here = here[key] if key < len(here) else None
         else:
-            is_inside_text = isinstance(here, str) and key != "number"  # of a thruster event, and not a tag
-            if not is_inside_text and not (detail["type"] == "missing" and key == detail["loc"][-1]):
+            is_inside_text = (
+                isinstance(here, str) and key != "number"
+            )  # of a thruster event, and not a tag
+            if not is_inside_text and not (
+                detail["type"] == "missing" and key == detail["loc"][-1]
+            ):
                 continue
         path.append(key)
     context = detail.get("ctx", {})
@@ -430,7 +512,9 @@ def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | 
             known = dict.fromkeys(_known_keys(model, path[:-1], detail["loc"]))
             return f"unknown key {shown(path[-1])}", did_you_mean(path[-1], known)
         case "literal_error" | "union_tag_invalid":
-            allowed = re.findall(r"'([^']*)'", str(context.get("expected", context.get("expected_tags"))))
+            allowed = re.findall(
+                r"'([^']*)'", str(context.get("expected", context.get("expected_tags")))
+            )
             word = context.get("tag", value)
             return f"{shown(word)} is not allowed", did_you_mean(word, allowed, "allowed")
         case "union_tag_not_found":
@@ -438,20 +522,35 @@ def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | 
         case "json_invalid" | "json_type":
             return f"{shown(value)} is not JSON", "write an object in JSON, as text"
         case "string_pattern_mismatch":
-            return f"{shown(value)} is not a valid name", "use letters, digits, _ . and -, beginning with a letter"
+            return (
+                f"{shown(value)} is not a valid name",
+                "use letters, digits, _ . and -, beginning with a letter",
+            )
     # Pydantic's own sentence, such as "Input should be a valid number", in the words of YAML.
     sentence = re.sub(
-        r" or (instance of|object to) .*|, unable to .*| after validation|(?<=\ba) valid", "", detail["msg"]
+        r" or (instance of|object to) .*|, unable to .*| after validation|(?<=\ba) valid",
+        "",
+        detail["msg"],
     )
-    for word, plain in (("a integer", "a whole number"), ("dictionary", "mapping"), ("tuple", "list")):
+    for word, plain in (
+        ("a integer", "a whole number"),
+        ("dictionary", "mapping"),
+        ("tuple", "list"),
+    ):
         sentence = sentence.replace(word, plain)
     return f"{shown(value)} {sentence.partition(' ')[2]}", None
 
 
 def _known_keys(model: Any, path: KeyPath, loc: KeyPath) -> Iterator[str]:
-    """The keys that a model has at a key path; of the members of a union, those of the one in pydantic's location."""
+    """The keys that a model has at a key path; of the members of a union, those of the one in
+    pydantic's location.
+    """
     for place, each in models_within(model):
-        if len(place) == len(path) and all(part in (one, _ANY) for part, one in zip(place, path, strict=True)):
-            tags = (each.model_fields[name].annotation for name in _TAGGED if name in each.model_fields)
+        if len(place) == len(path) and all(
+            part in (one, _ANY) for part, one in zip(place, path, strict=True)
+        ):
+            tags = (
+                each.model_fields[name].annotation for name in _TAGGED if name in each.model_fields
+            )
             if all(typing.get_args(tag)[0] in loc for tag in tags):
                 yield from each.model_fields

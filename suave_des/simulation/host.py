@@ -20,7 +20,9 @@ from suave_des.registry import dependencies_of, measured_somewhere, names_in, ti
 from suave_des.scenario.models import support
 
 RAISED = (Exception, SystemExit)
-"""Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
+"""Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an
+error.
+"""
 
 _T = TypeVar("_T")
 _MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
@@ -32,8 +34,8 @@ _MAX_YIELDS_AT_ONE_TIME = 10_000
 class ManagerHost:
     """Makes a manager and calls its hooks.
 
-    An event-triggered manager (see `ManagingSubsystem`) is not called at each of its times: a call in a state in which
-    an earlier one changed nothing is left out.
+    An event-triggered manager (see `ManagingSubsystem`) is not called at each of its times: a call
+    in a state in which an earlier one changed nothing is left out.
 
     Attributes:
         bus: where the diagnostics come from that the manager subscribes to.
@@ -53,9 +55,15 @@ class ManagerHost:
     training: bool
     manager: ManagingSubsystem = field(init=False)
     _is_waiting: bool = field(default=False, init=False)  # for a change
-    _due_s: float = field(default=inf, init=False)  # next time of `adapt`; while it waits, the earliest
-    _effect_after_s: float = field(default=inf, init=False)  # a call of `adapt`; inf: too often to be expected
-    _idle_regions: set[tuple[int, ...]] = field(default_factory=set, init=False)  # in which calls change nothing
+    _due_s: float = field(
+        default=inf, init=False
+    )  # next time of `adapt`; while it waits, the earliest
+    _effect_after_s: float = field(
+        default=inf, init=False
+    )  # a call of `adapt`; inf: too often to be expected
+    _idle_regions: set[tuple[int, ...]] = field(
+        default_factory=set, init=False
+    )  # in which calls change nothing
     _depends_on: list[tuple[Measurements, Thresholds]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
@@ -64,7 +72,9 @@ class ManagerHost:
         try:
             self.manager = kind(self.system)
             if not hasattr(self.manager, "system"):
-                raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(system)")
+                raise TypeError(
+                    f"{kind.__name__}.__init__ does not begin with super().__init__(system)"
+                )
             self.manager.recall(self.learned, self.training)
             times = times_of(self.manager)
             declared = dependencies_of(self.manager)
@@ -72,15 +82,26 @@ class ManagerHost:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
             raise self.error_of(error) from error
-        is_event_triggered = declared is not None and not self.system.recorded  # a recorded mission makes every call
+        is_event_triggered = (
+            declared is not None and not self.system.recorded
+        )  # a recorded mission makes every call
         if declared is not None and is_event_triggered:
-            self._depends_on = [(measurements[name], declared[name]) for name in measurements if name in declared]
+            self._depends_on = [
+                (measurements[name], declared[name]) for name in measurements if name in declared
+            ]
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         if times is not None:
-            (self._period_s, self._due_s, latency_s), self._is_event_triggered = times, is_event_triggered
-            if is_event_triggered or self._period_s >= 15.0:  # to look ahead anew takes as long as to fly 15 s in vain
-                self._effect_after_s = latency_s + support(self.system.scenario.latencies.mode_change_s)[0]
+            (self._period_s, self._due_s, latency_s), self._is_event_triggered = (
+                times,
+                is_event_triggered,
+            )
+            if (
+                is_event_triggered or self._period_s >= 15.0
+            ):  # to look ahead anew takes as long as to fly 15 s in vain
+                self._effect_after_s = (
+                    latency_s + support(self.system.scenario.latencies.mode_change_s)[0]
+                )
             self._alarm = Alarm(self.system.env, self._adapt)
             self._set_alarm(self._due_s)
 
@@ -93,7 +114,9 @@ class ManagerHost:
         self._guarded(self.manager.mission_ended, metrics)
 
     def remarks(self) -> Iterator[str]:
-        """Yield probable mistakes of the manager's author that are no errors, as the mission has shown them."""
+        """Yield probable mistakes of the manager's author that are no errors, as the mission has
+        shown them.
+        """
         author = next(base for base in self.manager_type.__mro__ if "adapt" in vars(base))
         is_own = not author.__module__.startswith("suave_des.")
         if is_own and self.manager.period_s is None and "adapt" not in names_in(author):
@@ -129,14 +152,18 @@ class ManagerHost:
         self._is_waiting, requests = False, self.system.modes.requests
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:
-            self._go_on(changed=self.system.modes.requests > requests, waits=self._is_event_triggered)
+            self._go_on(
+                changed=self.system.modes.requests > requests, waits=self._is_event_triggered
+            )
         elif isinstance(adaptation, Generator):
             self.system.env.process(self._guarded_process(adaptation))
         else:
             raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
 
     def _go_on(self, *, changed: bool, waits: bool) -> None:
-        """Set the alarm to the next time of `adapt`, or, if it waits, to the next one that may change something."""
+        """Set the alarm to the next time of `adapt`, or, if it waits, to the next one that may
+        change something.
+        """
         now_s, period_s = self.system.env.now, self._period_s
         while self._due_s <= now_s:
             self._due_s += period_s
@@ -162,8 +189,12 @@ class ManagerHost:
         self.system._vehicle.expected_changes_s["manager"] = t_s + self._effect_after_s
 
     def _regions_until(self, t_s: float) -> tuple[tuple[int, ...], float]:
-        """Find the regions of measured values at mission time t, and until when they stay the same."""
-        found = [each.region_until(t_s, thresholds) for each, thresholds in self._depends_on] or [(0, inf)]
+        """Find the regions of measured values at mission time t, and until when they stay the
+        same.
+        """
+        found = [each.region_until(t_s, thresholds) for each, thresholds in self._depends_on] or [
+            (0, inf)
+        ]
         regions, untils_s = zip(*found, strict=True)
         return regions, min(untils_s)
 
@@ -171,16 +202,28 @@ class ManagerHost:
         resume: Callable[[Any], object] = adaptation.send
         outcome, yields, since_s = None, 0, (began_s := self.system.env.now)
         while True:
-            yields, since_s = (yields + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
+            yields, since_s = (
+                (yields + 1, since_s)
+                if self.system.env.now == since_s
+                else (0, self.system.env.now)
+            )
             try:
                 if yields > _MAX_YIELDS_AT_ONE_TIME:
-                    raise RuntimeError(f"adapt yielded {_MAX_YIELDS_AT_ONE_TIME} events, and no mission time passed")
+                    raise RuntimeError(
+                        f"adapt yielded {_MAX_YIELDS_AT_ONE_TIME} events, and no mission time passed"
+                    )
                 event = resume(outcome)
                 if not isinstance(event, simpy.Event):
-                    raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")
+                    raise TypeError(
+                        f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)"
+                    )
             except StopIteration as end:
-                in_time = self.system.env.now - began_s < self._period_s  # no call was due meanwhile
-                self._go_on(changed=True, waits=in_time and self._is_event_triggered and end.value is True)
+                in_time = (
+                    self.system.env.now - began_s < self._period_s
+                )  # no call was due meanwhile
+                self._go_on(
+                    changed=True, waits=in_time and self._is_event_triggered and end.value is True
+                )
                 return
             except RAISED as error:
                 raise self.error_of(error) from error

@@ -1,4 +1,6 @@
-"""One mission: vehicle, monitors, managed and managing subsystem, wired into a SimPy environment and advanced in it."""
+"""One mission: vehicle, monitors, managed and managing subsystem, wired into a SimPy environment
+and advanced in it.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,12 @@ from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measurements, Timing, message_loss
-from suave_des.monitor.monitors import leak_monitor, measure_battery, measure_signals, start_monitors
+from suave_des.monitor.monitors import (
+    leak_monitor,
+    measure_battery,
+    measure_signals,
+    start_monitors,
+)
 from suave_des.monitor.thrusters import Thrusters, draw_schedule, thruster_monitor
 from suave_des.registry import ManagerLike, cause_of, is_built_in, manager_class, name_of
 from suave_des.resources import DEFAULT_SCENARIO
@@ -59,9 +66,9 @@ class CallerManages(NoManager):
 class Mission:
     """One mission, advanced step by step, or at once by `result`.
 
-    Without a manager the caller is the managing subsystem: each task begins with the default modes of its functions,
-    and everything after that is up to `change_mode`. Missions that are advanced in other steps are the same missions:
-    only what is requested, and when, makes a difference.
+    Without a manager the caller is the managing subsystem: each task begins with the default modes
+    of its functions, and everything after that is up to `change_mode`. Missions that are advanced
+    in other steps are the same missions: only what is requested, and when, makes a difference.
 
     Example:
         >>> mission = Mission("seams2023", run=1, seed=8)
@@ -73,10 +80,10 @@ class Mission:
         61.0
 
     Args:
-        scenario: path of a scenario file, name of a shipped one, or a Simulator of a loaded one, which saves loading
-            it for each of many missions.
-        manager: name of a managing subsystem, module:Class, or a class, which the caller then watches; None: the
-            caller.
+        scenario: path of a scenario file, name of a shipped one, or a Simulator of a loaded one,
+            which saves loading it for each of many missions.
+        manager: name of a managing subsystem, module:Class, or a class, which the caller then
+            watches; None: the caller.
         run: number of the run in a campaign with this seed.
         seed: of everything that is random.
         record: whether events and trajectory are kept, for `result`.
@@ -106,7 +113,10 @@ class Mission:
     ) -> None:
         for name, number in (("run", run), ("seed", seed)):
             if isinstance(number, bool) or not isinstance(number, int) or number < 0:
-                raise InputError(f"{name}: {shown(number)} is not a number of a {name}", remedy="give a whole number")
+                raise InputError(
+                    f"{name}: {shown(number)} is not a number of a {name}",
+                    remedy="give a whole number",
+                )
         if replacements:
             own = "scenario", "manager", "run", "seed", "record"
             check_names("Mission", replacements, (*own, *Replacements.__annotations__))
@@ -127,18 +137,29 @@ class Mission:
         # The vehicle, and what is measured.
         self._start_m, self._origin_m = draw_start(draws)
         self._track = prepared.take_track()
-        self._vehicle = prepared.make_vehicle(draws, self._start_m, self._track, manager_type.needs_knowledge)
+        self._vehicle = prepared.make_vehicle(
+            draws, self._start_m, self._track, manager_type.needs_knowledge
+        )
         self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, recorder.log)
         self._battery = measure_battery(described, draws, prepared.duration_s)
-        measured = [*measure_signals(loaded, draws, prepared.duration_s), *filter(None, [self._battery])]
+        measured = [
+            *measure_signals(loaded, draws, prepared.duration_s),
+            *filter(None, [self._battery]),
+        ]
         self._measurements: Mapping[str, Measurements] = {each.key: each for each in measured}
         self._visibility = self._measurements[WATER_VISIBILITY]
 
         # The managed subsystem.
         seen = prepared.detected_points, prepared.bounds_m, prepared.view_tangent
-        self._detector = PipelineDetector(env, self._vehicle, self._visibility.arrays, *seen, recorder.log)
-        mode_latency_s = draws.each_time("latencies.mode_change_s", described.latencies.mode_change_s)
-        self.mode_manager = ModeManager(env, loaded.modes, self._make_nodes(), mode_latency_s, recorder.log)
+        self._detector = PipelineDetector(
+            env, self._vehicle, self._visibility.arrays, *seen, recorder.log
+        )
+        mode_latency_s = draws.each_time(
+            "latencies.mode_change_s", described.latencies.mode_change_s
+        )
+        self.mode_manager = ModeManager(
+            env, loaded.modes, self._make_nodes(), mode_latency_s, recorder.log
+        )
         self._coordinator = self._make_coordinator()
 
         # What is observed of it.
@@ -148,7 +169,9 @@ class Mission:
         self._observe()
 
         # The managing subsystem.
-        files, learned = ({}, {}) if manager is None else prepared.manager_inputs(self._manager_name)
+        files, learned = (
+            ({}, {}) if manager is None else prepared.manager_inputs(self._manager_name)
+        )
         system = System(
             env=env,
             modes=self.mode_manager,
@@ -164,7 +187,9 @@ class Mission:
             _files=files,
             _open_knowledge=lambda: prepared.knowledge,
         )
-        self._host = ManagerHost(manager_type, system, self.bus, self._error_of, learned, prepared.training is not None)
+        self._host = ManagerHost(
+            manager_type, system, self.bus, self._error_of, learned, prepared.training is not None
+        )
         self.manager = self._host.manager
         if self._battery is not None:
             self._battery.listeners.append(self._host.state_changed)
@@ -176,8 +201,8 @@ class Mission:
         """Advance mission time.
 
         Args:
-            until: mission time in s, which comes before whatever happens at that very time; None: the mission's end,
-                beyond which it does not go in any case.
+            until: mission time in s, which comes before whatever happens at that very time; None:
+                the mission's end, beyond which it does not go in any case.
 
         Raises:
             InputError: that time has already passed.
@@ -199,7 +224,9 @@ class Mission:
             InputError: there is no such function or mode, or the mission has a manager.
         """
         if self._manager_name != CALLER:
-            raise InputError("the mission has a manager, which changes modes", remedy="leave the manager out")
+            raise InputError(
+                "the mission has a manager, which changes modes", remedy="leave the manager out"
+            )
         if not self.mode_manager.change_mode(function, mode):
             self.check_mode(function, mode)
 
@@ -221,12 +248,16 @@ class Mission:
         return self._result
 
     def close(self) -> None:
-        """Give the mission's memory back to its Simulator, for the next mission; this one cannot continue."""
+        """Give the mission's memory back to its Simulator, for the next mission; this one cannot
+        continue.
+        """
         if vars(self.bus):  # not closed yet
             self._prepared.give_back(self._track)
         drop_events(self.env)
         for part in (self._vehicle, self._detector, self._host, self.bus):
-            vars(part).clear()  # what refers to each other is freed at once then, which saves 5% of a mission's time
+            vars(
+                part
+            ).clear()  # what refers to each other is freed at once then, which saves 5% of a mission's time
 
     # What can be seen.
 
@@ -257,13 +288,18 @@ class Mission:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions that are currently needed: those of the whole mission, and those of the task."""
+        """The functions that are currently needed: those of the whole mission, and those of the
+        task.
+        """
         return self._coordinator.functions
 
     @property
     def modes(self) -> Mapping[str, tuple[str, ...]]:
         """The modes of each function that can be requested."""
-        return {function: self.mode_manager.available_modes(function) for function in self.mode_manager.nodes}
+        return {
+            function: self.mode_manager.available_modes(function)
+            for function in self.mode_manager.nodes
+        }
 
     def current_mode(self, function: str) -> str | None:
         """Return the last requested mode of a function; None before the first request."""
@@ -294,7 +330,9 @@ class Mission:
         """Compute the metrics, a row of runs.csv; as of now while the mission is not over."""
         coordinator, detector = self._coordinator, self._detector
         found = coordinator.search_time_s is not None
-        x_m, y_m = self._prepared.points[detector.first_point, :2].tolist() if found else (None, None)
+        x_m, y_m = (
+            self._prepared.points[detector.first_point, :2].tolist() if found else (None, None)
+        )
         return MissionMetrics(
             scenario=self._scenario.name,
             manager=self._manager_name,
@@ -318,7 +356,10 @@ class Mission:
     def _make_nodes(self) -> dict[str, FunctionNode]:
         """Make the functions' nodes: those of the exemplar, and those that the scenario names."""
         env, described, draws = self.env, self._scenario, self._draws
-        revision, loss_probability = described.revision, draws.value("revision.set_points.loss_probability")
+        revision, loss_probability = (
+            described.revision,
+            draws.value("revision.set_points.loss_probability"),
+        )
 
         def sender(function: str) -> SetPointSender:
             keys = [f"revision.set_points.node_frame_offset_{axis}_m/{function}" for axis in "xyz"]
@@ -340,17 +381,23 @@ class Mission:
             draws.value("latencies.search_start_s"),
         )
         path = self._prepared.path
-        follow = FollowPipeline(env, sender(domain.FOLLOW_PIPELINE), revision.follow, path, self._detector)
+        follow = FollowPipeline(
+            env, sender(domain.FOLLOW_PIPELINE), revision.follow, path, self._detector
+        )
         self._follow, search.other, follow.other = follow, follow, search
         nodes: dict[str, FunctionNode] = {
-            domain.MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._thrusters, recovery_s),
+            domain.MAINTAIN_MOTION: MaintainMotion(
+                env, self.bus, revision.recovery, self._thrusters, recovery_s
+            ),
             domain.GENERATE_SEARCH_PATH: search,
             domain.FOLLOW_PIPELINE: follow,
         }
         if self._battery is not None and (station := described.battery) is not None:
             recharge = domain.GENERATE_RECHARGE_PATH
             phase_s = draws.phase(recharge, station.docking_check_period_s)
-            nodes[recharge] = GenerateRechargePath(env, sender(recharge), station, self._battery, phase_s)
+            nodes[recharge] = GenerateRechargePath(
+                env, sender(recharge), station, self._battery, phase_s
+            )
         self._surface = None if described.leak is None else Surface(env, sender(domain.SURFACE))
         if self._surface is not None:
             nodes[domain.SURFACE] = self._surface
@@ -368,7 +415,9 @@ class Mission:
             try:
                 nodes[name] = node = kind(context)
                 if not hasattr(node, "context"):
-                    raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(context)")
+                    raise TypeError(
+                        f"{kind.__name__}.__init__ does not begin with super().__init__(context)"
+                    )
             except RAISED as error:
                 raise self._error_of(error, name) from error
         return nodes
@@ -377,19 +426,26 @@ class Mission:
         described, draws = self._scenario, self._draws
         surfaced = None if self._surface is None else self._surface.surfaced
         follow, log = self._follow, self._recorder.log
-        coordinator = MissionCoordinator(self.env, described, draws, self._detector, follow, log, surfaced)
+        coordinator = MissionCoordinator(
+            self.env, described, draws, self._detector, follow, log, surfaced
+        )
         level = None if described.battery is None else described.battery.mission_ends_at_level
         if self._battery is not None and level is not None:
             self.env.process(coordinator.watch_battery(self._battery, level))
         if described.leak is not None:
-            self.env.process(leak_monitor(self.env, self.bus, draws.value("leak.time_s"), coordinator.give_up))
+            self.env.process(
+                leak_monitor(self.env, self.bus, draws.value("leak.time_s"), coordinator.give_up)
+            )
         return coordinator
 
     def _observe(self) -> None:
         """Have metrics and record told what they are made of."""
         modes, bus = self.mode_manager, self.bus
         self.components = components = dict[str, str]()
-        bus.subscribe(lambda report: components.update({report.key: str(report.value)}), (Kind.COMPONENT_STATUS,))
+        bus.subscribe(
+            lambda report: components.update({report.key: str(report.value)}),
+            (Kind.COMPONENT_STATUS,),
+        )
         bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
         modes.listeners.append(self._reactions.mode_effect)
         if self._scenario.further_columns:
@@ -407,7 +463,9 @@ class Mission:
             (Kind.POSE, "pose"): lambda: self.pose,
             (Kind.DISTANCE, "distance_inspected_m"): lambda: self._follow.distance_m,
         }
-        start_monitors(self.env, self.bus, self._measurements.values(), states, self._detector.detected)
+        start_monitors(
+            self.env, self.bus, self._measurements.values(), states, self._detector.detected
+        )
         self.env.process(
             thruster_monitor(
                 self._thrusters,
@@ -430,9 +488,13 @@ class Mission:
         if self._scenario.further_columns:
             self._further.reasoning_time_s = self.manager.reasoning_time_s
             if self._surface is not None and self._surface.surfaced_s is not None:
-                self._further.surfacing_time_s = self._surface.surfaced_s - self._draws.drawn["leak.time_s"]
+                self._further.surfacing_time_s = (
+                    self._surface.surfaced_s - self._draws.drawn["leak.time_s"]
+                )
             further = self._further.columns(metrics)
-        refusals = [str(self.mode_manager.refusal(*request)) for request in self.mode_manager.refused]
+        refusals = [
+            str(self.mode_manager.refusal(*request)) for request in self.mode_manager.refused
+        ]
         return MissionResult(
             metrics,
             tuple(recorder.events),

@@ -31,10 +31,15 @@ if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
 
 
 def draw_start(draws: Draws) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Draw where a run's mission begins, and where its search has its origin: x and y of each, world frame, m."""
+    """Draw where a run's mission begins, and where its search has its origin: x and y of each,
+    world frame, m.
+    """
     value = draws.value
     x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
-    return (x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m"))
+    return (x_m, y_m), (
+        x_m + value("calibration.origin_x_m"),
+        y_m + value("calibration.origin_y_m"),
+    )
 
 
 class PreparedScenario:
@@ -49,15 +54,26 @@ class PreparedScenario:
     ) -> None:
         self.loaded, self.runs_per_draw, self.training = loaded, dict(runs_per_draw), training
         scenario = loaded.scenario
-        self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
+        self.points = sample_points(
+            scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece
+        )
         self.path = InspectionPath.there_and_back(self.points, scenario.revision.follow.altitude_m)
-        detected = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
+        detected = self.points + np.array(
+            [0.0, 0.0, scenario.revision.monitors.detected_point_height_m]
+        )
         self.detected_points, self.view_tangent = detected, scenario.vehicle.camera.tangent
-        self.bounds_m: tuple[Point, Point] = tuple(detected.min(axis=0).tolist()), tuple(detected.max(axis=0).tolist())
-        self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        self.bounds_m: tuple[Point, Point] = (
+            tuple(detected.min(axis=0).tolist()),
+            tuple(detected.max(axis=0).tolist()),
+        )
+        self.duration_s = (
+            scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        )
         self.custom_functions = custom_functions(loaded)
         calibrated = [name for name in Autopilot._fields if name in Calibration.model_fields]
-        self.autopilot = Autopilot(**{name: getattr(scenario.calibration, name) for name in calibrated})
+        self.autopilot = Autopilot(
+            **{name: getattr(scenario.calibration, name) for name in calibrated}
+        )
         self.vehicle_model = vehicle_model(scenario.vehicle)
         self.numbers: dict[str, float] = {}
         self._spare_tracks: list[Array] = []
@@ -73,21 +89,32 @@ class PreparedScenario:
     def manager_inputs(self, manager: str) -> tuple[Mapping[str, Path], Mapping[str, Any]]:
         """Find the files that a manager declares, by their names as given, and its training result.
 
-        The result is mutable in training; otherwise it is the content of the file that `learned` names, if any.
+        The result is mutable in training; otherwise it is the content of the file that `learned`
+        names, if any.
 
         Raises:
-            InputError: a file is not there; or the training result cannot be read, or has something else in it.
+            InputError: a file is not there; or the training result cannot be read, or has something
+                else in it.
         """
         if manager not in self._manager_inputs:
             found = declared_files([self.loaded], {manager: manager_class(manager)})
             declared = {name: path for (_, name), path in found.items()}
-            name = None if self.training is not None else self.loaded.manager_settings(manager).get("learned")
+            name = (
+                None
+                if self.training is not None
+                else self.loaded.manager_settings(manager).get("learned")
+            )
             path = None if name is None else self.loaded.manager_file(manager, str(name))
-            self._manager_inputs[manager] = declared, MappingProxyType({}) if path is None else read_learned(path)
+            self._manager_inputs[manager] = (
+                declared,
+                MappingProxyType({}) if path is None else read_learned(path),
+            )
         files, learned = self._manager_inputs[manager]
         return files, learned if self.training is None else self.training.setdefault(manager, {})
 
-    def make_vehicle(self, draws: Draws, start_m: tuple[float, float], track: Array, reasons: bool) -> Vehicle:
+    def make_vehicle(
+        self, draws: Draws, start_m: tuple[float, float], track: Array, reasons: bool
+    ) -> Vehicle:
         """Make the vehicle of one mission; if the manager reasons, it slows the simulator down."""
         scenario, value = self.loaded.scenario, draws.value
         loss = value("calibration.real_time_factor_loss")
@@ -108,8 +135,14 @@ class PreparedScenario:
         )
 
     def take_track(self) -> Array:
-        """Return memory for a vehicle's track; to allocate it for each mission would fragment memory."""
-        return self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), COLUMNS))
+        """Return memory for a vehicle's track; to allocate it for each mission would fragment
+        memory.
+        """
+        return (
+            self._spare_tracks.pop()
+            if self._spare_tracks
+            else np.empty((track_rows(self.duration_s), COLUMNS))
+        )
 
     def give_back(self, track: Array) -> None:
         """Keep the memory of a mission that is no longer needed for the next one."""
@@ -118,14 +151,20 @@ class PreparedScenario:
 
 @lru_cache(maxsize=64)
 def vehicle_model(description: VehicleDescription) -> VehicleModel:
-    """Return a vehicle's constants; equal descriptions give the same object, which is the key of cached results."""
+    """Return a vehicle's constants; equal descriptions give the same object, which is the key of
+    cached results.
+    """
     values = {each.name: getattr(description, each.name) for each in fields(VehicleModel)}
     thrusters = tuple(Thruster(each.position_m, each.direction) for each in description.thrusters)
     return VehicleModel(**values | {"thrusters": thrusters})
 
 
-def _draw_current(wave: CurrentWaveDescription | None, draws: Draws) -> tuple[Point, tuple[float, float, float, float]]:
-    """Draw the current: its constant part, and the part that varies over time, as the vehicle needs it."""
+def _draw_current(
+    wave: CurrentWaveDescription | None, draws: Draws
+) -> tuple[Point, tuple[float, float, float, float]]:
+    """Draw the current: its constant part, and the part that varies over time, as the vehicle needs
+    it.
+    """
     value = draws.value
     x, y, z = (value(f"current.{axis}_m_per_s") for axis in "xyz")
     if wave is None:
@@ -133,5 +172,10 @@ def _draw_current(wave: CurrentWaveDescription | None, draws: Draws) -> tuple[Po
     east, north = cos(direction_rad := value("current.wave.direction_rad")), sin(direction_rad)
     mean, amplitude = value("current.wave.mean_m_per_s"), value("current.wave.amplitude_m_per_s")
     rate = 2.0 * pi / wave.period_s
-    varying = amplitude * east, amplitude * north, rate * STEP_S, rate * value("current.wave.shift_s")
+    varying = (
+        amplitude * east,
+        amplitude * north,
+        rate * STEP_S,
+        rate * value("current.wave.shift_s"),
+    )
     return (x + mean * east, y + mean * north, z), varying

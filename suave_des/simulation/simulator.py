@@ -13,9 +13,10 @@ class Simulator(PreparedScenario):
 
     Args:
         loaded: the scenario with its files.
-        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
-        training: what each manager has learned, by its name, kept from mission to mission; None: missions are no
-            training.
+        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path
+            is not in it.
+        training: what each manager has learned, by its name, kept from mission to mission; None:
+            missions are no training.
 
     Example:
         >>> simulator = Simulator(load_scenario("seams2023"))
@@ -23,12 +24,15 @@ class Simulator(PreparedScenario):
         89.0
     """
 
-    def run(self, manager: ManagerLike, run: int, seed: int, *, record: bool = False) -> MissionResult:
+    def run(
+        self, manager: ManagerLike, run: int, seed: int, *, record: bool = False
+    ) -> MissionResult:
         """Run one mission.
 
         Args:
             manager: name of the managing subsystem, module:Class, or a class.
-            run: number of the run in its campaign; together with the seed it decides everything that is random.
+            run: number of the run in its campaign; together with the seed it decides everything
+                that is random.
             seed: seed of the campaign.
             record: whether to keep events and trajectory.
 

@@ -1,8 +1,10 @@
-"""The vehicle's motion: rigid body, thrusters and guided autopilot, stepped on a fixed grid by one compiled loop.
+"""The vehicle's motion: rigid body, thrusters and guided autopilot, stepped on a fixed grid by one
+compiled loop.
 
-One row of the track holds everything that the next step needs. Attitude is a quaternion (Fossen, Handbook of Marine
-Craft Hydrodynamics and Motion Control, 2.2.2): no trigonometry in the loop, and no singularity for a vehicle that
-tumbles. The other numbers after "Handbook" are sections or equations of that book.
+One row of the track holds everything that the next step needs. Attitude is a quaternion (Fossen,
+Handbook of Marine Craft Hydrodynamics and Motion Control, 2.2.2): no trigonometry in the loop, and
+no singularity for a vehicle that tumbles. The other numbers after "Handbook" are sections or
+equations of that book.
 """
 
 import math
@@ -36,10 +38,16 @@ RIGHTING = 5  # buoyancy times its height above the centre of mass, N m
 DRAG = 6  # six coefficients of -c |nu| nu, each divided by its mass or moment of inertia, 1/m and 1/rad
 POSITION_GAIN, POSITION_GAIN_Z = 12, 13  # velocity for a position error, 1/s
 JERK = 14  # of a leg, m/s^3
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = 15, 16  # acceleration for a horizontal velocity error, 1/s; its integral, 1/s^2
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = (
+    15,
+    16,
+)  # acceleration for a horizontal velocity error, 1/s; its integral, 1/s^2
 VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z = 17, 18  # the same for a vertical one
 INTEGRAL_LIMIT = 19  # of each velocity integral, m/s^2
-ROLL_GAIN, ROLL_RATE_GAIN = 20, 21  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
+ROLL_GAIN, ROLL_RATE_GAIN = (
+    20,
+    21,
+)  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
 HEADING_GAIN, HEADING_RATE_GAIN = 22, 23  # the same for the heading
 HEADING_INTEGRAL_GAIN = 24  # 1/s^3
 HEADING_INTEGRAL_LIMIT = 25  # rad/s^2
@@ -48,16 +56,20 @@ FLOOR, CEILING = 29, 30  # z of sea bed and surface, m
 WAVE_X, WAVE_Y = 31, 32  # amplitude of the varying part of the current, east and north, m/s
 WAVE_RATE, WAVE_PHASE = 33, 34  # its angle per row and at row 0, rad
 
-# Columns of the thrusters' array: what each can give, equal for one that has failed, and gave in the last step, N.
+# Columns of the thrusters' array: what each can give, equal for one that has failed, and gave in
+# the last step, N.
 LEAST, GREATEST, LAST = 0, 1, 2
 
 ARRIVED_M = 2.0
-"""ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
+"""ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to
+its end.
+"""
 
-# Columns of a course: a timer's start and period, s; half the width and height of the box around a way-point in which
-# it counts as reached, m; ticks from sending it to its first check, to sending it again, and again; what is added to x
-# and y in its set-point, and the set-point's z, m; the next tick that checks it, the one that sends it again, the last
-# to look at; its row, the first, the one after the last; how many set-points can be sent; time between rows, s.
+# Columns of a course: a timer's start and period, s; half the width and height of the box around a
+# way-point in which it counts as reached, m; ticks from sending it to its first check, to sending
+# it again, and again; what is added to x and y in its set-point, and the set-point's z, m; the next
+# tick that checks it, the one that sends it again, the last to look at; its row, the first, the one
+# after the last; how many set-points can be sent; time between rows, s.
 START, PERIOD, HALF_WIDTH, HALF_HEIGHT, FEWEST, MOST, MOST_AGAIN = range(7)
 SENT_X, SENT_Y, SENT_Z, TICK, AGAIN, UNTIL, PLACE, FIRST, END, ROOM, GRID = range(7, 18)
 
@@ -83,10 +95,11 @@ def clamp(value: float, limit: float) -> float:
 
 @compiled
 def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, float, float]:
-    """Begin the leg to a new set-point, as ArduPilot's waypoint controller does (AC_WPNav, set_wp_destination).
+    """Begin the leg to a new set-point, as ArduPilot's waypoint controller does (AC_WPNav,
+    set_wp_destination).
 
-    If the leg before is completed, the new one starts at its end. If not, the controller starts from the stopping
-    point of the vehicle, without the integral that it had built up.
+    If the leg before is completed, the new one starts at its end. If not, the controller starts
+    from the stopping point of the vehicle, without the integral that it had built up.
 
     Returns:
         Where the leg starts, x, y and z in m; the integral in x and y.
@@ -98,7 +111,8 @@ def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, 
         return to_x, to_y, to_z, track[row, 13], track[row, 14]
     qw, qx, qy, qz = track[row, 3], track[row, 4], track[row, 5], track[row, 6]
     u, v, w = track[row, 7], track[row, 8], track[row, 9]
-    # R nu as q nu q*: nu + 2 qw (e x nu) + 2 e x (e x nu), with the vector part e of q (Handbook, 2.2.2).
+    # R nu as q nu q*: nu + 2 qw (e x nu) + 2 e x (e x nu), with the vector part e of q (Handbook,
+    # 2.2.2).
     cx, cy, cz = qy * w - qz * v, qz * u - qx * w, qx * v - qy * u
     wx = u + 2.0 * (qw * cx + qy * cz - qz * cy)
     wy = v + 2.0 * (qw * cy + qz * cx - qx * cz)
@@ -109,14 +123,18 @@ def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, 
 
 @compiled
 def row_of(tick: int, timer: tuple[float, float, float]) -> int:
-    """Find the row nearest to a tick of a timer: time of tick 0, time between ticks, and time between rows, s."""
+    """Find the row nearest to a tick of a timer: time of tick 0, time between ticks, and time
+    between rows, s.
+    """
     start_s, period_s, grid_s = timer
     return int(np.rint((start_s + tick * period_s) / grid_s))
 
 
 @compiled
 def is_in_box(track: Array, row: int, box: tuple[float, float, float, float, float]) -> bool:
-    """Say whether a row's position is in a box: x, y and z of its centre, half its width and half its height, m."""
+    """Say whether a row's position is in a box: x, y and z of its centre, half its width and half
+    its height, m.
+    """
     x, y, z, half_width, half_height = box
     off_x, off_y, off_z = abs(track[row, 0] - x), abs(track[row, 1] - y), abs(track[row, 2] - z)
     return bool(off_x <= half_width and off_y <= half_width and off_z <= half_height)
@@ -132,7 +150,8 @@ def advance(
     timer: tuple[float, float, float],
     tick: int,
 ) -> int:
-    """Fill rows first + 1 .. last of the track from row `first`, with one set-point, and no thruster failing.
+    """Fill rows first + 1 .. last of the track from row `first`, with one set-point, and no
+    thruster failing.
 
     Args:
         track: shape (rows, COLUMNS); written in place.
@@ -147,7 +166,11 @@ def advance(
     check_row = row_of(tick, timer)
     h, set_point, prm, allocation, wrenches, thrusters = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
-    heading_w, heading_z, number = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN], set_point[NUMBER]
+    heading_w, heading_z, number = (
+        set_point[HALF_HEADING_COS],
+        set_point[HALF_HEADING_SIN],
+        set_point[NUMBER],
+    )
     # Unpacking a slice would create an array, which takes as long as a step.
     x, y, z = track[first, 0], track[first, 1], track[first, 2]
     qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
@@ -169,7 +192,12 @@ def advance(
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
     top_speed = prm[JERK] * quarter * quarter
     # A multiplication takes a fraction of the time of a division.
-    inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = 1.0 / mass, 1.0 / ixx, 1.0 / iyy, 1.0 / izz
+    inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = (
+        1.0 / mass,
+        1.0 / ixx,
+        1.0 / iyy,
+        1.0 / izz,
+    )
     for row in range(first + 1, last + 1):
         # Rotation matrix R, body to world (Handbook, 2.69).
         r00 = 1.0 - 2.0 * (qy * qy + qz * qz)
@@ -182,8 +210,13 @@ def advance(
         r21 = 2.0 * (qy * qz + qx * qw)
         r22 = 1.0 - 2.0 * (qx * qx + qy * qy)
 
-        # Guided autopilot. Its target moves along the leg: jerk +, -, -, + for a quarter of the leg's time each.
-        wx, wy, wz = r00 * u + r01 * v + r02 * w, r10 * u + r11 * v + r12 * w, r20 * u + r21 * v + r22 * w
+        # Guided autopilot. Its target moves along the leg: jerk +, -, -, + for a quarter of the
+        # leg's time each.
+        wx, wy, wz = (
+            r00 * u + r01 * v + r02 * w,
+            r10 * u + r11 * v + r12 * w,
+            r20 * u + r21 * v + r22 * w,
+        )
         leg_time += h
         distance, speed = length, 0.0
         left = min(leg_time, 4.0 * quarter - leg_time)  # time to the nearer end
@@ -198,9 +231,14 @@ def advance(
                 distance = 0.5 * length - left * (top_speed - slower / 3.0)
             if leg_time > 2.0 * quarter:
                 distance = length - distance
-        ex, ey, ez = from_x + distance * along_x - x, from_y + distance * along_y - y, from_z + distance * along_z - z
-        # Outer loop: position error to velocity, besides the target's own. Inner loop: proportional-integral on the
-        # velocity's error in the world frame, demanded as a force in the body frame.
+        ex, ey, ez = (
+            from_x + distance * along_x - x,
+            from_y + distance * along_y - y,
+            from_z + distance * along_z - z,
+        )
+        # Outer loop: position error to velocity, besides the target's own. Inner loop:
+        # proportional-integral on the velocity's error in the world frame, demanded as a force in
+        # the body frame.
         ex = prm[POSITION_GAIN] * ex + along_x * speed - wx
         ey = prm[POSITION_GAIN] * ey + along_y * speed - wy
         ez = prm[POSITION_GAIN_Z] * ez + along_z * speed - wz
@@ -215,7 +253,8 @@ def advance(
         d1 = r01 * fx + r11 * fy + r21 * fz
         d2 = r02 * fx + r12 * fy + r22 * fz
 
-        # Attitude: the vector part of conj(q) * q_heading is half the turn that is left, in the body frame.
+        # Attitude: the vector part of conj(q) * q_heading is half the turn that is left, in the
+        # body frame.
         ew = qw * heading_w + qz * heading_z
         sign = 2.0 if ew >= 0.0 else -2.0
         e_roll = sign * (-qx * heading_w - qy * heading_z)
@@ -225,12 +264,15 @@ def advance(
         d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
         d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
 
-        # Thrusters: allocate as if all worked, limit each. One loop, min and max, or C's order: 4 to 13% slower.
+        # Thrusters: allocate as if all worked, limit each. One loop, min and max, or C's order: 4
+        # to 13% slower.
         for i in range(6):
             thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
             thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
             least, greatest = thrusters[i, LEAST], thrusters[i, GREATEST]
-            thrusters[i, LAST] = least if thrust < least else greatest if thrust > greatest else thrust
+            thrusters[i, LAST] = (
+                least if thrust < least else greatest if thrust > greatest else thrust
+            )
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
         for i in range(6):
             thrust = thrusters[i, LAST]
@@ -241,14 +283,16 @@ def advance(
             t4 += wrenches[4, i] * thrust
             t5 += wrenches[5, i] * thrust
 
-        # Buoyancy above the centre of mass: a net force, and a moment that rights roll and pitch (Handbook, 4.1).
+        # Buoyancy above the centre of mass: a net force, and a moment that rights roll and pitch
+        # (Handbook, 4.1).
         t0 += prm[NET_BUOYANCY] * r20
         t1 += prm[NET_BUOYANCY] * r21
         t2 += prm[NET_BUOYANCY] * r22
         t3 -= prm[RIGHTING] * r21
         t4 += prm[RIGHTING] * r20
 
-        # M nu' = tau - C(nu) nu - D(nu_r) nu_r, drag taken implicitly: it stays stable at any speed.
+        # M nu' = tau - C(nu) nu - D(nu_r) nu_r, drag taken implicitly: it stays stable at any
+        # speed.
         cx, cy, cz = prm[CURRENT], prm[CURRENT + 1], prm[CURRENT + 2]
         if prm[WAVE_RATE] != 0.0:  # the current varies over time, which the row counts
             wave = math.sin(prm[WAVE_RATE] * row + prm[WAVE_PHASE])
@@ -269,11 +313,13 @@ def advance(
         q = (q + h * aq) / (1.0 + h * prm[DRAG + 4] * abs(q))
         r = (r + h * ar) / (1.0 + h * prm[DRAG + 5] * abs(r))
 
-        # Kinematics with the new velocity (semi-implicit Euler): p' = R v, q' = T_q(q) omega (Handbook, 2.86).
+        # Kinematics with the new velocity (semi-implicit Euler): p' = R v, q' = T_q(q) omega
+        # (Handbook, 2.86).
         x += h * (r00 * u + r01 * v + r02 * w)
         y += h * (r10 * u + r11 * v + r12 * w)
         z += h * (r20 * u + r21 * v + r22 * w)
-        # Neither into the sea bed nor out of the water; like ArduSub's, the controller does not wind up against it.
+        # Neither into the sea bed nor out of the water; like ArduSub's, the controller does not
+        # wind up against it.
         if z < prm[FLOOR] or z > prm[CEILING]:
             z = min(max(z, prm[FLOOR]), prm[CEILING])
             through = r20 * u + r21 * v + r22 * w
@@ -287,8 +333,9 @@ def advance(
         qx += 0.5 * h * dx
         qy += 0.5 * h * dy
         qz += 0.5 * h * dz
-        # The norm's inverse: near 1, one step of Newton's method from there is less than 4e-7 off, which the next row
-        # corrects; the square root and the division take an eighth of a step's time.
+        # The norm's inverse: near 1, one step of Newton's method from there is less than 4e-7 off,
+        # which the next row corrects; the square root and the division take an eighth of a step's
+        # time.
         square = qw * qw + qx * qx + qy * qy + qz * qz
         scale = 1.5 - 0.5 * square if abs(square - 1.0) < 1e-3 else 1.0 / math.sqrt(square)
         qw, qx, qy, qz = qw * scale, qx * scale, qy * scale, qz * scale
@@ -300,7 +347,11 @@ def advance(
         track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir
         track[row, 17], track[row, 18], track[row, 19] = from_x, from_y, from_z
         track[row, 20], track[row, 21], track[row, 22] = to_x, to_y, to_z
-        track[row, LEG_TIME], track[row, LEG_QUARTER], track[row, SET_POINT_NUMBER] = leg_time, quarter, number
+        track[row, LEG_TIME], track[row, LEG_QUARTER], track[row, SET_POINT_NUMBER] = (
+            leg_time,
+            quarter,
+            number,
+        )
         while row == check_row:
             if is_in_box(track, row, box):
                 return tick
@@ -311,23 +362,31 @@ def advance(
 
 @compiled
 def fly_waypoints(
-    track: Array, computed: int, end: int, dynamics: Dynamics, waypoints: Array, courses: Array, sends: IntArray
+    track: Array,
+    computed: int,
+    end: int,
+    dynamics: Dynamics,
+    waypoints: Array,
+    courses: Array,
+    sends: IntArray,
 ) -> tuple[int, bool, int]:
-    """Fly along one course or two: a tick that finds a way-point reached, or not in time, sends a set-point.
+    """Fly along one course or two: a tick that finds a way-point reached, or not in time, sends a
+    set-point.
 
     Args:
-        track, computed, dynamics: as for `advance`, and the last row that is filled; the set-point given last remains.
+        track, computed, dynamics: as for `advance`, and the last row that is filled; the set-point
+        given last remains.
         end: the row up to which to fill, after the first course's last tick.
         waypoints: x, y and z in the first columns, m, shape (n, at least 3).
         courses: shape (courses, 18), see `START` and the others.
-        sends: shape (m, 4), with one more than the courses' room in all; receives for each set-point its tick, its
-            course, how many of the course's way-points are reached by then, and the tick that sends it again. The last
-            of them is not given if there is no room for more, if it leads to no way-point, or if the one before is
-            reached but for its height.
+        sends: shape (m, 4), with one more than the courses' room in all; receives for each
+            set-point its tick, its course, how many of the course's way-points are reached by then,
+            and the tick that sends it again. The last of them is not given if there is no room for
+            more, if it leads to no way-point, or if the one before is reached but for its height.
 
     Returns:
-        How many set-points there are; whether the last of them is left to the caller; and the last row of the track
-        that is now filled. Ticks beyond the track do not count.
+        How many set-points there are; whether the last of them is left to the caller; and the last
+        row of the track that is now filled. Ticks beyond the track do not count.
     """
     set_point, sent, last_row, courses = dynamics[1], 0, track.shape[0] - 1, courses.copy()
     while True:
@@ -340,7 +399,13 @@ def fly_waypoints(
         tick, again, place = int(this[TICK]), int(this[AGAIN]), int(this[PLACE])
         if tick > until or row_of(tick, timer) > last_row:
             break
-        box = waypoints[place, 0], waypoints[place, 1], waypoints[place, 2], this[HALF_WIDTH], this[HALF_HEIGHT]
+        box = (
+            waypoints[place, 0],
+            waypoints[place, 1],
+            waypoints[place, 2],
+            this[HALF_WIDTH],
+            this[HALF_HEIGHT],
+        )
         if row_of(tick, timer) > computed:
             goal = again if courses.shape[0] == 1 else tick
             last = min(row_of(int(min(goal, until)), timer), last_row)
@@ -359,14 +424,27 @@ def fly_waypoints(
         is_level = is_reached or not is_in_box(track, row, (*box[:4], np.inf))
         place += is_reached
         again = tick + int(this[MOST] if is_reached else this[MOST_AGAIN])
-        sends[sent, 0], sends[sent, 1], sends[sent, 2], sends[sent, 3] = tick, course, place - int(this[FIRST]), again
+        sends[sent, 0], sends[sent, 1], sends[sent, 2], sends[sent, 3] = (
+            tick,
+            course,
+            place - int(this[FIRST]),
+            again,
+        )
         sent += 1
         if place == this[END] or this[ROOM] == 0.0 or not is_level:
             return sent, True, computed
-        set_point[0], set_point[1] = waypoints[place, 0] + this[SENT_X], waypoints[place, 1] + this[SENT_Y]
+        set_point[0], set_point[1] = (
+            waypoints[place, 0] + this[SENT_X],
+            waypoints[place, 1] + this[SENT_Y],
+        )
         set_point[2] = this[SENT_Z]
         set_point[NUMBER] += 1.0
         computed = row  # rows beyond it were flown to another set-point
-        this[TICK], this[AGAIN], this[PLACE], this[ROOM] = tick + this[FEWEST], again, place, this[ROOM] - 1.0
+        this[TICK], this[AGAIN], this[PLACE], this[ROOM] = (
+            tick + this[FEWEST],
+            again,
+            place,
+            this[ROOM] - 1.0,
+        )
     advance(track, computed, end, dynamics, *UNCHECKED)
     return sent, False, max(computed, end)

@@ -1,8 +1,10 @@
-"""Constants of a vehicle and its autopilot, its pose, and how its thrusters make a generalised force.
+"""Constants of a vehicle and its autopilot, its pose, and how its thrusters make a generalised
+force.
 
-Body frame: x forward, y left, z up, origin at the centre of mass. Generalised force tau = (X, Y, Z, K, M, N) in N and N
-m, generalised velocity nu = (u, v, w, p, q, r) in m/s and rad/s (Fossen, Handbook of Marine Craft Hydrodynamics and
-Motion Control, section 2.1; the axes here follow the exemplar, z up, and so do the signs).
+Body frame: x forward, y left, z up, origin at the centre of mass. Generalised force tau = (X, Y, Z,
+K, M, N) in N and N m, generalised velocity nu = (u, v, w, p, q, r) in m/s and rad/s (Fossen,
+Handbook of Marine Craft Hydrodynamics and Motion Control, section 2.1; the axes here follow the
+exemplar, z up, and so do the signs).
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ GRAVITY_M_PER_S2 = 9.80665
 
 
 class Pose(NamedTuple):
-    """eta in the world frame: position in m, attitude as Euler angles in rad (order z, y, x; Handbook, 2.2.1)."""
+    """eta in the world frame: position in m, attitude as Euler angles in rad (order z, y, x;
+    Handbook, 2.2.1).
+    """
 
     x_m: float
     y_m: float
@@ -31,7 +35,9 @@ class Pose(NamedTuple):
     yaw_rad: float
 
 
-def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
+def quaternion(
+    roll_rad: float, pitch_rad: float, yaw_rad: float
+) -> tuple[float, float, float, float]:
     """Convert Euler angles to a unit quaternion (w, x, y, z) (Handbook, 2.2.3)."""
     cr, cp, cy = cos(roll_rad / 2), cos(pitch_rad / 2), cos(yaw_rad / 2)
     sr, sp, sy = sin(roll_rad / 2), sin(pitch_rad / 2), sin(yaw_rad / 2)
@@ -40,7 +46,9 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float
 
 
 def euler_angles(attitude: Array) -> tuple[float, float, float]:
-    """Convert a unit quaternion (w, x, y, z), shape (4,), to roll, pitch and yaw in rad (Handbook, 2.2.3)."""
+    """Convert a unit quaternion (w, x, y, z), shape (4,), to roll, pitch and yaw in rad (Handbook,
+    2.2.3).
+    """
     w, x, y, z = attitude.tolist()
     roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
@@ -50,7 +58,9 @@ def euler_angles(attitude: Array) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Thruster:
-    """One thruster: its position, and the direction of its force at positive command (a unit vector)."""
+    """One thruster: its position, and the direction of its force at positive command (a unit
+    vector).
+    """
 
     position_m: tuple[float, float, float]
     direction: tuple[float, float, float]
@@ -58,12 +68,14 @@ class Thruster:
 
 @dataclass(frozen=True, eq=False)
 class VehicleModel:
-    """A rigid body with thrusters in water; compared by identity, which makes cached results quick to look up.
+    """A rigid body with thrusters in water; compared by identity, which makes cached results quick
+    to look up.
 
     Attributes:
         inertia_kg_m2: principal moments (Ixx, Iyy, Izz).
         centre_of_buoyancy_m: height above the centre of mass at which buoyancy acts.
-        quadratic_drag: coefficients of -c |nu| nu for the six components of nu, N s^2/m^2 and N m s^2.
+        quadratic_drag: coefficients of -c |nu| nu for the six components of nu, N s^2/m^2 and N m
+            s^2.
         thrust_limit_n: largest thrust of each thruster, in both directions.
     """
 
@@ -78,37 +90,50 @@ class VehicleModel:
 
     @cached_property
     def wrenches(self) -> Array:
-        """B in tau = B u, shape (6, number of thrusters); column i: thruster i's wrench at 1 N (Handbook, 12.3)."""
-        wrenches = [(*each.direction, *np.cross(each.position_m, each.direction)) for each in self.thrusters]
+        """B in tau = B u, shape (6, number of thrusters); column i: thruster i's wrench at 1 N
+        (Handbook, 12.3).
+        """
+        wrenches = [
+            (*each.direction, *np.cross(each.position_m, each.direction)) for each in self.thrusters
+        ]
         return _read_only(np.array(wrenches).T)
 
     @cached_property
     def allocation(self) -> Array:
-        """B's pseudo-inverse, shape (number of thrusters, 6), by which the autopilot spreads a demanded wrench.
+        """B's pseudo-inverse, shape (number of thrusters, 6), by which the autopilot spreads a
+        demanded wrench.
 
-        It allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets none.
+        It allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a
+        BlueROV2) gets none.
         """
         return _read_only(np.linalg.pinv(self.wrenches, rcond=1e-9))
 
 
 class Autopilot(NamedTuple):
-    """The guided controller of ArduSub: legs from set-point to set-point, and loops that follow the target on them.
+    """The guided controller of ArduSub: legs from set-point to set-point, and loops that follow the
+    target on them.
 
-    A new set-point is the end of a leg; a target moves along it, from rest to rest with a limited jerk. Position errors
-    to the target demand a velocity, velocity errors a force (ArduPilot, AC_WPNav, SCurve and AC_PosControl). Its limits
-    of a leg's speed and acceleration are left out: only legs of more than 30 m, or 2 m up or down, would reach them.
+    A new set-point is the end of a leg; a target moves along it, from rest to rest with a limited
+    jerk. Position errors to the target demand a velocity, velocity errors a force (ArduPilot,
+    AC_WPNav, SCurve and AC_PosControl). Its limits of a leg's speed and acceleration are left out:
+    only legs of more than 30 m, or 2 m up or down, would reach them.
 
     Attributes:
-        position_gain_per_s: horizontal velocity demanded for each metre of position error; ArduSub's default is 1.0.
-        jerk_m_per_s3: of a leg. ArduSub's default is 1.0 with gradual changes of jerk; a constant 0.5 takes about as
-            long on legs of 0.3 m.
+        position_gain_per_s: horizontal velocity demanded for each metre of position error;
+            ArduSub's default is 1.0.
+        jerk_m_per_s3: of a leg. ArduSub's default is 1.0 with gradual changes of jerk; a constant
+            0.5 takes about as long on legs of 0.3 m.
         velocity_gain_per_s: horizontal acceleration demanded for each m/s of velocity error.
-        velocity_integral_gain_per_s2: horizontal acceleration demanded for each metre of integrated velocity error.
+        velocity_integral_gain_per_s2: horizontal acceleration demanded for each metre of integrated
+            velocity error.
         heading_frequency_rad_per_s: natural frequency of heading control, critically damped.
-        heading_integral_gain_per_s3: angular acceleration demanded for each rad s of integrated heading error.
+        heading_integral_gain_per_s3: angular acceleration demanded for each rad s of integrated
+            heading error.
         vertical_position_gain_per_s: as the horizontal one; ArduSub's default is 3.0.
-        vertical_velocity_gain_per_s, vertical_velocity_integral_gain_per_s2: as the horizontal ones.
-        roll_frequency_rad_per_s: natural frequency of roll control; missions are not sensitive to it.
+        vertical_velocity_gain_per_s, vertical_velocity_integral_gain_per_s2: as the horizontal
+        ones.
+        roll_frequency_rad_per_s: natural frequency of roll control; missions are not sensitive to
+            it.
     """
 
     position_gain_per_s: float = 1.0
@@ -124,13 +149,21 @@ class Autopilot(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]) -> Array:
-    """Put the constants of vehicle and autopilot into the places that `kernel` names, in water at rest."""
+def kernel_parameters(
+    model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]
+) -> Array:
+    """Put the constants of vehicle and autopilot into the places that `kernel` names, in water at
+    rest.
+    """
     ap = autopilot
-    # The integral is limited to the force that the four horizontal thrusters together give along one axis.
+    # The integral is limited to the force that the four horizontal thrusters together give along
+    # one axis.
     integral_limit = 4.0 * model.thrust_limit_n * sqrt(0.5) / model.mass_kg
     inertia = (model.mass_kg,) * 3 + model.inertia_kg_m2
-    drag = [coefficient / inert for coefficient, inert in zip(model.quadratic_drag, inertia, strict=True)]
+    drag = [
+        coefficient / inert
+        for coefficient, inert in zip(model.quadratic_drag, inertia, strict=True)
+    ]
     buoyancy_n = model.water_density_kg_per_m3 * model.displaced_volume_m3 * GRAVITY_M_PER_S2
     net_n = buoyancy_n - model.mass_kg * GRAVITY_M_PER_S2
     forces = net_n, buoyancy_n * model.centre_of_buoyancy_m, *drag

@@ -1,4 +1,6 @@
-"""A vehicle in mission time: events command and disturb it, it can be read at any time, and is integrated lazily."""
+"""A vehicle in mission time: events command and disturb it, it can be read at any time, and is
+integrated lazily.
+"""
 
 import math
 from bisect import bisect_left
@@ -10,7 +12,14 @@ import numpy as np
 
 from suave_des.compiling import Array
 from suave_des.vehicle import kernel
-from suave_des.vehicle.model import Autopilot, Pose, VehicleModel, euler_angles, kernel_parameters, quaternion
+from suave_des.vehicle.model import (
+    Autopilot,
+    Pose,
+    VehicleModel,
+    euler_angles,
+    kernel_parameters,
+    quaternion,
+)
 
 STEP_S = 0.05
 Point = tuple[float, float, float]
@@ -19,15 +28,18 @@ ThrusterState = Literal["works", "frozen", "dead"]
 
 
 class ArrivalCheck(NamedTuple):
-    """The times at which arrival at a way-point is checked, and the box in which a way-point counts as reached.
+    """The times at which arrival at a way-point is checked, and the box in which a way-point counts
+    as reached.
 
     Attributes:
         start_s: time of tick 0.
         period_s: time between ticks.
         half_width_m: greatest difference in x and in y.
         half_height_m: greatest difference in z.
-        first_check_ticks: from the tick that finds a way-point reached to the first check of the next one.
-        resend_ticks: from the tick that sends a way-point's set-point to the one that sends it again.
+        first_check_ticks: from the tick that finds a way-point reached to the first check of the
+            next one.
+        resend_ticks: from the tick that sends a way-point's set-point to the one that sends it
+            again.
         resend_again_ticks: the same, once it has been sent again.
     """
 
@@ -44,13 +56,17 @@ class ArrivalCheck(NamedTuple):
         return self.start_s + tick * self.period_s
 
     def last_tick_until(self, t_s: float) -> int:
-        """Find the last tick up to time t, inclusive: a tick at t comes before anything else that happens then."""
+        """Find the last tick up to time t, inclusive: a tick at t comes before anything else that
+        happens then.
+        """
         tick = math.floor((t_s - self.start_s) / self.period_s + 1e-9)
         return tick if self.time_s(tick) <= t_s else tick - 1
 
 
 Ticks = tuple[int, int, int]
-"""The first tick that checks a way-point, the one that sends it again if it is not reached, and the last to look at."""
+"""The first tick that checks a way-point, the one that sends it again if it is not reached, and the
+last to look at.
+"""
 
 
 class Course(NamedTuple):
@@ -72,11 +88,15 @@ class Course(NamedTuple):
 
 
 Sends = list[list[int]]
-"""Set-points to be sent: tick, course, how many of its way-points are reached by then, tick that sends it again."""
+"""Set-points to be sent: tick, course, how many of its way-points are reached by then, tick that
+sends it again.
+"""
 
 
 class _Queue(NamedTuple):
-    """Queued set-points: `before` is in force until the first of them is sent; `last_s` is the time of the last one."""
+    """Queued set-points: `before` is in force until the first of them is sent; `last_s` is the time
+    of the last one.
+    """
 
     courses: Sequence[Course]
     sends: Sends
@@ -93,25 +113,30 @@ class _Queue(NamedTuple):
 class Vehicle:
     """The vehicle of one mission.
 
-    The track is a table of states on a grid of `STEP_S` seconds of mission time. A reading at time t is the state at
-    the grid point nearest to t; a change of control at time t acts from that grid point on. Rows are filled when they
-    are first needed; a change of control drops the rows after it. So reading, however often, never changes the
-    trajectory, and looking ahead under the present control costs nothing but the integration.
+    The track is a table of states on a grid of `STEP_S` seconds of mission time. A reading at time
+    t is the state at the grid point nearest to t; a change of control at time t acts from that grid
+    point on. Rows are filled when they are first needed; a change of control drops the rows after
+    it. So reading, however often, never changes the trajectory, and looking ahead under the present
+    control costs nothing but the integration.
 
     Attributes:
         model: constants of body and thrusters.
         autopilot: the guided controller.
         start: pose at t = 0, at rest; the autopilot's first set-point is this place with heading 0.
         duration_s: length of the mission; nothing can be read beyond it.
-        altitude_error_m: how far above its set-point the autopilot holds the vehicle (seen in the real runs).
+        altitude_error_m: how far above its set-point the autopilot holds the vehicle (seen in the
+            real runs).
         current_m_per_s: velocity of the water, world frame.
-        current_wave: amplitude of a part that varies as a sine, east and north, m/s; and the sine's angle per row of
-            the track and at row 0, rad.
-        time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
+        current_wave: amplitude of a part that varies as a sine, east and north, m/s; and the sine's
+            angle per row of the track and at row 0, rad.
+        time_scale: simulated seconds that pass in a second of mission time (the simulator's
+            real-time factor).
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
-        track_listeners: each is called after a change of control with the first row that it affects.
-        control_listeners: called after a change of control by others, one after the other until one queues way-points.
+        track_listeners: each is called after a change of control with the first row that it
+            affects.
+        control_listeners: called after a change of control by others, one after the other until one
+            queues way-points.
         computed_row: last row of the track that is filled.
         thrusters: the state of each.
         expected_changes_s: the next time at which control may be changed, by what may change it.
@@ -139,7 +164,9 @@ class Vehicle:
         self.last_row = rows - 1
         self.track: Array = np.empty((rows, kernel.COLUMNS)) if memory is None else memory
         self.track[0] = 0.0
-        self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
+        self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[
+            0, kernel.LEG_END
+        ] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
         self.thrusters: list[ThrusterState] = ["works"] * len(model.thrusters)
         least_n, greatest_n = -model.thrust_limit_n, model.thrust_limit_n
@@ -149,7 +176,14 @@ class Vehicle:
         parameters[kernel.CURRENT : kernel.FLOOR] = self.current_m_per_s
         parameters[kernel.WAVE_X :] = self.current_wave
         step_s = STEP_S * self.time_scale
-        self._dynamics = step_s, self._set_point, parameters, model.allocation, model.wrenches, self._thrust_n
+        self._dynamics = (
+            step_s,
+            self._set_point,
+            parameters,
+            model.allocation,
+            model.wrenches,
+            self._thrust_n,
+        )
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point, which replaces the previous one."""
@@ -167,26 +201,36 @@ class Vehicle:
         thrust_n = 0.0
         if state == "frozen":  # the next step tells what it gives
             row = self.computed_row
-            kernel.advance(self.track, row, min(row + 1, self.last_row), self._dynamics, *kernel.UNCHECKED)
+            kernel.advance(
+                self.track, row, min(row + 1, self.last_row), self._dynamics, *kernel.UNCHECKED
+            )
             thrust_n = float(self._thrust_n[thruster - 1, kernel.LAST])
         self.thrusters[thruster - 1] = state
         self._thrust_n[thruster - 1, : kernel.LAST] = thrust_n - limit_n, thrust_n + limit_n
         self._control_changed(t_s)
 
-    def queue_waypoints(self, t_s: float, courses: list[Course], until_s: float, *, send: bool) -> tuple[Sends, bool]:
-        """Look ahead, and queue set-points: the tick that finds a way-point reached commands the next one.
+    def queue_waypoints(
+        self, t_s: float, courses: list[Course], until_s: float, *, send: bool
+    ) -> tuple[Sends, bool]:
+        """Look ahead, and queue set-points: the tick that finds a way-point reached commands the
+        next one.
 
-        One that is not reached in time is commanded again, unless it is reached but for its height. A change of control
-        cancels the set-points that are still queued then. Ticks after the mission's end do not count.
+        One that is not reached in time is commanded again, unless it is reached but for its height.
+        A change of control cancels the set-points that are still queued then. Ticks after the
+        mission's end do not count.
 
         Args:
             courses: one, or two that are flown at the same time.
-            until_s: up to where the track is filled if no set-point is left to the caller; not after the mission's end.
-            send: whether to command the first way-point of the first course now; the others are already commanded.
+            until_s: up to where the track is filled if no set-point is left to the caller; not
+                after the mission's end.
+            send: whether to command the first way-point of the first course now; the others are
+                already commanded.
 
         Returns:
-            The set-points as they will be sent if control does not change; and whether the last of them is left to the
-            caller: it is one too many, leads to none of the way-points, or might not be the same as before.
+            The set-points as they will be sent if control does not change; and whether the last of
+            them is left to the
+            caller: it is one too many, leads to none of the way-points, or might not be the same as
+                before.
         """
         is_new = send or (self._queue is not None and t_s < self._queue.last_s)
         if is_new:
@@ -199,11 +243,29 @@ class Vehicle:
         numbers = np.empty((len(courses), kernel.GRID + 1))
         for n, each in enumerate(courses):
             end = first + len(each.waypoints)
-            numbers[n] = *each.check, *each.sent_as_m, *each.ticks, first, first, end, each.most, STEP_S
+            numbers[n] = (
+                *each.check,
+                *each.sent_as_m,
+                *each.ticks,
+                first,
+                first,
+                end,
+                each.most,
+                STEP_S,
+            )
             first = end
-        before, sends = self._set_point.copy(), np.empty((sum([each.most + 1 for each in courses]), 4), np.int64)
+        before, sends = (
+            self._set_point.copy(),
+            np.empty((sum([each.most + 1 for each in courses]), 4), np.int64),
+        )
         count, is_due, self.computed_row = kernel.fly_waypoints(
-            self.track, self.computed_row, row_at(until_s), self._dynamics, waypoints, numbers, sends
+            self.track,
+            self.computed_row,
+            row_at(until_s),
+            self._dynamics,
+            waypoints,
+            numbers,
+            sends,
         )
         found: Sends = sends[:count].tolist()
         queued = found[: count - is_due]
@@ -237,7 +299,9 @@ class Vehicle:
         if row <= self.computed_row:
             return
         if row > self.last_row:  # compiled code would write past the track
-            raise ValueError(f"the vehicle's track ends at {self.last_row * STEP_S:g} s, before {row * STEP_S:g} s")
+            raise ValueError(
+                f"the vehicle's track ends at {self.last_row * STEP_S:g} s, before {row * STEP_S:g} s"
+            )
         kernel.advance(self.track, self.computed_row, row, self._dynamics, *kernel.UNCHECKED)
         self.computed_row = row
 
@@ -248,12 +312,17 @@ class Vehicle:
 
     def _replace_set_point(self, course: Course, place: int, *, new: int) -> None:
         set_point, (x_m, y_m, z_m) = self._set_point, course.sent_as_m
-        set_point[0], set_point[1] = course.waypoints.item(place, 0) + x_m, course.waypoints.item(place, 1) + y_m
+        set_point[0], set_point[1] = (
+            course.waypoints.item(place, 0) + x_m,
+            course.waypoints.item(place, 1) + y_m,
+        )
         set_point[2] = z_m
         set_point[kernel.NUMBER] += new
 
     def _cancel_after(self, t_s: float) -> None:
-        """Fill the track up to time t, and no further; from there on only the current set-point remains."""
+        """Fill the track up to time t, and no further; from there on only the current set-point
+        remains.
+        """
         self.computed_row = self._row(t_s)
         queue, self._queue = self._queue, None
         if queue is not None and t_s < queue.last_s:
@@ -281,5 +350,7 @@ def track_rows(duration_s: float) -> int:
 
 
 def row_at(t_s: float) -> int:
-    """Find the row of the track nearest to a mission time; ties go to the even row, as in every such conversion."""
+    """Find the row of the track nearest to a mission time; ties go to the even row, as in every
+    such conversion.
+    """
     return round(t_s / STEP_S)

@@ -1,6 +1,7 @@
 """The pipeline, and the mock-up of its detection: which of its points a downward camera sees.
 
-Source: the pipeline detection of kas-lab/suave, of 4 February 2023 and of 1.5.0; the paper, section on the mission.
+Source: the pipeline detection of kas-lab/suave, of 4 February 2023 and of 1.5.0; the paper, section
+on the mission.
 """
 
 from functools import cache
@@ -12,7 +13,9 @@ from suave_des.compiling import Array, compiled
 
 
 @cache
-def sample_points(vertices_m: tuple[tuple[float, float, float], ...], points_per_piece: int = 20) -> Array:
+def sample_points(
+    vertices_m: tuple[tuple[float, float, float], ...], points_per_piece: int = 20
+) -> Array:
     """Sample points along the pipeline, shape (pieces * points_per_piece, 3), in m.
 
     Each straight piece gives evenly spaced points, its first vertex excluded and its last included.
@@ -29,13 +32,18 @@ def first_point_in_view(
 ) -> int:
     """Find the lowest index of the points that a camera at (x, y, z) sees, -1 if none.
 
-    With h the vertical distance to a point, the point is in view within h * tan(field of view / 2) in x and in y, and
-    visible if h is at most the water visibility. `view_tangent` is the tangent of half the field of view.
+    With h the vertical distance to a point, the point is in view within h * tan(field of view / 2)
+    in x and in y, and visible if h is at most the water visibility. `view_tangent` is the tangent
+    of half the field of view.
     """
     for index in range(points.shape[0]):
         h = abs(z_m - points[index, 2])
         d = h * view_tangent
-        if abs(y_m - points[index, 1]) <= d and abs(x_m - points[index, 0]) <= d and h <= visibility_m:
+        if (
+            abs(y_m - points[index, 1]) <= d
+            and abs(x_m - points[index, 0]) <= d
+            and h <= visibility_m
+        ):
             return index
     return -1
 
@@ -56,15 +64,20 @@ def first_detection(
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
         rows: the first and the last row that count.
         row_s: time between rows.
-        visibility: measured water visibility: the times, s, ascending, of the values, m; none before the first one.
-        points, bounds_m: points as the detection places them, shape (n, 3), m; the least and the greatest coordinates.
+        visibility: measured water visibility: the times, s, ascending, of the values, m; none
+            before the first one.
+        points, bounds_m: points as the detection places them, shape (n, 3), m; the least and the
+        greatest coordinates.
         view_tangent: tangent of half the camera's field of view.
     """
-    (low_x, low_y, low_z), (high_x, high_y, high_z) = bounds_m  # finding them here would take 2 s to compile
+    (low_x, low_y, low_z), (high_x, high_y, high_z) = (
+        bounds_m  # finding them here would take 2 s to compile
+    )
     (times_s, visibility_m), measured = visibility, 0
     for row in range(rows[0], rows[1] + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
-        # Far from the pipeline's bounding box no point can be in view: most rows of a search end here.
+        # Far from the pipeline's bounding box no point can be in view: most rows of a search end
+        # here.
         widest = max(abs(z - low_z), abs(z - high_z)) * view_tangent
         if x < low_x - widest or x > high_x + widest or y < low_y - widest or y > high_y + widest:
             continue

@@ -1,4 +1,6 @@
-"""Signals: quantities over mission time that do not depend on the vehicle, such as the water visibility."""
+"""Signals: quantities over mission time that do not depend on the vehicle, such as the water
+visibility.
+"""
 
 import math
 from bisect import bisect_right
@@ -6,7 +8,9 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 Signal = Callable[[float], float]
-"""Value at a mission time in s. Equal descriptions, except of a table, give the same function: values can be cached."""
+"""Value at a mission time in s. Equal descriptions, except of a table, give the same function:
+values can be cached.
+"""
 
 
 @lru_cache(maxsize=64)
@@ -16,7 +20,9 @@ def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0
     a cos(2 pi (t + shift) / period) + a + minimum, with the amplitude a = (maximum - minimum) / 2.
     """
     amplitude = (maximum - minimum) / 2.0
-    return lambda t_s: amplitude * math.cos(2.0 * math.pi * (t_s + shift_s) / period_s) + amplitude + minimum
+    return lambda t_s: (
+        amplitude * math.cos(2.0 * math.pi * (t_s + shift_s) / period_s) + amplitude + minimum
+    )
 
 
 @lru_cache(maxsize=64)
@@ -34,7 +40,8 @@ def step(time_s: float, before: float, after: float) -> Signal:
 def table(times_s: Sequence[float], values: Sequence[float], *, linear: bool = False) -> Signal:
     """Make a signal from values at given times, ascending.
 
-    Between two times it has the earlier value, or is interpolated linearly; outside, it has the nearest value.
+    Between two times it has the earlier value, or is interpolated linearly; outside, it has the
+    nearest value.
     """
 
     def value(t_s: float) -> float:

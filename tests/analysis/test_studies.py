@@ -51,7 +51,9 @@ def committed(name: str) -> pandas.DataFrame:
 @pytest.mark.parametrize("name", CASES)
 def test_a_small_repetition_gives_the_committed_figures_of_the_first_runs(study, name):
     module = study(name)
-    again = module.study(module.studies.FIRST_RUNS, 1, CASES[name]).set_index(KEYS[name])["first_difference"]
+    again = module.study(module.studies.FIRST_RUNS, 1, CASES[name]).set_index(KEYS[name])[
+        "first_difference"
+    ]
     assert len(again) > 0
     before = committed(name).set_index(KEYS[name])["first_difference"].loc[again.index]
     assert again.to_numpy() == pytest.approx(before.to_numpy(), abs=1e-3)
@@ -59,7 +61,11 @@ def test_a_small_repetition_gives_the_committed_figures_of_the_first_runs(study,
 
 def test_the_effects_of_parameters_are_drawn(study, tmp_path):
     module = study("sensitivity")
-    effects = {(manager, metric): np.arange(2.0) for manager in module.MANAGERS for metric in module.METRICS}
+    effects = {
+        (manager, metric): np.arange(2.0)
+        for manager in module.MANAGERS
+        for metric in module.METRICS
+    }
     module.draw(tmp_path / "effects.png", ["a", "b"], effects)
     assert (tmp_path / "effects.png").stat().st_size > 1_000
 
@@ -91,9 +97,16 @@ def test_predictions_name_the_files_that_made_them(study):
 def test_runs_that_are_as_predicted_score_in_full(study):
     module, rows = study("predict"), predictions()
     own = rows[rows["experiment"] == "exp3"]
-    chosen = own[(own["condition"] == "all") & ~own["manager"].str.contains(" - ")].set_index(["manager", "metric"])
+    chosen = own[(own["condition"] == "all") & ~own["manager"].str.contains(" - ")].set_index(
+        ["manager", "metric"]
+    )
     real = [
-        {"manager": manager, **{metric: chosen.loc[(manager, metric), "mean"] + off for metric in module.METRICS[:2]}}
+        {
+            "manager": manager,
+            **{
+                metric: chosen.loc[(manager, metric), "mean"] + off for metric in module.METRICS[:2]
+            },
+        }
         for manager in dict.fromkeys(chosen.index.get_level_values(0))
         for off in (-0.1, 0.1) * 15
     ]
@@ -101,19 +114,27 @@ def test_runs_that_are_as_predicted_score_in_full(study):
     assert "8 of 8 predicted means lie in the real 95% intervals." in said
     assert "8 of 8 real means lie in the predicted 90% intervals." in said
     far = pandas.DataFrame([{**row, "search_time_s": row["search_time_s"] + 99} for row in real])
-    assert "4 of 8 predicted means" in module.score(own, far.assign(mean_reaction_time_s=float("nan")))
+    assert "4 of 8 predicted means" in module.score(
+        own, far.assign(mean_reaction_time_s=float("nan"))
+    )
 
 
 def test_real_runs_are_scored_from_their_file(study):
-    said = study("predict").scored("exp1", [ROOT / "scenarios" / "published" / "planta_exp1_runs.csv"])
+    said = study("predict").scored(
+        "exp1", [ROOT / "scenarios" / "published" / "planta_exp1_runs.csv"]
+    )
     assert re.search(r"\d+ of 11 predicted means lie in the real 95% intervals", said)
     assert "Median search times of single conditions differ by: median " in said
 
 
-@pytest.mark.parametrize("name, script", [*((name, name) for name in CASES), ("predictions", "predict")])
+@pytest.mark.parametrize(
+    "name, script", [*((name, name) for name in CASES), ("predictions", "predict")]
+)
 def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, name, script):
     module, rows = study(script), committed(name)
-    assert (FOLDER / name / "conclusion.md").read_text(encoding="utf-8").strip() == module.conclude(rows).strip()
+    assert (FOLDER / name / "conclusion.md").read_text(encoding="utf-8").strip() == module.conclude(
+        rows
+    ).strip()
     assert (FOLDER / name / f"{name}.png").stat().st_size < 500_000
     assert module.studies.figure_of(module.draw, rows, 3.0).axes
 
@@ -122,7 +143,9 @@ def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(st
     module = study("half_blocks")
     (case,) = module.read_cases(["planta_exp1_campaign"], (), module.MANAGERS)
     problem = module.read_problem("planta_exp1", [case], 48, 2)
-    found = module.judge(problem, case.only(module.HALVES[0]), [each.start for each in problem.parameters])
+    found = module.judge(
+        problem, case.only(module.HALVES[0]), [each.start for each in problem.parameters]
+    )
     before = pandas.read_csv(FOLDER / "split" / "half_blocks.csv").iloc[0]
     assert (before["values"], before["judged_on"]) == ("shipped", "1 3 5")
     assert found.loss == pytest.approx(before["loss"], rel=1e-3)
@@ -133,12 +156,20 @@ def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chan
     module = study("predict")
     values = {1: [10.0, 12.0], 2: [20.0, 22.0], 3: [30.0, 32.0]}
     rows = [
-        {"manager": manager, "ensemble_member": member, "condition": 1, "run": run, "search_time_s": factor * value}
+        {
+            "manager": manager,
+            "ensemble_member": member,
+            "condition": 1,
+            "run": run,
+            "search_time_s": factor * value,
+        }
         for manager, factor in (("a", 1.0), ("b", 2.0))
         for member, both in values.items()
         for run, value in enumerate(both, 1)
     ]
-    missions = pandas.DataFrame(rows).assign(distance_inspected_m=float("nan"), mean_reaction_time_s=float("nan"))
+    missions = pandas.DataFrame(rows).assign(
+        distance_inspected_m=float("nan"), mean_reaction_time_s=float("nan")
+    )
     found = {row["manager"]: row for row in module.predict(missions) if row["condition"] == "all"}
     quantile = 2.919986  # of Student's t, 90%, 2 degrees of freedom
     for name, mean, between, chance in (
@@ -147,8 +178,12 @@ def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chan
         ("a - b", -21.0, 100.0, 10.0),
     ):
         assert (found[name]["mean"], found[name]["std"]) == pytest.approx((mean, chance**0.5))
-        variance = between - chance / 2.0 + chance / 5.0  # means of two simulated runs, and of five real ones
-        assert (found[name]["high90"] - mean) ** 2 == pytest.approx(quantile**2 * variance, rel=1e-5)
+        variance = (
+            between - chance / 2.0 + chance / 5.0
+        )  # means of two simulated runs, and of five real ones
+        assert (found[name]["high90"] - mean) ** 2 == pytest.approx(
+            quantile**2 * variance, rel=1e-5
+        )
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
@@ -167,7 +202,9 @@ def test_the_committed_table_of_mechanisms_is_of_the_committed_figures(study):
 
 def test_without_what_is_taken_out_missions_differ_more_from_the_real_ones(study):
     module = study("mechanisms")
-    shipped, changed = (module.agreement_2025(3, each) for each in (module.CHANGES[0], module.CHANGES[1]))
+    shipped, changed = (
+        module.agreement_2025(3, each) for each in (module.CHANGES[0], module.CHANGES[1])
+    )
     assert 0.0 < shipped["distance_2025"] < 0.7 * changed["distance_2025"]
 
 
@@ -182,7 +219,9 @@ def test_intervals_hold_the_mean_of_whatever_plays_the_real_system(study):
     chance = np.random.default_rng(1)
     at = chance.choice([50.0, 120.0, 130.0], (150, 1))
     real = [{"a": at + off + chance.normal(0.0, 5.0, (150, 8))} for off in (-10.0, 20.0)]
-    useful, useless = ({"a": each + chance.normal(0.0, 5.0, (150, 8))} for each in (at, chance.permutation(at)))
+    useful, useless = (
+        {"a": each + chance.normal(0.0, 5.0, (150, 8))} for each in (at, chance.permutation(at))
+    )
     for simulator in (useful, useless):
         rows = list(module.coverage(real, simulator, [(3, 2), (6, 1), (12, 1)], 200))
         assert min(row["assisted"] for row in rows) >= 0.91
@@ -192,6 +231,8 @@ def test_intervals_hold_the_mean_of_whatever_plays_the_real_system(study):
 def test_the_committed_conclusion_is_of_the_committed_tables(study):
     module = study("assisted")
     tables = [pandas.read_csv(FOLDER / "assisted" / name) for name in ("coverage.csv", "gains.csv")]
-    assert (FOLDER / "assisted" / "conclusion.md").read_text(encoding="utf-8").strip() == module.conclude(*tables)
+    assert (FOLDER / "assisted" / "conclusion.md").read_text(
+        encoding="utf-8"
+    ).strip() == module.conclude(*tables)
     least = tables[0].groupby("simulator")["assisted"].min()
     assert min(least["shipped"], least["biased"]) >= 0.9 and least["useless"] >= 0.84

@@ -26,7 +26,21 @@ from tests.helpers.command import ends_within
 from tests.scenario.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
 
 NUMBERS = (
-    *("0", "-1", "5e-324", "1e308", "1e9", ".inf", "-.inf", ".nan", "1_0", "０", "²", "0x10", "1:30"),
+    *(
+        "0",
+        "-1",
+        "5e-324",
+        "1e308",
+        "1e9",
+        ".inf",
+        "-.inf",
+        ".nan",
+        "1_0",
+        "０",
+        "²",
+        "0x10",
+        "1:30",
+    ),
     "99999999999999",
 )
 WORDS = (
@@ -137,7 +151,10 @@ def test_digits_that_only_python_takes_for_such_are_refused(event):
 def test_scenarios(tmp_path):
     path, done = tmp_path / "damaged.yaml", 0
     for seed in range(CASES):
-        path.write_text(damaged(SCENARIO, seed, ("revision: 2023", "kind: table", "base: seams2023")), encoding="utf-8")
+        path.write_text(
+            damaged(SCENARIO, seed, ("revision: 2023", "kind: table", "base: seams2023")),
+            encoding="utf-8",
+        )
 
         def mission() -> None:
             loaded = load_scenario(path)
@@ -153,7 +170,8 @@ def test_rules(tmp_path):
     path, done, vocabulary = tmp_path / "damaged.swrl", 0, Ontology.load().vocabulary
     for seed in range(CASES):
         path.write_text(
-            damaged(RULE, seed, ("->", "^", "?x", "swrlb:equal(?x, ?x)", "sameAs(?a, ?b)")), encoding="utf-8"
+            damaged(RULE, seed, ("->", "^", "?x", "swrlb:equal(?x, ?x)", "sameAs(?a, ?b)")),
+            encoding="utf-8",
         )
         done += refused_in_one_line_or_done(lambda: RulesFile.read(path).rules(vocabulary))
     assert 0 < done < CASES
@@ -161,11 +179,17 @@ def test_rules(tmp_path):
 
 @pytest.mark.slow
 def test_what_is_imported_of_the_exemplar_s_files_can_be_loaded(tmp_path):
-    mission_file, runner_file, out = tmp_path / "mission.yaml", tmp_path / "runner.yaml", tmp_path / "mine.yaml"
+    mission_file, runner_file, out = (
+        tmp_path / "mission.yaml",
+        tmp_path / "runner.yaml",
+        tmp_path / "mine.yaml",
+    )
     campaign, done = tmp_path / "campaign.yaml", 0
     for seed in range(CASES):
         mission = (MISSION_2023, MISSION_15)[seed % 2]
-        mission_file.write_text(damaged(mission, seed, ("task_bridge:", "(1,failure,-3)")), encoding="utf-8")
+        mission_file.write_text(
+            damaged(mission, seed, ("task_bridge:", "(1,failure,-3)")), encoding="utf-8"
+        )
         runner_file.write_text(damaged(RUNNER_15, seed + CASES), encoding="utf-8")
         options = {
             "revision": list(REVISIONS)[seed % len(REVISIONS)],
@@ -192,6 +216,10 @@ def test_results(tmp_path):
     runs, done = tmp_path / "out" / "runs.csv", 0
     whole = runs.read_text(encoding="utf-8")
     for seed in range(min(CASES, 150)):
-        runs.write_text(damaged(whole, seed, ("inf", "-inf", "nan", "-5", '"', "=1+1")), encoding="utf-8")
-        done += refused_in_one_line_or_done(lambda: draw_folder(tmp_path / "out", tmp_path / "out.png"))
+        runs.write_text(
+            damaged(whole, seed, ("inf", "-inf", "nan", "-5", '"', "=1+1")), encoding="utf-8"
+        )
+        done += refused_in_one_line_or_done(
+            lambda: draw_folder(tmp_path / "out", tmp_path / "out.png")
+        )
     assert done > 0

@@ -26,7 +26,9 @@ def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path,
         process.send_signal(number)
         status, told = chaos.ended(process)
         assert status in (0, -number, 128 + number), told
-        assert "Traceback" not in told or "in _get_module_details" in told  # of Python itself, while it starts
+        assert (
+            "Traceback" not in told or "in _get_module_details" in told
+        )  # of Python itself, while it starts
         again = (
             ["--resume", "killed"]
             if (tmp_path / "killed" / "campaign.sqlite").is_file()
@@ -45,7 +47,16 @@ def test_an_overwriting_campaign_that_is_killed_leaves_no_results_of_the_old_one
     stream = random.Random(1)
     for _ in range(12):
         run_campaign(tmp_path / "short.yaml", ["none"], 5, 1, out=tmp_path / "out", overwrite=True)
-        arguments = ["short.yaml", "--managers", "random", "--runs", "3000", "--out", "out", "--overwrite"]
+        arguments = [
+            "short.yaml",
+            "--managers",
+            "random",
+            "--runs",
+            "3000",
+            "--out",
+            "out",
+            "--overwrite",
+        ]
         process = chaos.start(arguments, tmp_path)
         time.sleep(stream.uniform(0.5, 4.0))
         process.kill()

@@ -1,4 +1,6 @@
-"""A pipe in place of a file in a folder of results is refused or not waited for: nobody writes into it."""
+"""A pipe in place of a file in a folder of results is refused or not waited for: nobody writes into
+it.
+"""
 
 import os
 import shutil
@@ -11,7 +13,14 @@ from suave_des.campaign.campaign import run_campaign
 from tests.helpers.command import command_here, ends_within
 
 STORE = "campaign.sqlite"
-OF_CAMPAIGN = ("runs.csv", "manifest.json", "knowledge_states.jsonl", STORE, f"{STORE}-wal", f"{STORE}-journal")
+OF_CAMPAIGN = (
+    "runs.csv",
+    "manifest.json",
+    "knowledge_states.jsonl",
+    STORE,
+    f"{STORE}-wal",
+    f"{STORE}-journal",
+)
 OF_MISSION = ("mission.json", "events.csv", "trajectory.csv", "knowledge.jsonl")
 CAMPAIGN = (
     ("compare", "out"),
@@ -21,7 +30,11 @@ CAMPAIGN = (
     ("campaign", "--resume", "out", "--runs", "2"),
     ("kb", "try", "rule.swrl", "--on", "out"),
 )
-MISSION = (("figure", "out", "--out", "x.png"), ("replay", "out"), ("kb", "try", "rule.swrl", "--on", "out"))
+MISSION = (
+    ("figure", "out", "--out", "x.png"),
+    ("replay", "out"),
+    ("kb", "try", "rule.swrl", "--on", "out"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +47,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "names", "commands"), [("campaign", OF_CAMPAIGN, CAMPAIGN), ("mission", OF_MISSION, MISSION)]
+    ("kind", "names", "commands"),
+    [("campaign", OF_CAMPAIGN, CAMPAIGN), ("mission", OF_MISSION, MISSION)],
 )
 def test_no_command_waits_for_it(kind, names, commands, folders, tmp_path):
     (tmp_path / "rule.swrl").write_text('Late: c_status(?c, "FALSE") -> c_status(?c, "FALSE")\n')
@@ -48,7 +62,11 @@ def test_no_command_waits_for_it(kind, names, commands, folders, tmp_path):
             with ends_within(30):
                 done = command_here(*command, cwd=tmp_path)
             assert done.returncode in (0, 2), (name, command, done.stderr)
-            assert done.returncode == 0 or done.stderr.count("\n") == 1, (name, command, done.stderr)
+            assert done.returncode == 0 or done.stderr.count("\n") == 1, (
+                name,
+                command,
+                done.stderr,
+            )
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,9 @@ def test_each_program_runs(tmp_path, name, arguments, said):
 @pytest.mark.slow
 def test_the_table_of_commands_has_their_times(tmp_path):
     ended = run("commands.py", "--only", "kb rules", "--rounds", 1, folder=tmp_path)
-    assert re.match(r"\| `kb rules` \| [\d.]+ \| [\d.]+ \| \d+ \|  from", ended.stdout), ended.stderr
+    assert re.match(r"\| `kb rules` \| [\d.]+ \| [\d.]+ \| \d+ \|  from", ended.stdout), (
+        ended.stderr
+    )
 
 
 def test_every_command_is_measured_or_is_like_one_that_is():
@@ -67,7 +69,9 @@ def test_every_command_is_measured_or_is_like_one_that_is():
     assert isinstance(top, CommandsUnderHeadings)
     below = top.get_command(None, "kb")
     names = {*top.commands, *(f"kb {name}" for name in below.commands)} - {"kb"}
-    measured = {" ".join(words.split()[: 1 + words.startswith("kb ")]) for words in commands.COMMANDS} - {"--help"}
+    measured = {
+        " ".join(words.split()[: 1 + words.startswith("kb ")]) for words in commands.COMMANDS
+    } - {"--help"}
     assert measured | likewise == names
 
 
@@ -82,5 +86,8 @@ def test_measured_commands_have_the_options_that_they_are_given(words):
 
 def test_the_stock_reasoner_considers_thruster_and_visibility():
     state = MissionState(SEARCH, 3.0, "FALSE", SEARCHING_HIGH)
-    wanted = {"f_maintain_motion": "fd_recover_thrusters", "f_generate_search_path": "fd_spiral_medium"}
+    wanted = {
+        "f_maintain_motion": "fd_recover_thrusters",
+        "f_generate_search_path": "fd_spiral_medium",
+    }
     assert StockReasoner(shipped_folder("ontology")).plan(state) == wanted

@@ -25,7 +25,9 @@ def test_equal_campaigns_give_equal_bytes_on_one_and_two_workers(folder, tmp_pat
         run_campaign("seams2023", managers, 6, 3, workers, tmp_path / name)
     for file in ("runs.csv", "summary.csv"):
         one, two = ((tmp_path / name / file).read_bytes() for name in ("one", "two"))
-        assert one == two and one.startswith((folder / file).read_bytes())  # a manager more changes no other row
+        assert one == two and one.startswith(
+            (folder / file).read_bytes()
+        )  # a manager more changes no other row
     inputs = json.loads((tmp_path / "one" / "manifest.json").read_text())["inputs_sha256"]
     assert {"shipped/ontology/suave.owl", "shipped/ontology/tomasys.owl"} <= inputs.keys()
 
@@ -39,11 +41,15 @@ def test_summary_follows_from_runs(folder):
             values = [float(row[metric]) for row in rows if row["manager"] == line["manager"]]
             mean = sum(values) / 6
             std = (sum((value - mean) ** 2 for value in values) / 5) ** 0.5
-            half = 2.570582 * std / 6**0.5  # Student's t, 5 degrees of freedom, 97.5%: any statistics table
+            half = (
+                2.570582 * std / 6**0.5
+            )  # Student's t, 5 degrees of freedom, 97.5%: any statistics table
             assert line["n"] == "6"
             assert float(line[f"{metric}_mean"]) == pytest.approx(mean, abs=1e-5)
             assert float(line[f"{metric}_std"]) == pytest.approx(std, abs=1e-5)
-            assert float(line[f"{metric}_median"]) == pytest.approx(sum(sorted(values)[2:4]) / 2, abs=1e-5)
+            assert float(line[f"{metric}_median"]) == pytest.approx(
+                sum(sorted(values)[2:4]) / 2, abs=1e-5
+            )
             assert float(line[f"{metric}_ci95_low"]) == pytest.approx(mean - half, abs=1e-3)
             assert float(line[f"{metric}_ci95_high"]) == pytest.approx(mean + half, abs=1e-3)
 
@@ -59,15 +65,26 @@ class TestSuaveFormat:
         theirs = [row for name in names for row in rows_of(folder / name)]
         ours = rows_of(tmp_path / "out" / "runs.csv")
         assert list(theirs[0]) == [
-            *("mission_name", "datetime", "initial pos (x,y)", "time budget (s)", "time search (s)"),
+            *(
+                "mission_name",
+                "datetime",
+                "initial pos (x,y)",
+                "time budget (s)",
+                "time search (s)",
+            ),
             "distance inspected (m)",
         ]
         assert theirs[0]["mission_name"] == "time constrained none"
         assert theirs[4]["mission_name"] == "time constrained random"
-        assert {row["pipeline_found"] for row in ours} == {"True", "False"}  # or the next lines show nothing
+        assert {row["pipeline_found"] for row in ours} == {
+            "True",
+            "False",
+        }  # or the next lines show nothing
         for their, our in zip(theirs, ours, strict=True):
             found = our["pipeline_found"] == "True"
-            assert their["time search (s)"] == (f"{float(our['search_time_s']):.0f}" if found else "-1")
+            assert their["time search (s)"] == (
+                f"{float(our['search_time_s']):.0f}" if found else "-1"
+            )
             assert their["distance inspected (m)"] == our["distance_inspected_m"]
             assert their["time budget (s)"] == "150"
         x_m, y_m = float(ours[0]["initial_x_m"]), float(ours[0]["initial_y_m"])
@@ -78,7 +95,9 @@ class TestSuaveFormat:
 
     def test_a_later_campaign_without_it_leaves_none_of_an_earlier_one(self, tmp_path):
         run_campaign("release15", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
-        run_campaign("release15", ["bt"], 1, 1, out=tmp_path / "out", suave_format=True, overwrite=True)
+        run_campaign(
+            "release15", ["bt"], 1, 1, out=tmp_path / "out", suave_format=True, overwrite=True
+        )
         assert [path.name for path in (tmp_path / "out" / "suave").iterdir()] == ["bt_suave.csv"]
         run_campaign("release15", ["bt"], 1, 1, out=tmp_path / "out", overwrite=True)
         assert not (tmp_path / "out" / "suave").exists()
@@ -97,7 +116,11 @@ class TestSuaveFormat:
 
     def test_managers_that_differ_in_signs_that_no_file_name_has_get_files_of_their_own(self):
         names = dict(exemplar_names(["a:B", "a/B", "a_B"], "1.5", has_battery=False))
-        assert names == {"a_B_suave": "suave a:B", "a_B_suave_2": "suave a/B", "a_B_suave_3": "suave a_B"}
+        assert names == {
+            "a_B_suave": "suave a:B",
+            "a_B_suave_2": "suave a/B",
+            "a_B_suave_3": "suave a_B",
+        }
 
     def test_revision_1_5_writes_the_duration_where_runs_csv_has_the_limit(self, tmp_path):
         scenario = tmp_path / "short.yaml"
@@ -105,13 +128,27 @@ class TestSuaveFormat:
         run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
         theirs = rows_of(tmp_path / "out" / "suave" / "none_suave.csv")
         assert list(theirs[0]) == [
-            *("mission name", "datetime", "initial pos (x,y)", "mission duration (s)", "pipeline found"),
+            *(
+                "mission name",
+                "datetime",
+                "initial pos (x,y)",
+                "mission duration (s)",
+                "pipeline found",
+            ),
             *("time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"),
         ]
-        assert (theirs[0]["mission name"], theirs[1]["datetime"]) == ("suave none", "01-Jan-2000-00-00-02")
-        assert (theirs[0]["pipeline found"], theirs[0]["mean reaction time (s)"]) == ("False", "0.0")
+        assert (theirs[0]["mission name"], theirs[1]["datetime"]) == (
+            "suave none",
+            "01-Jan-2000-00-00-02",
+        )
+        assert (theirs[0]["pipeline found"], theirs[0]["mean reaction time (s)"]) == (
+            "False",
+            "0.0",
+        )
         ours = rows_of(tmp_path / "out" / "runs.csv")
-        assert [(row["pipeline_found"], row["search_time_s"]) for row in ours] == [("False", "20.0")] * 2
+        assert [(row["pipeline_found"], row["search_time_s"]) for row in ours] == [
+            ("False", "20.0")
+        ] * 2
         assert all(float(row["mission_duration_s"]) > 20 for row in ours)
         whole = [str(int(float(row["mission_duration_s"]))) for row in ours]
         for column in ("mission duration (s)", "time searching pipeline (s)"):

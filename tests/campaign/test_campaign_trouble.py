@@ -1,4 +1,6 @@
-"""What a campaign does when something goes wrong: what is kept and told; and what is seen of it while it runs."""
+"""What a campaign does when something goes wrong: what is kept and told; and what is seen of it
+while it runs.
+"""
 
 import io
 import json
@@ -34,7 +36,10 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers, tmp_path):
     assert failed == sorted(failed)
     for failure in result.failures:
         place = f"manager {manager}, run {failure.run}, mission time 50.00 s"
-        assert str(failure) == f"{place}: ValueError: I do not know what to do (awkward_managers.py, line 32)"
+        assert (
+            str(failure)
+            == f"{place}: ValueError: I do not know what to do (awkward_managers.py, line 32)"
+        )
     rows = rows_of(tmp_path / "out")
     assert [int(row["run"]) for row in rows if row["manager"] == manager] == [
         run for run in range(1, RUNS + 1) if run not in failed
@@ -45,11 +50,20 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers, tmp_path):
     assert manifest["missions"]["failed"] == len(failed)
 
 
-def test_a_manager_that_calls_exit_is_one_that_raises_and_when_all_missions_fail_there_are_no_rows(tmp_path):
+def test_a_manager_that_calls_exit_is_one_that_raises_and_when_all_missions_fail_there_are_no_rows(
+    tmp_path,
+):
     result = run_campaign("seams2023", [f"{AWKWARD}:Quits"], 1, 1, out=tmp_path / "out")
-    assert [failure.cause for failure in result.failures] == ["SystemExit: no more (awkward_managers.py, line 39)"]
+    assert [failure.cause for failure in result.failures] == [
+        "SystemExit: no more (awkward_managers.py, line 39)"
+    ]
     assert rows_of(tmp_path / "out") == []
-    assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith(f"{AWKWARD}:Quits,0,")
+    assert (
+        (tmp_path / "out" / "summary.csv")
+        .read_text()
+        .splitlines()[1]
+        .startswith(f"{AWKWARD}:Quits,0,")
+    )
 
 
 def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_others_go_on(tmp_path):
@@ -58,27 +72,36 @@ def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_othe
     assert 0 < len(result.failures) < 6
     assert {failure.manager for failure in result.failures} == {manager}
     for failure in result.failures:
-        assert failure.cause == "its worker process ended with status -9, 3 times (killed, or out of memory?)"
+        assert (
+            failure.cause
+            == "its worker process ended with status -9, 3 times (killed, or out of memory?)"
+        )
         assert not failure.lasting
     assert result.done + len(result.failures) == 24
     rows = rows_of(tmp_path / "out")
-    assert [row["run"] for row in rows if row["manager"] == "none"] == [str(run) for run in range(1, 13)]
+    assert [row["run"] for row in rows if row["manager"] == "none"] == [
+        str(run) for run in range(1, 13)
+    ]
 
 
 def test_when_every_worker_dies_the_campaign_stops_with_one_line(tmp_path):
-    with pytest.raises(WorkerError, match=r"8 worker processes in a row ended before a mission was done"):
+    with pytest.raises(
+        WorkerError, match=r"8 worker processes in a row ended before a mission was done"
+    ):
         run_campaign("seams2023", [f"{AWKWARD}:DiesAlways"], 20, 1, 2, tmp_path / "out")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers):
-    result = run_campaign("seams2023", [f"{AWKWARD}:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0)
+    result = run_campaign(
+        "seams2023", [f"{AWKWARD}:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0
+    )
     assert 0 < len(result.failures) < 12
     for failure in result.failures:
-        told = (
-            f"{AWKWARD}:HangsInSome, run {failure.run}, mission time 50.00 s: not done after 2 s (time-out), in adapt"
+        told = f"{AWKWARD}:HangsInSome, run {failure.run}, mission time 50.00 s: not done after 2 s (time-out), in adapt"
+        assert re.fullmatch(
+            f"manager {re.escape(told)} \\(awkward_managers.py, line \\d+\\)", str(failure)
         )
-        assert re.fullmatch(f"manager {re.escape(told)} \\(awkward_managers.py, line \\d+\\)", str(failure))
     assert result.done == 24 - len(result.failures)
 
 
@@ -103,21 +126,32 @@ def test_a_manager_whose_missions_all_take_too_long_is_given_up(workers, tmp_pat
     (tmp_path / "loops.py").write_text(LOOPS)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
-    result = run_campaign("seams2023", ["loops:Loops", "none"], 200, 1, workers, tmp_path / "out", time_out_s=0.5)
+    result = run_campaign(
+        "seams2023", ["loops:Loops", "none"], 200, 1, workers, tmp_path / "out", time_out_s=0.5
+    )
     assert result.done == 200 and 3 <= len(result.failures) <= 3 * workers
     assert result.remarks == (f"manager loops:Loops: {GIVEN_UP}",)
     for failure in result.failures:
-        assert re.fullmatch(r"not done after 0.5 s \(time-out\), in diagnostic \(loops.py, line [67]\)", failure.cause)
+        assert re.fullmatch(
+            r"not done after 0.5 s \(time-out\), in diagnostic \(loops.py, line [67]\)",
+            failure.cause,
+        )
     missions = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]
     assert missions["left_out"] == 200 - len(result.failures)
     later = run_campaign("seams2023", ["loops:LoopsLater"], 6, 1, time_out_s=0.3)
-    assert (later.done, len(later.failures), later.remarks) == (1, 5, ())  # one could be done: it is tried again
+    assert (later.done, len(later.failures), later.remarks) == (
+        1,
+        5,
+        (),
+    )  # one could be done: it is tried again
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch):
     monkeypatch.setattr(workers, "_MARGIN_S", 2.0)
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
-    assert [(failure.run, failure.cause) for failure in result.failures] == [(2, "not done after 8 s (time-out)")]
+    assert [(failure.run, failure.cause) for failure in result.failures] == [
+        (2, "not done after 8 s (time-out)")
+    ]
     assert result.done == 2
 
 
@@ -126,13 +160,17 @@ def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch):
     started_s = time.monotonic()
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 2, 201, 2, time_out_s=1.0)
     assert [failure.run for failure in result.failures] == [1, 2]
-    assert time.monotonic() < started_s + 45.0  # long before the missions come back, and before a start is overdue
+    assert (
+        time.monotonic() < started_s + 45.0
+    )  # long before the missions come back, and before a start is overdue
 
 
 def test_missions_run_in_as_many_processes_as_asked_for():
     manager = f"{AWKWARD}:TellsItsProcess"
     alone = run_campaign("seams2023", [manager], 2, 1)
-    assert {failure.cause.partition(" (")[0] for failure in alone.failures} == {f"RuntimeError: process {os.getpid()}"}
+    assert {failure.cause.partition(" (")[0] for failure in alone.failures} == {
+        f"RuntimeError: process {os.getpid()}"
+    }
     shared = run_campaign("seams2023", [manager], 19, 1, 2)
     processes = {re.sub(r"\D", "", failure.cause.partition(" (")[0]) for failure in shared.failures}
     assert str(os.getpid()) not in processes
@@ -193,7 +231,9 @@ def shown_on(screen: Screen, label: str = "seams2023") -> str:
 
 
 @pytest.mark.parametrize("width", [40, 120])
-def test_on_a_terminal_it_is_one_line_that_fits(width: int, screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_a_terminal_it_is_one_line_that_fits(
+    width: int, screen: Screen, monkeypatch: pytest.MonkeyPatch
+) -> None:
     screen.is_terminal = True
     monkeypatch.setenv("COLUMNS", str(width))
     *before, last = shown_on(screen).removesuffix("\n").split("\r")

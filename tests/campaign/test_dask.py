@@ -1,4 +1,6 @@
-"""Campaigns on a Dask cluster: the same bytes, all by value, whatever happens to workers and scheduler."""
+"""Campaigns on a Dask cluster: the same bytes, all by value, whatever happens to workers and
+scheduler.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,8 @@ def tell(event, arguments):
 sys.addaudithook(tell)
 """
 
-# Dask looks at its own work a hundred times a second, which costs each process a twentieth of a core when it waits.
+# Dask looks at its own work a hundred times a second, which costs each process a twentieth of a
+# core when it waits.
 _QUIET = {
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
@@ -81,7 +84,12 @@ class Cluster:
         """Start a worker, which is replaced when it ends, if so wanted."""
         scratch = ("--local-directory", str(self.folder / "scratch"))
         worker = self._start(
-            "dask_worker", self.address, "--nanny" if replaced else "--no-nanny", "--nthreads", str(threads), *scratch
+            "dask_worker",
+            self.address,
+            "--nanny" if replaced else "--no-nanny",
+            "--nthreads",
+            str(threads),
+            *scratch,
         )
         self.workers.append(worker)
         return worker
@@ -123,7 +131,9 @@ MINE = "my_managers.careful:Careful"
 
 @pytest.fixture(scope="module")
 def users_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A user's own scenario, ontology, rules, table, modes and manager, which is made of several modules."""
+    """A user's own scenario, ontology, rules, table, modes and manager, which is made of several
+    modules.
+    """
     folder = tmp_path_factory.mktemp("user")
     for name in ("suave.owl", "tomasys.owl"):
         shutil.copy(shipped_folder("ontology") / name, folder)
@@ -179,18 +189,26 @@ def _small_clusters() -> Iterator[list[Cluster]]:
 
 
 @pytest.fixture
-def small_cluster(_small_clusters: list[Cluster], tmp_path_factory: pytest.TempPathFactory) -> Cluster:
-    """A cluster of one worker, where missions are not given to another when it dies; another if a test ended it."""
+def small_cluster(
+    _small_clusters: list[Cluster], tmp_path_factory: pytest.TempPathFactory
+) -> Cluster:
+    """A cluster of one worker, where missions are not given to another when it dies; another if a
+    test ended it.
+    """
     if not _small_clusters or _small_clusters[-1].scheduler.poll() is not None:
         folder = tmp_path_factory.mktemp("small")
         settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
-        _small_clusters.append(cluster := Cluster(folder / "cluster", folder / "nothing", **settings))
+        _small_clusters.append(
+            cluster := Cluster(folder / "cluster", folder / "nothing", **settings)
+        )
         cluster.add_worker(replaced=True)
         cluster.wait_for_workers(1)
     return _small_clusters[-1]
 
 
-def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(cluster, users_folder, tmp_path, monkeypatch):
+def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
+    cluster, users_folder, tmp_path, monkeypatch
+):
     monkeypatch.chdir(users_folder)
     asked = ("own.yaml", ["metacontrol", MINE], 60, 1)
     run_campaign(*asked, out=tmp_path / "here")
@@ -216,9 +234,13 @@ def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(sm
         "RaisesInHalf": "ValueError: I do not know what to do (awkward_managers.py, line 32)",
     }
     managers = [f"{AWKWARD}:{name}" for name in causes]
-    result = run_campaign("seams2023", managers, 8, 1, scheduler=small_cluster.address, time_out_s=3.0)
+    result = run_campaign(
+        "seams2023", managers, 8, 1, scheduler=small_cluster.address, time_out_s=3.0
+    )
     found = {failure.manager.partition(":")[2]: failure.cause for failure in result.failures}
-    found["HangsInSome"] = found["HangsInSome"].rpartition(", line ")[0]  # whichever line of its loop
+    found["HangsInSome"] = found["HangsInSome"].rpartition(", line ")[
+        0
+    ]  # whichever line of its loop
     assert found == causes
     assert len(result.rows) + len(result.failures) == 24
     idle = {row[2]: row[3:] for row in run_campaign("seams2023", ["none"], 8, 1).rows}
@@ -226,7 +248,17 @@ def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(sm
 
 
 def test_ctrl_c_on_the_command_line(cluster, scenario, tmp_path):
-    asked = ["short.yaml", "--managers", "none", "--runs", "100000", "--scheduler", cluster.address, "--out", "out"]
+    asked = [
+        "short.yaml",
+        "--managers",
+        "none",
+        "--runs",
+        "100000",
+        "--scheduler",
+        cluster.address,
+        "--out",
+        "out",
+    ]
     process = chaos.start(asked, tmp_path)
     journal = tmp_path / "out" / f"{STORE_FILE}-wal"
     wait_until(lambda: has_size(journal, 200_000))
@@ -236,7 +268,9 @@ def test_ctrl_c_on_the_command_line(cluster, scenario, tmp_path):
     assert err.startswith("suave-des: interrupted; ")
     assert err.endswith("suave-des campaign --resume out runs the rest\n")
     assert err.count("\n") == 1
-    assert run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2  # workers are free for it
+    assert (
+        run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2
+    )  # workers are free for it
 
 
 def test_interrupted_there_and_resumed_here(cluster, scenario, tmp_path):
@@ -249,16 +283,24 @@ def test_interrupted_there_and_resumed_here(cluster, scenario, tmp_path):
         "perturbations": {"start.y_m": {"distribution": "normal", "mean": 0.0, "std": 1.0}},
     }
     with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* runs the rest"):
-        run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=stop, **varied)
+        run_campaign(
+            *asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=stop, **varied
+        )
     resume_campaign(tmp_path / "out")
     run_campaign(*asked, out=tmp_path / "whole", **varied)
-    assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == (
+        tmp_path / "whole" / "runs.csv"
+    ).read_bytes()
 
 
-def test_another_version_on_a_worker_is_named_and_nothing_is_written(cluster, tmp_path, monkeypatch):
+def test_another_version_on_a_worker_is_named_and_nothing_is_written(
+    cluster, tmp_path, monkeypatch
+):
     here = {**dask_cluster.code_versions(), "numpy": "1.0"}
     monkeypatch.setattr(dask_cluster, "code_versions", lambda: here)
-    with pytest.raises(InputError, match=r"numpy is [\d.]+ on worker tcp://\S+, and 1.0 here, which could change"):
+    with pytest.raises(
+        InputError, match=r"numpy is [\d.]+ on worker tcp://\S+, and 1.0 here, which could change"
+    ):
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", scheduler=cluster.address)
     assert not (tmp_path / "out").exists()
 
@@ -274,7 +316,12 @@ def test_a_scheduler_that_is_lost_in_the_middle(small_cluster, scenario, tmp_pat
 
     asked = (scenario, ["none", "random"], 200, 1)
     with pytest.raises(WorkerError) as lost:
-        run_campaign(*asked, out=tmp_path / "out", scheduler=small_cluster.address, on_progress=kill_scheduler)
+        run_campaign(
+            *asked,
+            out=tmp_path / "out",
+            scheduler=small_cluster.address,
+            on_progress=kill_scheduler,
+        )
     assert time.monotonic() < stopped_s[0] + 20.0  # Dask itself would go on for longer
     lost_it = rf"the connection to the scheduler {small_cluster.address} is lost"
     line = rf"{lost_it}; \d+ of 400 missions are done, and kept in \S+; "
@@ -282,7 +329,9 @@ def test_a_scheduler_that_is_lost_in_the_middle(small_cluster, scenario, tmp_pat
     assert capfd.readouterr().err == ""
     resume_campaign(tmp_path / "out")
     run_campaign(*asked, out=tmp_path / "whole")
-    assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == (
+        tmp_path / "whole" / "runs.csv"
+    ).read_bytes()
 
 
 class TestBadInput:
@@ -300,8 +349,18 @@ class TestBadInput:
             silent.bind(("127.0.0.1", 0))
             address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
             for folder in ("out", "earlier"):
-                with pytest.raises(InputError, match=rf"{address} does not answer as a Dask scheduler"):
-                    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / folder, scheduler=address, overwrite=True)
+                with pytest.raises(
+                    InputError, match=rf"{address} does not answer as a Dask scheduler"
+                ):
+                    run_campaign(
+                        "seams2023",
+                        ["none"],
+                        1,
+                        1,
+                        out=tmp_path / folder,
+                        scheduler=address,
+                        overwrite=True,
+                    )
         assert not (tmp_path / "out").exists()
         assert (tmp_path / "earlier" / "runs.csv").read_bytes() == before
         assert resume_campaign(tmp_path / "earlier").done == 1

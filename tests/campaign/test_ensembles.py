@@ -1,4 +1,6 @@
-"""Each run of a campaign has one member of an ensemble, the same under all managers; differences are told by member."""
+"""Each run of a campaign has one member of an ensemble, the same under all managers; differences
+are told by member.
+"""
 
 import csv
 from dataclasses import replace
@@ -9,7 +11,13 @@ import pytest
 from scipy import stats
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.variation import ENSEMBLE_COLUMN, Ensemble, Variation, differences, read_ensemble
+from suave_des.campaign.variation import (
+    ENSEMBLE_COLUMN,
+    Ensemble,
+    Variation,
+    differences,
+    read_ensemble,
+)
 from suave_des.errors import InputError
 from suave_des.records.store import MissionKey
 from suave_des.resources import shipped_folder
@@ -36,7 +44,10 @@ def test_a_run_is_the_mission_of_the_scenario_with_its_members_values(two):
     row = run_campaign("seams2023", ["none"], 2, seed=3, ensemble=two).frame().iloc[1]
     loaded = with_values(load_scenario("seams2023"), {GAIN: 2.0})
     alone = Simulator(loaded).run("none", 2, 3).metrics
-    assert (row["search_time_s"], row["detection_time_s"]) == (alone.search_time_s, round(alone.detection_time_s, 6))
+    assert (row["search_time_s"], row["detection_time_s"]) == (
+        alone.search_time_s,
+        round(alone.detection_time_s, 6),
+    )
 
 
 def test_resuming_gives_the_same_bytes(two, tmp_path):
@@ -48,15 +59,24 @@ def test_resuming_gives_the_same_bytes(two, tmp_path):
 
 
 def test_a_campaign_file_names_its_ensemble_relative_to_itself(two, tmp_path):
-    (tmp_path / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nruns: 2\nensemble: two.csv\n")
-    assert run_campaign(tmp_path / "mine.yaml", ["none"]).frame()[ENSEMBLE_COLUMN].tolist() == [1, 2]
+    (tmp_path / "mine.yaml").write_text(
+        "campaign: 1\nscenario: seams2023\nruns: 2\nensemble: two.csv\n"
+    )
+    assert run_campaign(tmp_path / "mine.yaml", ["none"]).frame()[ENSEMBLE_COLUMN].tolist() == [
+        1,
+        2,
+    ]
 
 
 def test_the_file_of_differences_has_a_row_for_each_pair_and_metric(two, tmp_path):
     run_campaign("seams2023", ["none", "random", "bt"], 4, out=tmp_path / "out", ensemble=two)
     with (tmp_path / "out" / "ensemble.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [(row["first"], row["second"]) for row in rows[:3]] == [("random", "none"), ("bt", "none"), ("bt", "random")]
+    assert [(row["first"], row["second"]) for row in rows[:3]] == [
+        ("random", "none"),
+        ("bt", "none"),
+        ("bt", "random"),
+    ]
     assert {row["metric"] for row in rows} == {"search_time_s", "distance_inspected_m"}
     assert {(row["n"], row["members"]) for row in rows} == {("4", "2")}
 
@@ -69,7 +89,10 @@ def test_the_file_of_differences_has_a_row_for_each_pair_and_metric(two, tmp_pat
         (f"{GAIN},{GAIN}\n1,1\n1,1\n", "line 1: has no column for each parameter"),
         (f"{GAIN}\n0.6\nfast\n", "line 3: expected 1 numbers, got fast"),
         (f"{GAIN}\n0.6\n0.6,0.7\n", "line 3: expected 1 numbers, got 0.6, 0.7"),
-        (f"{GAIN}\n0.6\n-4\n", "member 2 does not fit scenario seams2023: at calibration.velocity_gain_per_s=-4.0: "),
+        (
+            f"{GAIN}\n0.6\n-4\n",
+            "member 2 does not fit scenario seams2023: at calibration.velocity_gain_per_s=-4.0: ",
+        ),
         ("calibration.gain\n1\n2\n", "calibration.gain: "),
         ("revision\n1\n2\n", "member 1 does not fit scenario seams2023: "),
     ],
@@ -87,11 +110,16 @@ DRIFT = "calibration.drift_y_m"
 
 @pytest.mark.parametrize(
     "varied",
-    [{"sweep": {DRIFT: [0.1]}}, {"perturbations": {DRIFT: {"distribution": "uniform", "minimum": 0.1, "maximum": 1}}}],
+    [
+        {"sweep": {DRIFT: [0.1]}},
+        {"perturbations": {DRIFT: {"distribution": "uniform", "minimum": 0.1, "maximum": 1}}},
+    ],
 )
 def test_what_the_ensemble_varies_is_not_varied_by_the_campaign_too(two, varied):
     two.write_text(TWO.replace(GAIN, DRIFT), encoding="utf-8")
-    with pytest.raises(InputError, match=f"varies {DRIFT}, as the campaign's sweep or perturbations do"):
+    with pytest.raises(
+        InputError, match=f"varies {DRIFT}, as the campaign's sweep or perturbations do"
+    ):
         run_campaign("seams2023", ["none"], 1, ensemble=two, **varied)
 
 
@@ -133,7 +161,9 @@ def test_a_run_that_one_manager_lacks_is_left_out():
     rows = [row for row in rows_of({0: [1.0, 2.0], 1: [1.0, 5.0]}) if row[0] != MissionKey(0, 0, 1)]
     (found,) = differences(varied, rows, ["none", "bt"], {"search_time_s": 0})
     assert (found["n"], found["difference"]) == (1, 3.0)
-    assert [found[name] for name in ("ci95_low", "ci95_high", "range95_low", "range95_high")] == [None] * 4
+    assert [found[name] for name in ("ci95_low", "ci95_high", "range95_low", "range95_high")] == [
+        None
+    ] * 4
 
 
 def test_the_range_over_members_is_that_of_their_means():

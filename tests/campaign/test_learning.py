@@ -39,7 +39,8 @@ def test_a_frozen_policy_gives_the_same_rows_for_any_number_of_workers(learner):
     train("seams2023", learner, 9, "policy.json")
     options = {learner: {"learned": "policy.json"}}
     one, two = (
-        run_campaign("seams2023", [learner], 12, workers=workers, manager_options=options) for workers in (1, 2)
+        run_campaign("seams2023", [learner], 12, workers=workers, manager_options=options)
+        for workers in (1, 2)
     )
     assert one.equals(two) and "remarks" not in one.attrs
 
@@ -60,7 +61,9 @@ def test_a_campaign_on_missions_of_the_training_says_so(learner, given, runs, se
 def test_another_file_is_no_policy(learner, content):
     Path("policy.json").write_text(content)
     with pytest.raises(InputError, match=r"policy\.json"):
-        run_campaign("seams2023", [learner], 1, manager_options={learner: {"learned": "policy.json"}})
+        run_campaign(
+            "seams2023", [learner], 1, manager_options={learner: {"learned": "policy.json"}}
+        )
 
 
 def test_a_manager_that_learns_nothing_cannot_be_trained(tmp_path):
@@ -85,7 +88,11 @@ def test_a_class_that_keeps_something_from_mission_to_mission_is_found_out(worke
 
 
 def test_a_class_that_keeps_nothing_and_reads_what_there_may_be_is_not():
-    for manager, runs in ((f"{AWKWARD}:RaisesInHalf", 1), (f"{AWKWARD}:SavesCharge", 2), (f"{OUTSIDE}:Deliberate", 20)):
+    for manager, runs in (
+        (f"{AWKWARD}:RaisesInHalf", 1),
+        (f"{AWKWARD}:SavesCharge", 2),
+        (f"{OUTSIDE}:Deliberate", 20),
+    ):
         assert "remarks" not in run_campaign("seams2023", [manager], runs).attrs
 
 
@@ -103,9 +110,19 @@ def test_swapped_arguments_of_change_mode_are_told():
 @pytest.mark.parametrize(
     ("manager", "workers", "words", "remedy"),
     [
-        ("Misspells", 1, "f_generate_search_path has no mode 'fd_spiral_hihg' .did you mean", "fd_spiral_high)"),
+        (
+            "Misspells",
+            1,
+            "f_generate_search_path has no mode 'fd_spiral_hihg' .did you mean",
+            "fd_spiral_high)",
+        ),
         *(
-            ("ReadsNothing", workers, r"measured\('visibility'\) is always None", "battery_level, water_visibility)")
+            (
+                "ReadsNothing",
+                workers,
+                r"measured\('visibility'\) is always None",
+                "battery_level, water_visibility)",
+            )
             for workers in (1, 2)
         ),
     ],
@@ -113,7 +130,9 @@ def test_swapped_arguments_of_change_mode_are_told():
 @pytest.mark.usefixtures("quick_workers")
 def test_a_name_that_there_is_not_is_reported_once(manager, workers, words, remedy, tmp_path):
     with pytest.warns(UserWarning, match=words):
-        run_campaign("seams2023", [f"{AWKWARD}:{manager}"], 6, workers=workers, out=tmp_path / "out")
+        run_campaign(
+            "seams2023", [f"{AWKWARD}:{manager}"], 6, workers=workers, out=tmp_path / "out"
+        )
     (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
     assert "did you mean" in remark and remark.endswith(remedy)
 
@@ -121,7 +140,8 @@ def test_a_name_that_there_is_not_is_reported_once(manager, workers, words, reme
 def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too():
     manager = f"{AWKWARD}:ReadsNothingAtTimes"
     has_remark = {
-        seed: [bool(run_mission("seams2023", manager, run, seed).remarks) for run in (1, 2)] for seed in range(9)
+        seed: [bool(run_mission("seams2023", manager, run, seed).remarks) for run in (1, 2)]
+        for seed in range(9)
     }
     seed = next(seed for seed, runs in has_remark.items() if runs == [False, True])
     with pytest.warns(UserWarning, match=r"measured\('visibility'\)"):
@@ -131,21 +151,49 @@ def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too():
 @pytest.mark.parametrize(
     ("body", "status", "words"),
     [
-        ("def __init__(self, system): self.mine = system", 3, "__init__ does not begin with super().__init__(system)"),
+        (
+            "def __init__(self, system): self.mine = system",
+            3,
+            "__init__ does not begin with super().__init__(system)",
+        ),
         ("def diagnostic(self, kind, value): pass", 2, "write def diagnostic(self, diagnostic)"),
         ("def task_request(self, task): pass", 2, "did you mean def task_requested(self, task)?"),
         ("adapt = 3", 2, "write def adapt(self)"),
         ("period_s = 1.0; adapt = endless", 3, "no mission time passed"),
-        ("def diagnostic(self, diagnostic): yield self.system.env.timeout(1.0)", 2, "only adapt may yield"),
+        (
+            "def diagnostic(self, diagnostic): yield self.system.env.timeout(1.0)",
+            2,
+            "only adapt may yield",
+        ),
         ("async def task_requested(self, task): pass", 2, "write def task_requested(self, task)"),
-        ("period_s = 1.0; adapt = lambda self: 'fd_spiral_low'", 3, "adapt returned 'fd_spiral_low'; it may"),
-        ("period_s = '2'; adapt = endless", 3, "period_s is '2', starts_s is 0.0; they must be numbers"),
+        (
+            "period_s = 1.0; adapt = lambda self: 'fd_spiral_low'",
+            3,
+            "adapt returned 'fd_spiral_low'; it may",
+        ),
+        (
+            "period_s = '2'; adapt = endless",
+            3,
+            "period_s is '2', starts_s is 0.0; they must be numbers",
+        ),
         ("period_s = 1.0; starts_s = -50.0; adapt = endless", 3, "starts_s is -50.0"),
-        ("period_s = 1.0; adapt = endless; depends_on = ['water_visibility']", 3, "depends_on is ['water_visi"),
-        ("depends_on = {'water_visiblity': (3.25,)}", 3, "depends_on is {'water_visiblity': (3.25,)}; it must be like"),
+        (
+            "period_s = 1.0; adapt = endless; depends_on = ['water_visibility']",
+            3,
+            "depends_on is ['water_visi",
+        ),
+        (
+            "depends_on = {'water_visiblity': (3.25,)}",
+            3,
+            "depends_on is {'water_visiblity': (3.25,)}; it must be like",
+        ),
         ("subscribes_to = ('visibility',)", 2, "subscribes_to is ('visibility',)"),
         ("def check(self, loaded): pass", 2, "write @classmethod def check(cls, loaded)"),
-        ("input_files = classmethod(lambda cls, settings: [settings['table']])", 2, "--manager-option NAME=VALUE"),
+        (
+            "input_files = classmethod(lambda cls, settings: [settings['table']])",
+            2,
+            "--manager-option NAME=VALUE",
+        ),
     ],
 )
 def test_mistakes_in_a_class_are_reported_early(tmp_path, body, status, words):
@@ -157,7 +205,9 @@ def test_mistakes_in_a_class_are_reported_early(tmp_path, body, status, words):
 
 
 def installed(package: Path, where: Path) -> Path:
-    """Build a package's wheel and unpack it, which is what pip does; a virtual environment need not have pip."""
+    """Build a package's wheel and unpack it, which is what pip does; a virtual environment need not
+    have pip.
+    """
     build = "import sys; from hatchling.build import build_wheel; print(build_wheel(sys.argv[1]))"
     command = [sys.executable, "-c", build, str(where)]
     done = subprocess.run(command, cwd=package, check=True, capture_output=True, text=True)
@@ -176,7 +226,9 @@ def test_a_package_registers_its_manager_by_name(tmp_path):
     assert "cautious" in done.stdout
     inputs = json.loads((tmp_path / "out" / "manifest.json").read_text())["inputs_sha256"]
     assert "suave_cautious/__init__.py" in inputs
-    done = suave_des_command("campaign", "--resume", "out", "--runs", "3", "--workers", "1", cwd=tmp_path, **there)
+    done = suave_des_command(
+        "campaign", "--resume", "out", "--runs", "3", "--workers", "1", cwd=tmp_path, **there
+    )
     assert done.returncode == 0, done.stderr  # what a package registers is installed on purpose
 
 
@@ -184,9 +236,17 @@ def test_an_entry_point_that_does_not_import_is_bad_input(tmp_path):
     info = tmp_path / "broken-1.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
-    (info / "entry_points.txt").write_text("[suave_des.managers]\nbroken = no_such_module_at_all:Manager\n")
-    done = suave_des_command("run", "seams2023", "--manager", "broken", cwd=tmp_path, PYTHONPATH=str(tmp_path))
-    assert done.returncode == 2 and "no_such_module_at_all" in done.stderr and "Traceback" not in done.stderr
+    (info / "entry_points.txt").write_text(
+        "[suave_des.managers]\nbroken = no_such_module_at_all:Manager\n"
+    )
+    done = suave_des_command(
+        "run", "seams2023", "--manager", "broken", cwd=tmp_path, PYTHONPATH=str(tmp_path)
+    )
+    assert (
+        done.returncode == 2
+        and "no_such_module_at_all" in done.stderr
+        and "Traceback" not in done.stderr
+    )
 
 
 @pytest.mark.slow
@@ -198,6 +258,8 @@ def test_the_example_learns_a_policy_that_beats_bt_on_missions_that_it_has_not_s
     frame = run_campaign("seams2023", ["bt", learner], 200, seed=1, manager_options=options)
     wide = frame.pivot(index="run", columns="manager", values="search_time_s")
     gain_s = wide["bt"] - wide[learner]
-    interval = stats.bootstrap((gain_s,), lambda values, axis: values.mean(axis=axis), rng=1).confidence_interval
+    interval = stats.bootstrap(
+        (gain_s,), lambda values, axis: values.mean(axis=axis), rng=1
+    ).confidence_interval
     print(f"{gain_s.mean():.1f} s sooner, 95% interval {interval.low:.1f} to {interval.high:.1f}")
     assert interval.low > 10.0

@@ -1,4 +1,6 @@
-"""Settings and files of managers, on the command line and in sweeps; and whose code a resumed campaign runs."""
+"""Settings and files of managers, on the command line and in sweeps; and whose code a resumed
+campaign runs.
+"""
 
 import json
 import linecache
@@ -60,14 +62,21 @@ def search_times(**options: object) -> list[float]:
 
 def test_a_sweep_varies_a_managers_own_setting_which_the_scenario_need_not_have(settable):
     modes = ["fd_spiral_low", "fd_spiral_high"]
-    frame = run_campaign("seams2023", [settable], runs=3, sweep={f"managers.{settable}.mode": modes})
+    frame = run_campaign(
+        "seams2023", [settable], runs=3, sweep={f"managers.{settable}.mode": modes}
+    )
     for mode in modes:
         rows = frame[frame[f"managers.{settable}.mode"] == mode]
         assert rows["search_time_s"].tolist() == search_times(managers=[f"fixed:{mode}"])
 
 
 def test_values_by_key_path_are_those_of_the_scenario():
-    assert load_scenario("seams2023", values={"mission.time_limit_s": 120}).scenario.mission.time_limit_s == 120.0
+    assert (
+        load_scenario(
+            "seams2023", values={"mission.time_limit_s": 120}
+        ).scenario.mission.time_limit_s
+        == 120.0
+    )
     by_sweeps_name = load_scenario("seams2023", values={"visibility.period_s": 40})
     assert by_sweeps_name.scenario.signals["water_visibility"].period_s == 40.0
     with pytest.raises(InputError, match=r"--set: mission\.time_limit: unknown key"):
@@ -81,11 +90,21 @@ def test_names_of_managers_may_have_points_in_key_paths():
 
 def test_options_of_the_command_line(folder, settable):
     set_limit = ("--set", "mission.time_limit_s=150", "--set", "battery={discharge_time_s: 1e3}")
-    chosen = ("--manager-option", "mode=fd_spiral_high", "--manager-option", f"{settable}.other=[1, x]")
-    done = command_here("run", "seams2023", "--manager", settable, *set_limit, *chosen, "--out", "out", cwd=folder)
+    chosen = (
+        "--manager-option",
+        "mode=fd_spiral_high",
+        "--manager-option",
+        f"{settable}.other=[1, x]",
+    )
+    done = command_here(
+        "run", "seams2023", "--manager", settable, *set_limit, *chosen, "--out", "out", cwd=folder
+    )
     assert done.returncode == 0, done.stderr
     scenario = json.loads((folder / "out" / "mission.json").read_text())["scenario"]
-    assert scenario["mission"]["time_limit_s"] == 150.0 and scenario["battery"]["discharge_time_s"] == 1000.0
+    assert (
+        scenario["mission"]["time_limit_s"] == 150.0
+        and scenario["battery"]["discharge_time_s"] == 1000.0
+    )
     assert scenario["managers"][settable] == {"mode": "fd_spiral_high", "other": [1, "x"]}
 
 
@@ -124,21 +143,33 @@ class TestDeclaredFiles:
 
     def test_a_missing_one_is_noticed_before_any_mission(self, folder, settable):
         with pytest.raises(InputError, match=r"table\.txt.*reads this file, and it is not there"):
-            run_campaign("seams2023", [settable], 1, manager_options={settable: {"table": "table.txt"}})
+            run_campaign(
+                "seams2023", [settable], 1, manager_options={settable: {"table": "table.txt"}}
+            )
 
     def test_each_value_of_a_sweep_is_looked_at(self, folder, settable):
         (folder / "one.txt").write_text("fd_spiral_high")
         with pytest.raises(InputError, match=r"two\.txt"):
-            run_campaign("seams2023", [settable], 1, sweep={f"managers.{settable}.table": ["one.txt", "two.txt"]})
+            run_campaign(
+                "seams2023",
+                [settable],
+                1,
+                sweep={f"managers.{settable}.table": ["one.txt", "two.txt"]},
+            )
 
     def test_a_file_that_is_not_declared_is_not_given(self, folder, settable):
         with pytest.warns(UserWarning, match=r"secret\.txt' is not declared"):
             run_campaign("seams2023", [settable.replace("Settable", "Careless")], 1)
 
     @pytest.mark.parametrize("changed", ["a/table.txt", "a/table.yaml"])
-    def test_a_change_of_one_is_noticed_when_the_campaign_is_resumed(self, folder, settable, changed):
+    def test_a_change_of_one_is_noticed_when_the_campaign_is_resumed(
+        self, folder, settable, changed
+    ):
         """Also of a YAML file, and of one of two with the same name in different folders."""
-        managers, files = [settable, settable.replace("Settable", "Other")], [changed, changed.replace("a/", "b/")]
+        managers, files = (
+            [settable, settable.replace("Settable", "Other")],
+            [changed, changed.replace("a/", "b/")],
+        )
         for name in files:
             (folder / name).parent.mkdir()
             (folder / name).write_text("fd_spiral_high")
@@ -205,17 +236,23 @@ class TestReceivedFolder:
 
     @pytest.mark.parametrize("is_named", [True, False])
     def test_they_are_when_the_user_says_so(self, received, settable, is_named):
-        done = command_here(*RESUME, *(("--managers", settable) if is_named else ("--yes",)), cwd=received)
+        done = command_here(
+            *RESUME, *(("--managers", settable) if is_named else ("--yes",)), cwd=received
+        )
         assert (received / "imported").exists()
         # the code is another one than the campaign began with
         assert f"files_sha256.{settable.partition(':')[0]}.py was" in done.stderr
 
     def test_managers_of_the_campaign_file_are_not_run_unasked_either(self, folder):
         """The campaign file decides what runs, whatever the folder's own store says."""
-        (folder / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nmanagers: [none]\nruns: 1\n")
+        (folder / "mine.yaml").write_text(
+            "campaign: 1\nscenario: seams2023\nmanagers: [none]\nruns: 1\n"
+        )
         assert command_here("campaign", "mine.yaml", "--out", "out", cwd=folder).returncode == 0
         command = "exec:sh -c 'touch ran'"
-        (folder / "mine.yaml").write_text(f'campaign: 1\nscenario: seams2023\nmanagers: ["{command}"]\nruns: 1\n')
+        (folder / "mine.yaml").write_text(
+            f'campaign: 1\nscenario: seams2023\nmanagers: ["{command}"]\nruns: 1\n'
+        )
         done = command_here(*RESUME, cwd=folder)
         assert done.returncode == 2 and f"the code of {command}" in done.stderr
         assert not (folder / "ran").exists()
@@ -230,7 +267,9 @@ f_lights:
 f_lights_node:
   ros__parameters: {type: node, modes: {fd_dim: {ros__parameters: {power_w: 15.0}}}}
 """
-LIGHTS = "from suave_des.managed.node import CustomFunction\nclass Lights(CustomFunction):\n    pass\n"
+LIGHTS = (
+    "from suave_des.managed.node import CustomFunction\nclass Lights(CustomFunction):\n    pass\n"
+)
 
 
 class TestReceivedFunction:
@@ -246,7 +285,9 @@ class TestReceivedFunction:
         text = "base: seams2023\nmodes_file: modes.yaml\nmission: {functions: {search_pipeline: [f_lights]}}\n"
         text += f"default_modes: {{f_lights: fd_dim}}\nfunctions: {{f_lights: {{node: '{module.stem}:Lights'}}}}\n"
         (folder / "mine.yaml").write_text(text)
-        made = command_here("campaign", "mine.yaml", "--managers", "none", "--runs", "1", "--out", "out", cwd=folder)
+        made = command_here(
+            "campaign", "mine.yaml", "--managers", "none", "--runs", "1", "--out", "out", cwd=folder
+        )
         assert made.returncode == 0, made.stderr
         as_received(folder / "out")
         (folder / "imported").unlink()
@@ -255,7 +296,9 @@ class TestReceivedFunction:
     @pytest.mark.parametrize("command", [RESUME, ("replay", "out")])
     def test_it_is_not_imported_unasked(self, received, command):
         done = command_here(*command, cwd=received)
-        assert done.returncode == 2 and f"run the code of lights_{received.name}:Lights" in done.stderr
+        assert (
+            done.returncode == 2 and f"run the code of lights_{received.name}:Lights" in done.stderr
+        )
         assert not (received / "imported").exists()
         assert command_here(*command, "--yes", cwd=received).returncode == 0
         assert (received / "imported").exists()
@@ -269,7 +312,9 @@ class TestReceivedFunction:
         name = f"lights_{received.name}:Lights"
         text = f'campaign: 1\nscenario: mine.yaml\nmanagers: [none]\nsweep: {{functions.f_lights.node: ["{name}"]}}\n'
         (received / "swept.yaml").write_text(text)
-        (received / "mine.yaml").write_text((received / "mine.yaml").read_text().replace(name, "installed_package"))
+        (received / "mine.yaml").write_text(
+            (received / "mine.yaml").read_text().replace(name, "installed_package")
+        )
         file = read_campaign_file(received / "swept.yaml")
         campaign = read_campaign(CampaignSpec.of(received / "swept.yaml"), file)
         assert campaign.code() == (name,)

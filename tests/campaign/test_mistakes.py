@@ -21,14 +21,31 @@ def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def wrong_rule(tmp_path: Path) -> str:
-    (tmp_path / "mine.swrl").write_text('Late: c_status(?c, "False") -> Role(?c)\n', encoding="utf-8")
+    (tmp_path / "mine.swrl").write_text(
+        'Late: c_status(?c, "False") -> Role(?c)\n', encoding="utf-8"
+    )
     return "mine.swrl"
 
 
-def campaign(tmp_path: Path, *options: str, scenario: str = "seams2023", managers: str = "none") -> None:
-    """Run a campaign of one run; what it tells is logged, which goes to standard error outside tests."""
+def campaign(
+    tmp_path: Path, *options: str, scenario: str = "seams2023", managers: str = "none"
+) -> None:
+    """Run a campaign of one run; what it tells is logged, which goes to standard error outside
+    tests.
+    """
     (tmp_path / "out").mkdir()
-    arguments = ("campaign", scenario, "--runs", "1", "--managers", managers, "--workers", "1", "--out", "out")
+    arguments = (
+        "campaign",
+        scenario,
+        "--runs",
+        "1",
+        "--managers",
+        managers,
+        "--workers",
+        "1",
+        "--out",
+        "out",
+    )
     done = command_here(*arguments, *options, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
@@ -37,7 +54,10 @@ def test_a_mistaken_rule_is_told_in_the_words_of_kb_check(tmp_path, wrong_rule, 
     campaign(tmp_path, "--rules", wrong_rule)
     finding, pointer = caplog.messages
     assert finding == f"WARN   mine.swrl: line 1, rule Late, column 20: {STATUS}"
-    assert finding in command_here("kb", "check", "--rules", wrong_rule, cwd=tmp_path).stdout.splitlines()
+    assert (
+        finding
+        in command_here("kb", "check", "--rules", wrong_rule, cwd=tmp_path).stdout.splitlines()
+    )
     assert "suave-des kb check" in pointer
 
 
@@ -53,7 +73,9 @@ def test_shipped_files_are_not_even_checked(scenario, tmp_path, monkeypatch):
     campaign(tmp_path, scenario=scenario, managers="metacontrol")
 
 
-def test_the_same_files_are_checked_once_and_changed_ones_again(tmp_path, wrong_rule, monkeypatch, caplog):
+def test_the_same_files_are_checked_once_and_changed_ones_again(
+    tmp_path, wrong_rule, monkeypatch, caplog
+):
     checks: list[Subject] = []
 
     def counted(base: Ontology, subject: Subject) -> list[Finding]:
@@ -62,7 +84,9 @@ def test_the_same_files_are_checked_once_and_changed_ones_again(tmp_path, wrong_
 
     monkeypatch.setattr("suave_des.knowledge.checks.findings_in", counted)
     for status, number in (("False", 1), ("False", 1), ("FALSE", 2), ("Flase", 3), ("False", 3)):
-        (tmp_path / wrong_rule).write_text(f'Late: c_status(?c, "{status}") -> Role(?c)\n', encoding="utf-8")
+        (tmp_path / wrong_rule).write_text(
+            f'Late: c_status(?c, "{status}") -> Role(?c)\n', encoding="utf-8"
+        )
         run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])
         assert len(checks) == number
     assert [STATUS in message for message in caplog.messages] == [True, False, False, False]

@@ -1,4 +1,6 @@
-"""Whatever ends a campaign, what is done is kept, and going on gives the bytes of an undisturbed one."""
+"""Whatever ends a campaign, what is done is kept, and going on gives the bytes of an undisturbed
+one.
+"""
 
 import random
 import shutil
@@ -55,16 +57,24 @@ def interrupted(scenario: Path, folder: Path, runs: int = 20, missions: int = 15
 def test_resumed_on_any_number_of_workers_the_bytes_are_the_same(before, after, scenario, tmp_path):
     whole = undisturbed(scenario, 20, tmp_path / "whole")
     with pytest.raises(CampaignInterrupted):
-        run_campaign(scenario, MANAGERS, 20, 1, before, tmp_path / "out", on_progress=stopped_after(15))
+        run_campaign(
+            scenario, MANAGERS, 20, 1, before, tmp_path / "out", on_progress=stopped_after(15)
+        )
     seen: list[Progress] = []
     resume_campaign(tmp_path / "out", after, on_progress=seen.append)
     assert (tmp_path / "out" / "runs.csv").read_bytes() == whole
     assert seen[0].done > 15  # what was done is not done again
-    assert (tmp_path / "out" / "summary.csv").read_bytes() == (tmp_path / "whole" / "summary.csv").read_bytes()
-    assert (tmp_path / "out" / "manifest.json").read_bytes() == (tmp_path / "whole" / "manifest.json").read_bytes()
+    assert (tmp_path / "out" / "summary.csv").read_bytes() == (
+        tmp_path / "whole" / "summary.csv"
+    ).read_bytes()
+    assert (tmp_path / "out" / "manifest.json").read_bytes() == (
+        tmp_path / "whole" / "manifest.json"
+    ).read_bytes()
 
 
-def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(scenario, tmp_path, monkeypatch):
+def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(
+    scenario, tmp_path, monkeypatch
+):
     """What was read is still held by the exception then, and must not keep the database locked."""
     interrupted(scenario, tmp_path / "out")
 
@@ -79,7 +89,9 @@ def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(scen
     with pytest.raises(CampaignInterrupted):
         resume_campaign(tmp_path / "out")
     resume_campaign(tmp_path / "out")
-    assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed(scenario, 20, tmp_path / "whole")
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed(
+        scenario, 20, tmp_path / "whole"
+    )
 
 
 def test_a_campaign_that_is_done_may_get_more_runs(scenario, tmp_path):
@@ -101,7 +113,9 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario, undisturbed_l
 
     done = chaos.survive_forked(6, random.Random(7), run, out)
     assert done == sorted(done)
-    assert len({count for count in done if 0 < count < 2 * runs}) >= 2  # or the moments showed nothing
+    assert (
+        len({count for count in done if 0 < count < 2 * runs}) >= 2
+    )  # or the moments showed nothing
     resume_campaign(out)
     assert (out / "runs.csv").read_bytes() == undisturbed_long
     assert sorted(path.name for path in out.iterdir()) == [
@@ -110,8 +124,12 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario, undisturbed_l
 
 
 @pytest.mark.usefixtures("quick_campaigns")
-@pytest.mark.parametrize(("kills", "runs"), [(1, LONG), pytest.param(4, 3000, marks=pytest.mark.slow)])
-def test_killed_with_its_workers_or_without_the_bytes_are_the_same(scenario, undisturbed_long, tmp_path, kills, runs):
+@pytest.mark.parametrize(
+    ("kills", "runs"), [(1, LONG), pytest.param(4, 3000, marks=pytest.mark.slow)]
+)
+def test_killed_with_its_workers_or_without_the_bytes_are_the_same(
+    scenario, undisturbed_long, tmp_path, kills, runs
+):
     whole = undisturbed_long if runs == LONG else undisturbed(scenario, runs, tmp_path / "whole")
     asked = [str(scenario), "--managers", ",".join(MANAGERS), "--runs", str(runs), "--workers", "2"]
     done = chaos.survive(kills, random.Random(7), tmp_path, asked, longest_s=0.3)
@@ -134,7 +152,12 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("file", "old", "new", "difference"),
         [
-            ("own.yaml", "time_limit_s: 60", "time_limit_s: 61", r"scenario.mission.time_limit_s was 60.0, and is now"),
+            (
+                "own.yaml",
+                "time_limit_s: 60",
+                "time_limit_s: 61",
+                r"scenario.mission.time_limit_s was 60.0, and is now",
+            ),
             ("own.yaml", "seams2023", "release15", r"scenario\.\S+ was "),
             ("suave_modes.yaml", "\n", "\n\n", r"files_sha256\.\S+suave_modes.yaml was "),
             ("suave.owl", "\n", "\n\n", r"files_sha256\.\S+suave.owl was "),
@@ -155,12 +178,16 @@ class TestRefusals:
         with pytest.raises(InputError, match=r"runs was 20, and is now 10"):
             resume_campaign(out, runs=10)
         monkeypatch.setattr("suave_des.__version__", "99.0")
-        with pytest.raises(InputError, match=r"versions.suave-des was '[0-9.]+', and is now '99.0'"):
+        with pytest.raises(
+            InputError, match=r"versions.suave-des was '[0-9.]+', and is now '99.0'"
+        ):
             resume_campaign(out)
 
     @pytest.mark.usefixtures("quick_campaigns")
     def test_two_campaigns_on_one_folder(self, scenario, tmp_path):
-        process = chaos.start([str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path)
+        process = chaos.start(
+            [str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path
+        )
         try:
             wait_until(lambda: has_campaign(tmp_path / "out"))
             taken = "another campaign is running in the output folder"
@@ -177,7 +204,9 @@ class TestRefusals:
 
 class TestDisk:
     def test_that_fills_up_as_the_system_tells_it(self, scenario, undisturbed_long, tmp_path):
-        """Files may not grow beyond 40 kB: the system refuses to write, as it does on a full disk."""
+        """Files may not grow beyond 40 kB: the system refuses to write, as it does on a full
+        disk.
+        """
         code = (
             "import resource, signal, sys\n"
             "resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))\n"
@@ -200,7 +229,9 @@ class TestDisk:
             if progress.done == 7:
                 shutil.rmtree(tmp_path / "out")
 
-        with pytest.raises(StoreError, match=r"was removed while the campaign ran; .* start a new campaign$"):
+        with pytest.raises(
+            StoreError, match=r"was removed while the campaign ran; .* start a new campaign$"
+        ):
             run_campaign(scenario, MANAGERS, 20, 1, out=tmp_path / "out", on_progress=remove)
 
 

@@ -18,8 +18,12 @@ from suave_des.scenario.loader import LoadedScenario, load_scenario
 from tests.helpers import AWKWARD
 
 
-def campaign(*managers: str, loaded: LoadedScenario | None = None, time_out_s: float = 60.0) -> Campaign:
-    return read_campaign(CampaignSpec.of("seams2023", managers=managers, time_out_s=time_out_s), None, loaded)
+def campaign(
+    *managers: str, loaded: LoadedScenario | None = None, time_out_s: float = 60.0
+) -> Campaign:
+    return read_campaign(
+        CampaignSpec.of("seams2023", managers=managers, time_out_s=time_out_s), None, loaded
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +65,9 @@ class TestOwnModules:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
         found = user_modules(["mine.manager:M", "none", "metacontrol"], [])
-        assert found == {place: folder / place for place in files if place != "mine/not_imported.py"}
+        assert found == {
+            place: folder / place for place in files if place != "mine/not_imported.py"
+        }
 
     def test_of_a_script_what_it_imports(self, folder, monkeypatch):
         """Its own classes are sent by value."""
@@ -71,7 +77,9 @@ class TestOwnModules:
         (folder / "habits.py").write_text("PERIOD_S = 4.0\n")
         mine = type("Mine", (NoManager,), {"__module__": "__main__"})
         monkeypatch.setattr(sys.modules["__main__"], "Mine", mine, raising=False)
-        monkeypatch.setattr(sys.modules["__main__"], "__file__", str(folder / "script.py"), raising=False)
+        monkeypatch.setattr(
+            sys.modules["__main__"], "__file__", str(folder / "script.py"), raising=False
+        )
         assert user_modules(["__main__:Mine"], []) == {
             "__main__.py": folder / "script.py",
             "habits.py": folder / "habits.py",
@@ -93,15 +101,23 @@ class TestOnAWorker:
     def run(parcel: bytes, runs: range) -> list[Finished]:
         return cluster.run("token", parcel, tuple(MissionKey(0, 0, run) for run in runs))
 
-    def test_files_that_managers_declare_travel_each_with_its_own_content(self, tmp_path, monkeypatch):
+    def test_files_that_managers_declare_travel_each_with_its_own_content(
+        self, tmp_path, monkeypatch
+    ):
         """Also where two managers have a file of the same name, from different folders."""
         monkeypatch.chdir(tmp_path)
         (tmp_path / "below").mkdir()
         names = [f"{AWKWARD}:Declares", f"{AWKWARD}:DeclaresToo"]
         text = f'base: seams2023\nmanagers: {{"{names[1]}": {{table: table.txt}}}}\n'
-        for path, content in (("table.txt", "high"), ("below/table.txt", "low"), ("below/mine.yaml", text)):
+        for path, content in (
+            ("table.txt", "high"),
+            ("below/table.txt", "low"),
+            ("below/mine.yaml", text),
+        ):
             (tmp_path / path).write_text(content)
-        loaded = load_scenario("below/mine.yaml", manager_options={names[0]: {"table": "table.txt"}})
+        loaded = load_scenario(
+            "below/mine.yaml", manager_options={names[0]: {"table": "table.txt"}}
+        )
         parcel = cluster.pack(campaign(*names, loaded=loaded))
         shutil.rmtree(tmp_path / "below")
         (tmp_path / "table.txt").unlink()
@@ -109,7 +125,9 @@ class TestOnAWorker:
         there = cluster._current["token"][0].campaign.loaded
         files = [there.manager_file(name, "table.txt") for name in names]
         assert [path.read_text() for path in files] == ["high", "low"]
-        assert all(path.is_relative_to(tmp_path / "scratch") and path.name == "table.txt" for path in files)
+        assert all(
+            path.is_relative_to(tmp_path / "scratch") and path.name == "table.txt" for path in files
+        )
 
     def test_a_mission_that_takes_too_long_is_interrupted_in_a_thread_too(self):
         outcomes: list[list[Finished]] = []
@@ -118,7 +136,13 @@ class TestOnAWorker:
         thread.start()
         thread.join(60.0)
         (finished,) = outcomes
-        assert [isinstance(outcome, MissionFailure) for _, outcome in finished] == [False, True, False]
+        assert [isinstance(outcome, MissionFailure) for _, outcome in finished] == [
+            False,
+            True,
+            False,
+        ]
         late = finished[1][1]
         assert (late.run, late.time_s, late.lasting) == (2, 50.0, False)
-        assert late.cause.startswith("not done after 1 s (time-out), in adapt (awkward_managers.py, line ")
+        assert late.cause.startswith(
+            "not done after 1 s (time-out), in adapt (awkward_managers.py, line "
+        )

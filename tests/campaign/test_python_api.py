@@ -51,7 +51,13 @@ class TestRunCampaign:
         kinds = {str(kind) for name, kind in frame.dtypes.items() if name.endswith(("_s", "_m"))}
         assert kinds == {"float64"}
         names = ("scenario", "run", "seed", "pipeline_found", "adaptations")
-        assert [str(frame[name].dtype) for name in names] == ["category", "int64", "int64", "bool", "int64"]
+        assert [str(frame[name].dtype) for name in names] == [
+            "category",
+            "int64",
+            "int64",
+            "bool",
+            "int64",
+        ]
         assert frame["mean_reaction_time_s"].isna().any()
 
     def test_it_is_what_runs_csv_says(self, scenario, tmp_path):
@@ -61,7 +67,8 @@ class TestRunCampaign:
 
     def test_attrs_tell_the_rest_as_plain_values(self, tmp_path):
         with pytest.warns(
-            UserWarning, match=rf"\d of 6 missions failed, see attrs\['failures'\]: manager {AWKWARD}:"
+            UserWarning,
+            match=rf"\d of 6 missions failed, see attrs\['failures'\]: manager {AWKWARD}:",
         ) as told:
             frame = suave_des.run_campaign(
                 "seams2023",
@@ -90,7 +97,9 @@ class TestRunCampaign:
         assert len(nothing) == 0
         assert [str(kind) for kind in nothing.dtypes] == [str(kind) for kind in some.dtypes]
 
-    def test_ctrl_c_at_a_prompt_gives_what_is_there(self, scenario, tmp_path, interrupted_after, monkeypatch):
+    def test_ctrl_c_at_a_prompt_gives_what_is_there(
+        self, scenario, tmp_path, interrupted_after, monkeypatch
+    ):
         monkeypatch.setattr(sys, "ps1", ">>> ", raising=False)
         for out in (None, tmp_path / "out"):
             interrupted_after(7)
@@ -112,18 +121,45 @@ class TestArguments:
     @pytest.mark.parametrize(
         ("call", "words"),
         [
-            (lambda: run_mission("seams2023", mananger="none"), "run_mission has no argument 'mananger' .did you mean"),
+            (
+                lambda: run_mission("seams2023", mananger="none"),
+                "run_mission has no argument 'mananger' .did you mean",
+            ),
             (lambda: run_mission(), "run_mission: missing a required argument: 'scenario'"),
-            (lambda: run_mission(3), "scenario: expected a name, a path or a loaded scenario, got 3"),
-            (lambda: run_mission("seams2023", "none", run="1"), "run: expected a whole number, got '1'"),
-            (lambda: run_campaign("seams2023", runs="ten"), "runs: expected a whole number, got 'ten'"),
+            (
+                lambda: run_mission(3),
+                "scenario: expected a name, a path or a loaded scenario, got 3",
+            ),
+            (
+                lambda: run_mission("seams2023", "none", run="1"),
+                "run: expected a whole number, got '1'",
+            ),
+            (
+                lambda: run_campaign("seams2023", runs="ten"),
+                "runs: expected a whole number, got 'ten'",
+            ),
             (lambda: run_campaign("seams2023", rnus=3), "no argument 'rnus' .did you mean 'runs'"),
             (lambda: run_campaign("seams2023", command=["x"]), "no argument 'command'"),
-            (lambda: load_scenario("seams2023", rules="a.swrl"), "rules: expected a list, got 'a.swrl'"),
-            (lambda: with_values("seams2023", {}), "loaded: expected a loaded scenario, got 'seams2023'"),
-            (lambda: suave_des.Mission("seams2023", sed=3), "Mission has no argument 'sed' .did you mean 'seed'"),
-            (lambda: suave_des.KnowledgeBase.load(rulez="x"), "KnowledgeBase.load has no argument 'rulez'"),
-            (lambda: suave_des.CampaignFrame().compare(metrcs=["x"]), "compare has no argument 'metrcs' .did "),
+            (
+                lambda: load_scenario("seams2023", rules="a.swrl"),
+                "rules: expected a list, got 'a.swrl'",
+            ),
+            (
+                lambda: with_values("seams2023", {}),
+                "loaded: expected a loaded scenario, got 'seams2023'",
+            ),
+            (
+                lambda: suave_des.Mission("seams2023", sed=3),
+                "Mission has no argument 'sed' .did you mean 'seed'",
+            ),
+            (
+                lambda: suave_des.KnowledgeBase.load(rulez="x"),
+                "KnowledgeBase.load has no argument 'rulez'",
+            ),
+            (
+                lambda: suave_des.CampaignFrame().compare(metrcs=["x"]),
+                "compare has no argument 'metrcs' .did ",
+            ),
         ],
     )
     def test_that_a_function_has_not_or_of_another_type_are_told_in_plain_words(self, call, words):
@@ -131,13 +167,17 @@ class TestArguments:
             call()
 
     def test_numbers_may_be_of_numpy(self, scenario):
-        assert len(suave_des.run_campaign(scenario, "none", runs=np.int64(2), seed=np.uint8(3))) == 2
+        assert (
+            len(suave_des.run_campaign(scenario, "none", runs=np.int64(2), seed=np.uint8(3))) == 2
+        )
 
 
 def test_a_mission_draws_itself():
     mission = suave_des.run_mission("seams2023", "none", run=1, seed=8)
     assert [len(mission.figure(kind).axes) for kind in ("map", "timeline")] == [3, 3]
-    with pytest.raises(InputError, match=r"there is no figure 'mapp' of a mission .did you mean 'map'"):
+    with pytest.raises(
+        InputError, match=r"there is no figure 'mapp' of a mission .did you mean 'map'"
+    ):
         mission.figure("mapp")
 
 
@@ -149,7 +189,11 @@ class Mine(NoManager):
 
 
 def test_a_class_is_known_by_its_registered_name_or_by_its_place():
-    assert [name_of(each) for each in (Metacontrol, "bt", Mine)] == ["metacontrol", "bt", f"{__name__}:Mine"]
+    assert [name_of(each) for each in (Metacontrol, "bt", Mine)] == [
+        "metacontrol",
+        "bt",
+        f"{__name__}:Mine",
+    ]
 
 
 @pytest.mark.parametrize("wrong", [int, 3, None], ids=str)
@@ -194,9 +238,13 @@ def test_arrays_in_the_forms_of_a_sweep_become_lists():
 def test_a_loaded_scenario_runs_as_its_file_does_and_with_its_values():
     asked = {"runs": 2, "progress": False}
     of_file = run_campaign("seams2023", ["none"], **asked)
-    pandas.testing.assert_frame_equal(run_campaign(load_scenario("seams2023"), "none", **asked), of_file)
+    pandas.testing.assert_frame_equal(
+        run_campaign(load_scenario("seams2023"), "none", **asked), of_file
+    )
     short = with_values(load_scenario("seams2023"), {"mission.time_limit_s": 50})
-    assert run_campaign(short, NoManager, runs=1, progress=False)["search_time_s"].tolist() == [50.0]
+    assert run_campaign(short, NoManager, runs=1, progress=False)["search_time_s"].tolist() == [
+        50.0
+    ]
     assert run_mission(short, NoManager).metrics.search_time_s == 50.0
 
 
@@ -221,6 +269,11 @@ print(one.equals(two), len(two), two["manager"].iloc[0])
 
 def test_a_manager_of_a_notebook_runs_on_several_workers():
     done = subprocess.run(
-        [sys.executable, "-"], input=IN_NOTEBOOK, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-"],
+        input=IN_NOTEBOOK,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
     assert done.stdout == "True 3 __main__:Mine\n", done.stderr

@@ -1,4 +1,6 @@
-"""Output folders that come from elsewhere, are damaged, or were left by a command that was killed."""
+"""Output folders that come from elsewhere, are damaged, or were left by a command that was
+killed.
+"""
 
 import json
 import os
@@ -46,12 +48,17 @@ class TestLinks:
         ("name", "link"),
         [
             *(("campaign.sqlite-wal", "symlink_to"), ("campaign.sqlite-wal", "hardlink_to")),
-            *(("campaign.sqlite-journal", "symlink_to"), ("campaign.sqlite-journal", "hardlink_to")),
+            *(
+                ("campaign.sqlite-journal", "symlink_to"),
+                ("campaign.sqlite-journal", "hardlink_to"),
+            ),
             *(("campaign.sqlite", "symlink_to"), ("suave", "symlink_to")),
         ],
     )
     def test_where_the_campaign_is_resumed(self, received, precious, name, link):
-        target = {"suave": precious.parent, "campaign.sqlite": received / "elsewhere.sqlite"}.get(name, precious)
+        target = {"suave": precious.parent, "campaign.sqlite": received / "elsewhere.sqlite"}.get(
+            name, precious
+        )
         if name == "campaign.sqlite":
             (received / name).rename(target)
         getattr(received / name, link)(target)
@@ -73,20 +80,45 @@ class TestLinks:
         assert not (tmp_path / "runs.csv").is_symlink()
 
 
-WRONG = (None, 0, -1, 1e400, 2**70, "", "x", "../x", [], [1], ["a", None], {}, {"a": 1}, [[[]]], True)
+WRONG = (
+    None,
+    0,
+    -1,
+    1e400,
+    2**70,
+    "",
+    "x",
+    "../x",
+    [],
+    [1],
+    ["a", None],
+    {},
+    {"a": 1},
+    [[[]]],
+    True,
+)
 """Values that JSON has, in place of what is expected."""
 
 
 def forgeries(path: Path) -> Iterator[tuple[object, Callable[[sqlite3.Connection], object]]]:
     """Edits of a store after which its checksums are right, each with a name."""
     with sqlite3.connect(path) as db:
-        about = {name: json.loads(value) for name, value in db.execute("SELECT name, value FROM about")}
-        rows = [json.loads(content) for (content,) in db.execute("SELECT content FROM outcomes ORDER BY run")]
+        about = {
+            name: json.loads(value) for name, value in db.execute("SELECT name, value FROM about")
+        }
+        rows = [
+            json.loads(content)
+            for (content,) in db.execute("SELECT content FROM outcomes ORDER BY run")
+        ]
 
     def noted(name: str, value: object) -> Callable[[sqlite3.Connection], object]:
-        return lambda db: db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
+        return lambda db: db.execute(
+            "INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value)
+        )
 
-    def outcome(value: object, kind: int = 0, run: object = 1) -> Callable[[sqlite3.Connection], object]:
+    def outcome(
+        value: object, kind: int = 0, run: object = 1
+    ) -> Callable[[sqlite3.Connection], object]:
         content = json.dumps(value)
         crc = _crc(0, 0, run, kind, content)
         statement = "INSERT OR REPLACE INTO outcomes VALUES (0, 0, ?, ?, ?, ?)"
@@ -99,7 +131,10 @@ def forgeries(path: Path) -> Iterator[tuple[object, Callable[[sqlite3.Connection
         for key in about[name]:
             for value in WRONG[:: 1 if name == "request" else 4]:
                 yield (name, key, value), noted(name, {**about[name], key: value})
-    for value in (*WRONG, *([*rows[0][:place], wrong, *rows[0][place + 1 :]] for place in (7, 8) for wrong in WRONG)):
+    for value in (
+        *WRONG,
+        *([*rows[0][:place], wrong, *rows[0][place + 1 :]] for place in (7, 8) for wrong in WRONG),
+    ):
         for kind in (0, 1, 2, 7):
             yield (kind, value), outcome(value, kind)
     for run in (0, -5, 2**62, 9):
@@ -155,7 +190,9 @@ class TestDamage:
                 pytest.skip(str(error))
         self.resumed(received)
 
-    @pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in range(1, 8))])
+    @pytest.mark.parametrize(
+        "part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in range(1, 8))]
+    )
     def test_of_what_has_the_right_checksum_is_no_traceback(self, received, part):
         """As somebody would forge it who knows the program."""
         whole = (received / "campaign.sqlite").read_bytes()
@@ -173,7 +210,10 @@ class TestDamage:
     @pytest.mark.parametrize(
         ("damage", "told"),
         [
-            ("UPDATE outcomes SET content = replace(content, '2.5', '2.6') WHERE run = 3", "the outcome of run 3 is"),
+            (
+                "UPDATE outcomes SET content = replace(content, '2.5', '2.6') WHERE run = 3",
+                "the outcome of run 3 is",
+            ),
             (b"something else " * 100, "file is not a database"),
             (None, r"[\s\S]*start a new campaign with --overwrite"),
             (b"", "there is no campaign in it"),  # as one that was killed at its very start leaves
@@ -187,7 +227,11 @@ class TestDamage:
             store.close()
         else:
             size = path.stat().st_size
-            path.write_bytes(path.read_bytes()[: size // 3] + b"\xff" * (size * 2 // 3) if damage is None else damage)
+            path.write_bytes(
+                path.read_bytes()[: size // 3] + b"\xff" * (size * 2 // 3)
+                if damage is None
+                else damage
+            )
         with pytest.raises(InputError, match=told):
             resume_campaign(received)
 
@@ -218,7 +262,9 @@ class TestOverwrite:
             run_campaign("release15", ["bt"], 2, 1, out=received, overwrite=True)
         assert not {"runs.csv", "summary.csv", "manifest.json"} & set(found)
 
-    def test_results_of_another_campaign_than_the_store_s_are_not_drawn(self, received, tmp_path, command):
+    def test_results_of_another_campaign_than_the_store_s_are_not_drawn(
+        self, received, tmp_path, command
+    ):
         other = tmp_path / "other"
         run_campaign("seams2023", ["none"], 3, 2, out=other)
         shutil.copy(other / "campaign.sqlite", received / "campaign.sqlite")
@@ -228,7 +274,9 @@ class TestOverwrite:
 
 def test_the_time_out_follows_the_reasoner():
     def default(**options: object) -> float:
-        return read_campaign(CampaignSpec.of("seams2023", managers=["none"], **options), None).spec.time_out_s
+        return read_campaign(
+            CampaignSpec.of("seams2023", managers=["none"], **options), None
+        ).spec.time_out_s
 
     assert default() == default(reasoner="pellet") == 120
     assert default(reasoner="owlready2") == 1800

@@ -1,4 +1,6 @@
-"""A campaign that is told to stop, by Ctrl-C or by kill, keeps what is done and leaves no empty folder."""
+"""A campaign that is told to stop, by Ctrl-C or by kill, keeps what is done and leaves no empty
+folder.
+"""
 
 import _thread
 import os
@@ -23,14 +25,26 @@ from tests.helpers.command import has_size, wait_until
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 RUNS = 100_000
-"""More than are done before a signal comes, also from a test that a busy machine held up for seconds."""
+"""More than are done before a signal comes, also from a test that a busy machine held up for
+seconds.
+"""
 FILES = [STORE_FILE, "manifest.json", "runs.csv", "summary.csv"]
 
 
 @pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(("number", "workers"), [*zip(STATUS, (1, 2), strict=True)])
 def test_what_is_done_is_kept(number, workers, scenario, tmp_path):
-    asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
+    asked = [
+        str(scenario),
+        "--managers",
+        "none",
+        "--runs",
+        str(RUNS),
+        "--workers",
+        str(workers),
+        "--out",
+        "out",
+    ]
     process = chaos.start(asked, tmp_path)
     wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
     children = chaos.workers_of(process)
@@ -49,10 +63,13 @@ def test_what_is_done_is_kept(number, workers, scenario, tmp_path):
 
 @pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(
-    ("number", "after_s"), [(signal.SIGINT, 0.0), (signal.SIGTERM, 0.0), (signal.SIGINT, 0.3), (signal.SIGTERM, 0.3)]
+    ("number", "after_s"),
+    [(signal.SIGINT, 0.0), (signal.SIGTERM, 0.0), (signal.SIGINT, 0.3), (signal.SIGTERM, 0.3)],
 )
 def test_no_empty_folder_is_left(number, after_s, scenario, tmp_path):
-    process = chaos.start([str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path)
+    process = chaos.start(
+        [str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path
+    )
     wait_until((tmp_path / "out" / STORE_FILE).exists)
     time.sleep(after_s)
     process.send_signal(number)
@@ -69,7 +86,8 @@ def test_no_empty_folder_is_left(number, after_s, scenario, tmp_path):
 def test_workers_leave_ctrl_c_to_the_campaign(scenario, tmp_path):
     """A terminal sends it to all processes of a command; each would say so in many lines."""
     process = chaos.start(
-        [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"], tmp_path
+        [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"],
+        tmp_path,
     )
     wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
     for child in chaos.workers_of(process):
@@ -80,7 +98,16 @@ def test_workers_leave_ctrl_c_to_the_campaign(scenario, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGTERM])
 def test_a_signal_to_all_its_processes_is_told_once(number, scenario, tmp_path):
     """As a terminal sends it that is closed, or a scheduler of jobs."""
-    command = [sys.executable, "-m", "suave_des", "campaign", str(scenario), "--managers", "none", "--quiet"]
+    command = [
+        sys.executable,
+        "-m",
+        "suave_des",
+        "campaign",
+        str(scenario),
+        "--managers",
+        "none",
+        "--quiet",
+    ]
     process = subprocess.Popen(
         [*command, "--runs", str(RUNS), "--workers", "2", "--out", "out"],
         cwd=tmp_path,
@@ -88,7 +115,9 @@ def test_a_signal_to_all_its_processes_is_told_once(number, scenario, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # under nohup it is ignored
+        preexec_fn=lambda: signal.signal(
+            signal.SIGHUP, signal.SIG_DFL
+        ),  # under nohup it is ignored
     )
     wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
     os.killpg(process.pid, number)
@@ -131,13 +160,17 @@ class TestInterruptedAtAnAwkwardMoment:
             "suave_des.campaign.campaign.in_process",
         ],
     )
-    def test_before_the_first_mission_nothing_is_left(self, moment, scenario, tmp_path, monkeypatch):
+    def test_before_the_first_mission_nothing_is_left(
+        self, moment, scenario, tmp_path, monkeypatch
+    ):
         monkeypatch.setattr(moment, ctrl_c)
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
-    def test_before_an_earlier_campaign_is_replaced_its_missions_stay(self, scenario, tmp_path, monkeypatch):
+    def test_before_an_earlier_campaign_is_replaced_its_missions_stay(
+        self, scenario, tmp_path, monkeypatch
+    ):
         out = tmp_path / "out"
         run_campaign(scenario, ["none"], 2, 1, out=out)
         before = {path.name: path.read_bytes() for path in out.iterdir()}
@@ -145,27 +178,35 @@ class TestInterruptedAtAnAwkwardMoment:
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 3, 1, out=out, overwrite=True)
         monkeypatch.undo()
-        resume_campaign(out)  # the results went first, so that none stand beside another campaign's missions
-        assert {path.name: path.read_bytes() for path in out.iterdir() if path.suffix == ".csv"} == {
-            name: content for name, content in before.items() if name.endswith(".csv")
-        }
+        resume_campaign(
+            out
+        )  # the results went first, so that none stand beside another campaign's missions
+        assert {
+            path.name: path.read_bytes() for path in out.iterdir() if path.suffix == ".csv"
+        } == {name: content for name, content in before.items() if name.endswith(".csv")}
 
     def test_between_two_transactions_what_comes_next_is_kept(self, tmp_path):
         path = tmp_path / STORE_FILE
         store = Store(path)
         store.begin({})
-        store._db.execute("COMMIT")  # as commit() does, and is interrupted before it begins the next
+        store._db.execute(
+            "COMMIT"
+        )  # as commit() does, and is interrupted before it begins the next
         store.note("remarks", ["mine"])
         store.close()
         store = Store(path)
         assert store.about("remarks") == ["mine"]
         store.close()
 
-    def test_while_files_are_written_it_says_how_to_have_them(self, scenario, tmp_path, monkeypatch):
+    def test_while_files_are_written_it_says_how_to_have_them(
+        self, scenario, tmp_path, monkeypatch
+    ):
         out = tmp_path / "out"
         with monkeypatch.context() as patch:
             patch.setattr("suave_des.records.store.write_campaign", ctrl_c)
-            with pytest.raises(KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"):
+            with pytest.raises(
+                KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"
+            ):
                 run_campaign(scenario, ["none"], 2, 1, out=out)
         assert resume_campaign(out).done == 2
         assert sorted(path.name for path in out.iterdir()) == FILES
@@ -180,7 +221,10 @@ def test_an_error_that_the_signal_led_to_is_no_damage(scenario, tmp_path, monkey
         raise RecursionError
 
     monkeypatch.setattr("suave_des.campaign.campaign.gather", broken_import)
-    with signals_raised(), pytest.raises(KeyboardInterrupt, match=r"nothing is lost: .* --resume .* writes the files"):
+    with (
+        signals_raised(),
+        pytest.raises(KeyboardInterrupt, match=r"nothing is lost: .* --resume .* writes the files"),
+    ):
         run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
 
 

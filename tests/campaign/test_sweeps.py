@@ -29,14 +29,22 @@ def write(folder: Path, text: str) -> Path:
 def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path):
     path = write(tmp_path, HEAD)
     result = run_campaign(path)
-    assert (result.campaign.spec.managers, result.campaign.spec.runs, result.campaign.spec.seed) == (
+    assert (
+        result.campaign.spec.managers,
+        result.campaign.spec.runs,
+        result.campaign.spec.seed,
+    ) == (
         ("none", "random"),
         4,
         7,
     )
     assert result.rows == run_campaign("seams2023", ["none", "random"], 4, 7).rows
     other = run_campaign(path, ["none"], 2, 8)
-    assert (other.campaign.spec.managers, other.campaign.spec.runs, other.campaign.spec.seed) == (("none",), 2, 8)
+    assert (other.campaign.spec.managers, other.campaign.spec.runs, other.campaign.spec.seed) == (
+        ("none",),
+        2,
+        8,
+    )
 
 
 def test_each_value_of_a_sweep_gives_the_missions_of_a_scenario_that_has_it(tmp_path):
@@ -47,13 +55,17 @@ def test_each_value_of_a_sweep_gives_the_missions_of_a_scenario_that_has_it(tmp_
     loaded = with_values(load_scenario("seams2023"), {"signals.water_visibility.period_s": 120.0})
     metrics = Simulator(loaded).run("random", 3, 7).metrics
     assert float(rows[14]["search_time_s"]) == metrics.search_time_s
-    assert float(rows[14]["distance_inspected_m"]) == pytest.approx(metrics.distance_inspected_m, abs=1e-6)
+    assert float(rows[14]["distance_inspected_m"]) == pytest.approx(
+        metrics.distance_inspected_m, abs=1e-6
+    )
 
 
 def test_a_grid_combines_each_with_each_and_the_last_named_changes_fastest():
     sweep = Sweep(grid={"a": [1, 2], "b": [3, 4, 5]}, zip={"c": [6, 7], "d": [8, 9]})
     points = [tuple(sweep.values(point).values()) for point in range(sweep.points)]
-    assert points == [(a, b, *cd) for a, b, cd in itertools.product([1, 2], [3, 4, 5], [(6, 8), (7, 9)])]
+    assert points == [
+        (a, b, *cd) for a, b, cd in itertools.product([1, 2], [3, 4, 5], [(6, 8), (7, 9)])
+    ]
 
 
 @settings(max_examples=50, deadline=None)
@@ -86,20 +98,30 @@ def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path):
     single = run_campaign(write(tmp_path, text), ["none"], 7).frame()
     firsts = [1, 1, 1, 4, 4, 4, 7]
     assert list(shared["start.x_m"]) == [single["start.x_m"][first - 1] for first in firsts]
-    assert list(shared["initial_y_m"]) == list(single["initial_y_m"])  # drawn by the scenario, each run its own
+    assert list(shared["initial_y_m"]) == list(
+        single["initial_y_m"]
+    )  # drawn by the scenario, each run its own
 
 
 @settings(max_examples=5, deadline=None)
-@given(st.integers(0, 2**31), st.lists(st.sampled_from([40.0, 60.0, 100.0]), min_size=1, max_size=3, unique=True))
+@given(
+    st.integers(0, 2**31),
+    st.lists(st.sampled_from([40.0, 60.0, 100.0]), min_size=1, max_size=3, unique=True),
+)
 def test_more_points_managers_or_noise_change_no_other_row(seed, periods):
-    def rows(managers: list[str], runs: int, periods: list[float], **more: Any) -> set[tuple[object, ...]]:
+    def rows(
+        managers: list[str], runs: int, periods: list[float], **more: Any
+    ) -> set[tuple[object, ...]]:
         sweep = {"visibility.period_s": periods}
         return set(run_campaign("seams2023", managers, runs, seed, sweep=sweep, **more).rows)
 
     assert rows(["none"], 1, periods) <= rows(["random", "none"], 2, [*periods, 77.0])
     drawn = {"thruster_events.0.time_s": {"distribution": "uniform", "minimum": 30, "maximum": 40}}
     alone = {row[:-1] for row in rows(["none"], 1, periods, perturbations=drawn)}
-    noisier = {**drawn, "current.z_m_per_s": {"distribution": "uniform", "minimum": 0, "maximum": 0}}
+    noisier = {
+        **drawn,
+        "current.z_m_per_s": {"distribution": "uniform", "minimum": 0, "maximum": 0},
+    }
     assert alone == {row[:-2] for row in rows(["none"], 1, periods, perturbations=noisier)}
 
 
@@ -112,8 +134,14 @@ def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(
     run_campaign(path, runs=2, out=tmp_path / "resumed")
     resume_campaign(tmp_path / "resumed", runs=4)
     whole = (tmp_path / "one" / "runs.csv").read_bytes()
-    assert whole == (tmp_path / "two" / "runs.csv").read_bytes() == (tmp_path / "resumed" / "runs.csv").read_bytes()
-    summaries = [(tmp_path / name / "summary.csv").read_bytes() for name in ("one", "two", "resumed")]
+    assert (
+        whole
+        == (tmp_path / "two" / "runs.csv").read_bytes()
+        == (tmp_path / "resumed" / "runs.csv").read_bytes()
+    )
+    summaries = [
+        (tmp_path / name / "summary.csv").read_bytes() for name in ("one", "two", "resumed")
+    ]
     assert len(set(summaries)) == 1 and summaries[0].count(b"\n") == 1 + 4 * 2
 
 
@@ -124,17 +152,41 @@ def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(
         ("campaign: 1\n", "scenario: is missing"),
         (HEAD + "sweeps: {}\n", "line 6, sweeps: unknown key 'sweeps' (did you mean 'sweep'?"),
         (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
-        (HEAD + "sweep:\n  visibility.period_s: 40\n", "line 7, sweep.visibility.period_s: 40 should be a list"),
-        (HEAD + "sweep:\n  visibility.period_s: [40, -3]\n", "line 7, sweep.visibility.period_s: at"),
-        (HEAD + "sweep:\n  visibility.period_s: [40, 3, 40.0]\n", "line 7, sweep.visibility.period_s: has a poi"),
+        (
+            HEAD + "sweep:\n  visibility.period_s: 40\n",
+            "line 7, sweep.visibility.period_s: 40 should be a list",
+        ),
+        (
+            HEAD + "sweep:\n  visibility.period_s: [40, -3]\n",
+            "line 7, sweep.visibility.period_s: at",
+        ),
+        (
+            HEAD + "sweep:\n  visibility.period_s: [40, 3, 40.0]\n",
+            "line 7, sweep.visibility.period_s: has a poi",
+        ),
         (HEAD + "sweep:\n  zip: {start.x_m: [1, 1], start.y_m: [2, 2.0]}\n", "has a point twice"),
         (HEAD + "sweep:\n  modes_file: [a.yaml]\n", "files were read with the scenario"),
         (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: unknown key"),
-        (HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n", "start.x_m has 1, start.y_m has 2"),
-        (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: expected a distribution, got 3"),
-        (HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n", "is drawn at each use, not once"),
-        (HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n", "line 7, perturbations.mission.ti"),
-        (HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (1, 2)}\nsweep:\n  start.x_m: [1]\n", "varies start.x_m, as"),
+        (
+            HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n",
+            "start.x_m has 1, start.y_m has 2",
+        ),
+        (
+            HEAD + "perturbations:\n  start.x_m: 3\n",
+            "line 7, perturbations.start.x_m: expected a distribution, got 3",
+        ),
+        (
+            HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n",
+            "is drawn at each use, not once",
+        ),
+        (
+            HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n",
+            "line 7, perturbations.mission.ti",
+        ),
+        (
+            HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (1, 2)}\nsweep:\n  start.x_m: [1]\n",
+            "varies start.x_m, as",
+        ),
     ],
 )
 def test_bad_campaign_files(tmp_path, text, message):
@@ -146,9 +198,13 @@ def test_bad_campaign_files(tmp_path, text, message):
 
 def test_a_failure_in_a_sweep_names_its_point(tmp_path):
     sweep = {"visibility.period_s": [40.0, 80.0]}
-    result = run_campaign("seams2023", [f"{AWKWARD}:RaisesAlways"], 1, 1, sweep=sweep, out=tmp_path / "out")
+    result = run_campaign(
+        "seams2023", [f"{AWKWARD}:RaisesAlways"], 1, 1, sweep=sweep, out=tmp_path / "out"
+    )
     assert [failure.point for failure in result.failures] == [0, 1]
-    assert '"visibility.period_s": 80.0' in (tmp_path / "out" / "manifest.json").read_text(encoding="utf-8")
+    assert '"visibility.period_s": 80.0' in (tmp_path / "out" / "manifest.json").read_text(
+        encoding="utf-8"
+    )
 
 
 @pytest.mark.usefixtures("quick_workers")
@@ -157,7 +213,9 @@ def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_byt
     managers = ["none", "metacontrol"]
 
     def run(runs: int, workers: int, out: Path) -> bytes:
-        run_campaign("seams2023", managers, runs, 3, workers, out, sweep=sweep, record_knowledge=True)
+        run_campaign(
+            "seams2023", managers, runs, 3, workers, out, sweep=sweep, record_knowledge=True
+        )
         return (out / CAMPAIGN_KNOWLEDGE_FILE).read_bytes()
 
     whole = run(3, 1, tmp_path / "whole")
@@ -174,4 +232,7 @@ def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_byt
     alone = Simulator(loaded).run("metacontrol", 2, 3, record=True).knowledge
     assert [each.state for each in missions[4].records] == [each.state for each in alone]
     plain = run_campaign("seams2023", managers, 3, 3, sweep=sweep)
-    assert run_campaign("seams2023", managers, 3, 3, sweep=sweep, record_knowledge=True).rows == plain.rows
+    assert (
+        run_campaign("seams2023", managers, 3, 3, sweep=sweep, record_knowledge=True).rows
+        == plain.rows
+    )

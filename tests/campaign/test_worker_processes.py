@@ -23,7 +23,9 @@ print("numba" in sys.modules)
 
 def without_workers(scenario: Path, managers: list[str]) -> str:
     """What the script prints of managers that do as these do."""
-    return run_campaign(str(scenario), managers, runs=12, seed=1, progress=False).to_csv(index=False)
+    return run_campaign(str(scenario), managers, runs=12, seed=1, progress=False).to_csv(
+        index=False
+    )
 
 
 def test_a_script_that_defines_a_manager_needs_no_guard_nor_loads_the_compiler(scenario, tmp_path):
@@ -59,11 +61,16 @@ class Writer(NoManager):
 """
 
 
-def test_what_a_manager_has_written_is_there_when_workers_have_ended(scenario, tmp_path, monkeypatch):
+def test_what_a_manager_has_written_is_there_when_workers_have_ended(
+    scenario, tmp_path, monkeypatch
+):
     (tmp_path / "writer.py").write_text(WRITER)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
-    assert len(run_campaign(str(scenario), ["writer:Writer"], runs=12, workers=2, progress=False)) == 12
+    assert (
+        len(run_campaign(str(scenario), ["writer:Writer"], runs=12, workers=2, progress=False))
+        == 12
+    )
     written = [path.read_text().count("a mission") for path in tmp_path.glob("written_*.txt")]
     assert sum(written) >= 12  # some are repeated
 
@@ -92,13 +99,17 @@ class Cut(NoManager):
 
 
 @pytest.mark.usefixtures("quick_workers")
-def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(scenario, tmp_path, monkeypatch, capfd):
+def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(
+    scenario, tmp_path, monkeypatch, capfd
+):
     (tmp_path / "cut.py").write_text(CUT)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
     shared = run_campaign(str(scenario), ["cut:Cut"], runs=12, seed=1, workers=2, progress=False)
     assert (tmp_path / "cut.txt").exists()
-    assert shared.to_csv(index=False) == without_workers(scenario, ["none"]).replace(",none,", ",cut:Cut,")
+    assert shared.to_csv(index=False) == without_workers(scenario, ["none"]).replace(
+        ",none,", ",cut:Cut,"
+    )
     assert capfd.readouterr().err == ""
 
 
@@ -114,4 +125,7 @@ def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(scenario, tm
     ],
 )
 def test_few_missions_of_built_in_managers_start_no_workers_unless_asked_for(processes, options):
-    assert CampaignSpec.of("seams2023", **{"managers": ["none", "random", "bt"], **options}).processes == processes
+    assert (
+        CampaignSpec.of("seams2023", **{"managers": ["none", "random", "bt"], **options}).processes
+        == processes
+    )

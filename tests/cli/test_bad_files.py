@@ -1,4 +1,6 @@
-"""Whatever stands in place of a file or number: one line that says where and what, status 2, nothing half-written."""
+"""Whatever stands in place of a file or number: one line that says where and what, status 2,
+nothing half-written.
+"""
 
 import os
 from collections.abc import Callable
@@ -35,7 +37,9 @@ def _awkward_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
 
 
-def assert_refused(command: Command, tmp_path: Path, arguments: tuple[str, ...], *words: str) -> None:
+def assert_refused(
+    command: Command, tmp_path: Path, arguments: tuple[str, ...], *words: str
+) -> None:
     before = sorted(path.name for path in tmp_path.rglob("*"))
     status, out, error = command(*arguments)
     assert (status, out) == (2, "")
@@ -69,7 +73,9 @@ def test_in_place_of_a_scenario(command, tmp_path, name, words):
     assert_refused(command, tmp_path, ("campaign", name, *CAMPAIGN[2:], "--out", "out"), *words)
 
 
-@pytest.mark.parametrize("name", ["latin.txt", "empty.txt", "nul.txt", "folder", "pipe", "loop", LONG])
+@pytest.mark.parametrize(
+    "name", ["latin.txt", "empty.txt", "nul.txt", "folder", "pipe", "loop", LONG]
+)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -93,8 +99,14 @@ def test_in_place_of_another_file(command, tmp_path, arguments, name):
 
 @pytest.mark.parametrize(
     "arguments",
-    # Where a command would show progress after some seconds, --quiet leaves the error alone in any time.
-    [RUN, (*CAMPAIGN, "--quiet"), ("reproduce", "--runs=1", "--quiet"), ("validate", "--runs=1", "--quiet")],
+    # Where a command would show progress after some seconds, --quiet leaves the error alone in any
+    # time.
+    [
+        RUN,
+        (*CAMPAIGN, "--quiet"),
+        ("reproduce", "--runs=1", "--quiet"),
+        ("validate", "--runs=1", "--quiet"),
+    ],
     ids=" ".join,
 )
 @pytest.mark.parametrize(
@@ -165,7 +177,9 @@ def test_in_place_of_a_number_or_a_name(command, tmp_path, arguments, words):
         b"\xef\xbb\xbfbase: seams2023.yaml\nmission: {time_limit_s: 1E1}\n",
     ],
 )
-def test_windows_line_ends_a_byte_order_mark_and_scientific_notation_are_fine(command, tmp_path, text):
+def test_windows_line_ends_a_byte_order_mark_and_scientific_notation_are_fine(
+    command, tmp_path, text
+):
     (tmp_path / "fine.yaml").write_bytes(text)
     status, out, error = command("run", "fine.yaml", "--manager", "none")
     assert (status, error) == (0, "")
@@ -183,15 +197,39 @@ class TestFigure:
         mission, runs = results / "mission", results / "campaign" / "runs.csv"
         damages: list[tuple[Path, Callable[[str], str], str]] = [
             (mission / "trajectory.csv", lambda text: "", "trajectory.csv: cannot be read"),
-            (mission / "trajectory.csv", lambda text: text.replace("\n0.2,", "\ninf,"), "line 3: t_s: expected a"),
-            (mission / "events.csv", lambda text: text.replace("\n0.0,", "\nsoon,", 1), "line 2: t_s: expected a"),
+            (
+                mission / "trajectory.csv",
+                lambda text: text.replace("\n0.2,", "\ninf,"),
+                "line 3: t_s: expected a",
+            ),
+            (
+                mission / "events.csv",
+                lambda text: text.replace("\n0.0,", "\nsoon,", 1),
+                "line 2: t_s: expected a",
+            ),
             (mission / "mission.json", lambda text: "{", "mission.json: is not JSON"),
-            (mission / "mission.json", lambda text: '{"metrics": {}, "scenario": {}}', "is not the record"),
-            (mission / "mission.json", lambda text: text.replace('"seed"', '"sed"', 1), "seed is missing"),
+            (
+                mission / "mission.json",
+                lambda text: '{"metrics": {}, "scenario": {}}',
+                "is not the record",
+            ),
+            (
+                mission / "mission.json",
+                lambda text: text.replace('"seed"', '"sed"', 1),
+                "seed is missing",
+            ),
             (runs, lambda text: "", "runs.csv: line 1: has no column"),
             (runs, lambda text: text.splitlines()[0] + "\n", "has no missions"),
-            (runs, lambda text: text.replace("True", "maybe"), "line 2: pipeline_found: expected True or"),
-            (runs, lambda text: text.replace(",none,", ",,"), "line 2: manager: expected a manager's name, got ''"),
+            (
+                runs,
+                lambda text: text.replace("True", "maybe"),
+                "line 2: pipeline_found: expected True or",
+            ),
+            (
+                runs,
+                lambda text: text.replace(",none,", ",,"),
+                "line 2: manager: expected a manager's name, got ''",
+            ),
         ]
         for path, damage, words in damages:
             whole = path.read_text()
@@ -199,7 +237,11 @@ class TestFigure:
             assert_refused(command, results, ("figure", path.parent.name, "--out", "m.png"), words)
             path.write_text(whole)
 
-    @pytest.mark.parametrize("out", ["no/where.png", "file/m.png", "/proc/m.png", f"{LONG[:300]}.png", "folder.png"])
+    @pytest.mark.parametrize(
+        "out", ["no/where.png", "file/m.png", "/proc/m.png", f"{LONG[:300]}.png", "folder.png"]
+    )
     def test_a_picture_that_cannot_be_written(self, command, results, out):
         (results / "folder.png").mkdir()
-        assert_refused(command, results, ("figure", "campaign", "--out", out), "cannot be written: ")
+        assert_refused(
+            command, results, ("figure", "campaign", "--out", out), "cannot be written: "
+        )

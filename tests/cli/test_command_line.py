@@ -1,4 +1,6 @@
-"""The command line: exit statuses, one line for an error, and what each command prints and writes."""
+"""The command line: exit statuses, one line for an error, and what each command prints and
+writes.
+"""
 
 import io
 import json
@@ -54,7 +56,18 @@ def test_names_with_a_blank_between_them_are_told_of_the_comma(command):
 
 def test_a_folder_with_brackets_is_named_as_it_is(command):
     folder = "new[b] :car:"
-    ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", folder)
+    ended = command(
+        "campaign",
+        "seams2023",
+        "--managers",
+        "none",
+        "--runs",
+        "1",
+        "--workers",
+        "1",
+        "--out",
+        folder,
+    )
     assert ended.out.endswith(f"\n1 mission is in {folder}/runs.csv\n")
 
 
@@ -96,15 +109,25 @@ class TestRun:
         assert all(line == line.rstrip() for line in ended.out.splitlines())
 
     def test_writes_mission_events_and_trajectory(self, command, tmp_path):
-        assert command("run", "seams2023", "--manager", "random", "--seed", "7", "--out", "out").status == 0
+        assert (
+            command("run", "seams2023", "--manager", "random", "--seed", "7", "--out", "out").status
+            == 0
+        )
         out = tmp_path / "out"
-        assert sorted(path.name for path in out.iterdir()) == ["events.csv", "mission.json", "trajectory.csv"]
+        assert sorted(path.name for path in out.iterdir()) == [
+            "events.csv",
+            "mission.json",
+            "trajectory.csv",
+        ]
         events = rows_of(out / "events.csv")
         assert list(events[0]) == ["t_s", "source", "event", "detail"]
         times = [float(event["t_s"]) for event in events]
         assert times == sorted(times)
         trajectory = rows_of(out / "trajectory.csv")
-        assert ",".join(trajectory[0]) == "t_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad,mode,visibility_m"
+        assert (
+            ",".join(trajectory[0])
+            == "t_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad,mode,visibility_m"
+        )
         assert float(trajectory[-1]["t_s"]) >= 300.0
         mission = json.loads((out / "mission.json").read_text())
         assert mission["metrics"]["manager"] == "random"
@@ -115,8 +138,31 @@ class TestRun:
         assert mission["command"][:3] == ["suave-des", "run", "seams2023"]
 
     def test_is_the_campaigns_mission_of_that_run_and_seed(self, command, tmp_path):
-        command("campaign", "seams2023", "--managers", "random", "--runs", "3", "--seed", "5", "--workers", "1", *OUT)
-        command("run", "seams2023", "--manager", "random", "--seed", "5", "--run", "3", "--out", "mission")
+        command(
+            "campaign",
+            "seams2023",
+            "--managers",
+            "random",
+            "--runs",
+            "3",
+            "--seed",
+            "5",
+            "--workers",
+            "1",
+            *OUT,
+        )
+        command(
+            "run",
+            "seams2023",
+            "--manager",
+            "random",
+            "--seed",
+            "5",
+            "--run",
+            "3",
+            "--out",
+            "mission",
+        )
         row = rows_of(tmp_path / "out" / "runs.csv")[2]
         metrics = json.loads((tmp_path / "mission" / "mission.json").read_text())["metrics"]
         assert {name: "" if value is None else str(value) for name, value in metrics.items()} == row
@@ -162,7 +208,10 @@ def test_each_event_is_one_line_whatever_its_detail_has(terminal):
     print_timeline(console, replace(result, events=(first, *result.events[1:])))
     lines = file.getvalue().splitlines()
     details = ["first second third", *(event.detail for event in result.events[1:])]
-    assert all(line.endswith(detail) for line, detail in zip(lines[3 : 3 + len(details)], details, strict=True))
+    assert all(
+        line.endswith(detail)
+        for line, detail in zip(lines[3 : 3 + len(details)], details, strict=True)
+    )
     assert lines[-1].split()[-2:] == ["300.1", "s"]
 
 
@@ -174,8 +223,12 @@ PERIODS = "sweep:\n  visibility.period_s: [{}]\n"
 @pytest.mark.parametrize(("points", "shown"), [(40, 40), (41, 39), (57, 39)])
 def test_a_long_sweep_has_its_first_rows_and_where_the_others_are(points, shown, command):
     Path("short.yaml").write_text(SHORT)
-    Path("sweep.yaml").write_text(HEAD + PERIODS.format(", ".join(str(40 + number) for number in range(points))))
-    lines = command("campaign", "sweep.yaml", "--out", "out", "--workers", "1", "--quiet").out.splitlines()
+    Path("sweep.yaml").write_text(
+        HEAD + PERIODS.format(", ".join(str(40 + number) for number in range(points)))
+    )
+    lines = command(
+        "campaign", "sweep.yaml", "--out", "out", "--workers", "1", "--quiet"
+    ).out.splitlines()
     rows = [line.split()[0] for line in lines if line.split()[1:2] == ["none"]]
     assert rows == [str(40 + number) for number in range(shown)]
     more = [line for line in lines if "rows more" in line]
@@ -190,7 +243,9 @@ IMPROVES = "revision.metacontrol.improve_when_exceeded"
 STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibility=4")
 
 
-@pytest.mark.parametrize(("improves", "functions"), [("true", ["f_generate_search_path"]), ("false", [])])
+@pytest.mark.parametrize(
+    ("improves", "functions"), [("true", ["f_generate_search_path"]), ("false", [])]
+)
 def test_infer_decides_with_the_values_that_are_set(command, improves, functions):
     _, out, _ = command("kb", "infer", *STATE, "--set", f"{IMPROVES}={improves}")
     planned = out.partition("plan\n")[2]
@@ -203,7 +258,13 @@ def test_missions_that_diff_runs_have_the_values_that_are_set(command):
     means = []
     for limit_s in (20, 60):
         _, out, _ = command(
-            "kb", "diff", "suave.owl", "suave.owl", *options, "--set", f"mission.time_limit_s={limit_s}"
+            "kb",
+            "diff",
+            "suave.owl",
+            "suave.owl",
+            *options,
+            "--set",
+            f"mission.time_limit_s={limit_s}",
         )
         (row,) = (line for line in out.splitlines() if line.startswith("search time, s"))
         means.append(float(row.split()[3]))
@@ -211,7 +272,9 @@ def test_missions_that_diff_runs_have_the_values_that_are_set(command):
 
 
 def test_tests_that_are_written_cannot_have_values_that_are_set(command):
-    status, _, err = command("kb", "test", "--coverage", "--write", "new.yaml", "--set", "knowledge.reasoner=pellet")
+    status, _, err = command(
+        "kb", "test", "--coverage", "--write", "new.yaml", "--set", "knowledge.reasoner=pellet"
+    )
     assert status == 2 and "name it with --scenario" in err
     assert not Path("new.yaml").exists()
 

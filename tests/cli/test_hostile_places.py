@@ -1,4 +1,6 @@
-"""Commands where something of the system is missing, damaged, closed, made by somebody else, or asks to stop."""
+"""Commands where something of the system is missing, damaged, closed, made by somebody else, or
+asks to stop.
+"""
 
 import os
 import signal
@@ -19,14 +21,35 @@ from tests.helpers.command import command_here, python
 COMMAND = [sys.executable, "-P", "-m", "suave_des"]
 CHECKOUT = Path(caches.__file__).parent.parent
 ONE_MISSION = ["run", "seams2023", "--manager", "none"]
-CAMPAIGN = ["campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", "--out", "out"]
+CAMPAIGN = [
+    "campaign",
+    "seams2023",
+    "--managers",
+    "none",
+    "--runs",
+    "2",
+    "--workers",
+    "1",
+    "--out",
+    "out",
+]
 
 
-def run(*arguments: str, command: list[str] = COMMAND, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(
+    *arguments: str, command: list[str] = COMMAND, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Run a command in the current folder, with the user's caches."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("SUAVE_DES_CACHE_DIR", "NUMBA_CACHE_DIR")}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("SUAVE_DES_CACHE_DIR", "NUMBA_CACHE_DIR")
+    }
     return subprocess.run(
-        [*command, *arguments], env={**kept, **environment}, capture_output=True, text=True, timeout=300
+        [*command, *arguments],
+        env={**kept, **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
 
 
@@ -34,7 +57,9 @@ def run(*arguments: str, command: list[str] = COMMAND, **environment: str) -> su
 def small_loop(tmp_path: Path) -> list[str]:
     """A command that compiles one small function with the package, and prints 55.0."""
     program = tmp_path / "small.py"
-    program.write_text("import sys; sys.path[:0] = sys.argv[1:]\nfrom small_loop import total\nprint(total(10.0))\n")
+    program.write_text(
+        "import sys; sys.path[:0] = sys.argv[1:]\nfrom small_loop import total\nprint(total(10.0))\n"
+    )
     (tmp_path / "small_loop.py").write_text(
         "from suave_des.compiling import compiled\n\n\n"
         "@compiled\ndef total(n):\n    s = 0.0\n    while n > 0.0:\n"
@@ -44,8 +69,12 @@ def small_loop(tmp_path: Path) -> list[str]:
 
 
 class TestCacheFolder:
-    def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(self, tmp_path, small_loop):
-        done = run(command=small_loop, HOME="/dev/null/home", XDG_CACHE_HOME="", TMPDIR=str(tmp_path))
+    def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(
+        self, tmp_path, small_loop
+    ):
+        done = run(
+            command=small_loop, HOME="/dev/null/home", XDG_CACHE_HOME="", TMPDIR=str(tmp_path)
+        )
         assert (done.returncode, done.stdout) == (0, "55.0\n")
         assert done.stderr.count("the cache folder cannot be used") == 1
         (folder,) = tmp_path.glob("suave-des-*")
@@ -53,7 +82,8 @@ class TestCacheFolder:
         assert list(folder.rglob("*.nbc"))
 
     @pytest.mark.parametrize(
-        "damage", ["flip", *(pytest.param(each, marks=pytest.mark.slow) for each in ("cut", "text"))]
+        "damage",
+        ["flip", *(pytest.param(each, marks=pytest.mark.slow) for each in ("cut", "text"))],
     )
     def test_with_damaged_machine_code_is_mended(self, tmp_path, damage, small_loop):
         cache = tmp_path / "cache"
@@ -61,7 +91,9 @@ class TestCacheFolder:
         environment.pop("NUMBA_CACHE_DIR", None)
 
         def result() -> str:
-            done = subprocess.run(small_loop, env=environment, capture_output=True, text=True, timeout=120)
+            done = subprocess.run(
+                small_loop, env=environment, capture_output=True, text=True, timeout=120
+            )
             assert done.stderr == ""
             return done.stdout
 
@@ -105,14 +137,25 @@ def test_files_named_like_python_s_own_modules_are_not_run_by_workers(tmp_path):
     (tmp_path / "mine.py").write_text(
         "from suave_des.managing.simple import NoManager\n\n\nclass Mine(NoManager):\n    pass\n"
     )
-    managers = ["campaign", "seams2023", "--managers", "none,mine:Mine", "--runs", "2", "--workers", "2"]
+    managers = [
+        "campaign",
+        "seams2023",
+        "--managers",
+        "none,mine:Mine",
+        "--runs",
+        "2",
+        "--workers",
+        "2",
+    ]
     done = run(*managers, "--out", "out", "--quiet")
     assert done.returncode == 0, done.stderr
     assert not list(tmp_path.glob("ran-*"))
 
 
 class TestStopped:
-    @pytest.mark.parametrize(("number", "status"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+    @pytest.mark.parametrize(
+        ("number", "status"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)]
+    )
     @pytest.mark.parametrize("after_s", [0.1, pytest.param(0.5, marks=pytest.mark.slow)])
     def test_as_it_starts_it_ends_in_one_line(self, tmp_path, number, status, after_s):
         program = (
@@ -124,7 +167,18 @@ class TestStopped:
             "main()\n"
             "time.sleep(5)\n"
         )
-        done = python("-c", program, "x", "campaign", "seams2023", "--runs", "300", "--out", "out", cwd=tmp_path)
+        done = python(
+            "-c",
+            program,
+            "x",
+            "campaign",
+            "seams2023",
+            "--runs",
+            "300",
+            "--out",
+            "out",
+            cwd=tmp_path,
+        )
         assert done.returncode == status
         assert "Traceback" not in done.stderr
         assert len(done.stderr.splitlines()) == 1
@@ -164,14 +218,21 @@ class TestStopped:
     def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path):
         for place in range(60):
             process = subprocess.Popen(
-                [*COMMAND, *ONE_MISSION], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+                [*COMMAND, *ONE_MISSION],
+                cwd=tmp_path,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
             )
             number = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[place % 3]
             time.sleep(0.05 + 0.025 * place)
             process.send_signal(number)
             _, told = process.communicate(timeout=60)
-            # Before Python runs a line of the command, the system ends it, or Python by its own KeyboardInterrupt.
-            assert process.returncode in (0, 128 + number, -number) or (place < 8 and number == signal.SIGINT)
+            # Before Python runs a line of the command, the system ends it, or Python by its own
+            # KeyboardInterrupt.
+            assert process.returncode in (0, 128 + number, -number) or (
+                place < 8 and number == signal.SIGINT
+            )
             assert "Traceback" not in told or place < 8
 
 
@@ -183,7 +244,9 @@ class TestOutput:
 
     def test_that_nobody_reads_is_no_error_and_results_are_kept(self, tmp_path):
         arguments = [*COMMAND, *CAMPAIGN, "--quiet"]
-        process = subprocess.Popen(arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        process = subprocess.Popen(
+            arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
         process.stdout.close()
         told = process.stderr.read()
         assert process.wait(300) == 128 + signal.SIGPIPE
@@ -195,8 +258,13 @@ class TestOutput:
         assert plain("a\x1b[31m\u202eb ± é\n") == "a\\x1b[31m\\u202eb ± é\n"
 
 
-def test_java_takes_no_options_from_the_environment_and_leaves_nothing_in_the_temporary_folder(tmp_path):
-    options = {"JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption", "_JAVA_OPTIONS": "-XX:+NoSuchOption"}
+def test_java_takes_no_options_from_the_environment_and_leaves_nothing_in_the_temporary_folder(
+    tmp_path,
+):
+    options = {
+        "JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption",
+        "_JAVA_OPTIONS": "-XX:+NoSuchOption",
+    }
     arguments = ["kb", "infer", "--reasoner", "pellet", "--at", "water_visibility=1"]
     done = run(*arguments, TMPDIR=str(tmp_path), **options)
     assert (done.returncode, done.stderr) == (0, "")
@@ -214,11 +282,17 @@ class TestLimits:
     def test_of_a_query_holds_within_a_regular_expression(self, tmp_path):
         done = run("kb", "query", "--time-limit", "1", self.CATASTROPHIC)
         assert done.returncode == 2
-        assert done.stderr == "suave-des: answering the query: not done after 1 s (allow more with --time-limit)\n"
+        assert (
+            done.stderr
+            == "suave-des: answering the query: not done after 1 s (allow more with --time-limit)\n"
+        )
 
     def test_sigterm_ends_such_a_query(self, tmp_path):
         process = subprocess.Popen(
-            [*COMMAND, "kb", "query", self.CATASTROPHIC], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+            [*COMMAND, "kb", "query", self.CATASTROPHIC],
+            cwd=tmp_path,
+            stderr=subprocess.PIPE,
+            text=True,
         )
         time.sleep(3)
         process.terminate()
@@ -228,7 +302,18 @@ class TestLimits:
     def test_of_open_files_is_reported(self, tmp_path):
         import resource
 
-        arguments = ["campaign", "seams2023", "--managers", "none", "--runs", "9", "--workers", "2", "--out", "out"]
+        arguments = [
+            "campaign",
+            "seams2023",
+            "--managers",
+            "none",
+            "--runs",
+            "9",
+            "--workers",
+            "2",
+            "--out",
+            "out",
+        ]
         done = subprocess.run(
             [*COMMAND, *arguments],
             cwd=tmp_path,
@@ -251,7 +336,9 @@ class TestLimits:
 @pytest.mark.parametrize("command", [["--help"], ["kb", "rules"], ONE_MISSION])
 def test_output_to_a_full_disk_is_told_in_one_line(command, tmp_path):
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([*COMMAND, *command], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True)
+        done = subprocess.run(
+            [*COMMAND, *command], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True
+        )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "the output cannot be written: No space left on device" in done.stderr
 
@@ -263,15 +350,22 @@ def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path):
     except OSError:
         pytest.skip("this file system has names in UTF-8 only")
     out.rmdir()
-    done = subprocess.run([*COMMAND, *CAMPAIGN[:-1], out], cwd=tmp_path, capture_output=True)  # says the name: bytes
+    done = subprocess.run(
+        [*COMMAND, *CAMPAIGN[:-1], out], cwd=tmp_path, capture_output=True
+    )  # says the name: bytes
     assert done.returncode == 0, done.stderr
-    for command in (["campaign", "--resume", str(out), "--runs", "3", "--quiet"], ["report", str(out)]):
+    for command in (
+        ["campaign", "--resume", str(out), "--runs", "3", "--quiet"],
+        ["report", str(out)],
+    ):
         assert command_here(*command, cwd=tmp_path).returncode == 0
     assert (out / "report.html").is_file()
 
 
 class Deaf:
-    """What is raised as it is forgotten, nobody hears; nor in Python code that compiled code calls."""
+    """What is raised as it is forgotten, nobody hears; nor in Python code that compiled code
+    calls.
+    """
 
     def __init__(self, number: int) -> None:
         self.number = number

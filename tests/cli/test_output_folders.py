@@ -1,4 +1,6 @@
-"""--overwrite replaces results of the same kind only: a folder never holds a mission beside a campaign."""
+"""--overwrite replaces results of the same kind only: a folder never holds a mission beside a
+campaign.
+"""
 
 from pathlib import Path
 
@@ -7,7 +9,18 @@ import pytest
 from suave_des.files import FAMILIES
 
 RUN = ("run", "seams2023", "--manager", "none", "--out", "out")
-CAMPAIGN = ("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", "out")
+CAMPAIGN = (
+    "campaign",
+    "seams2023",
+    "--managers",
+    "none",
+    "--runs",
+    "1",
+    "--workers",
+    "1",
+    "--out",
+    "out",
+)
 REPRODUCE = ("reproduce", "--runs", "2", "--workers", "1", "--out", "out")
 VALIDATE = ("validate", "--managers", "none", "--runs", "2", "--workers", "1", "--out", "out")
 
@@ -41,7 +54,13 @@ def test_a_new_campaign_takes_away_the_tables_of_the_one_that_it_replaces(comman
     assert command(*first)[0] == 0
     Path("out/notes.txt").write_text("mine")
     assert command(*CAMPAIGN, "--overwrite")[0] == 0
-    assert set(files()) == {"campaign.sqlite", "runs.csv", "summary.csv", "manifest.json", "notes.txt"}
+    assert set(files()) == {
+        "campaign.sqlite",
+        "runs.csv",
+        "summary.csv",
+        "manifest.json",
+        "notes.txt",
+    }
 
 
 def test_every_file_that_a_command_writes_is_known(command):

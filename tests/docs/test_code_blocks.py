@@ -29,7 +29,8 @@ def name(page):
 
 def outdated(page, folder, *, quick):
     return [
-        f"{block.place}\n" + "".join(unified_diff(block.text.splitlines(True), real.splitlines(True), "page", "real"))
+        f"{block.place}\n"
+        + "".join(unified_diff(block.text.splitlines(True), real.splitlines(True), "page", "real"))
         for block, real in run_page(page, folder, quick=quick)
         if differs(block, real, quick=quick)
     ]
@@ -43,7 +44,13 @@ def test_blocks_show_what_they_print(page, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if any({"test", "long"} & set(block.marks) for block in blocks_of(page))], ids=name
+    "page",
+    [
+        page
+        for page in PAGES
+        if any({"test", "long"} & set(block.marks) for block in blocks_of(page))
+    ],
+    ids=name,
 )
 def test_blocks_that_are_shortened_elsewhere_show_what_they_print(page, tmp_path):
     wrong = outdated(page, tmp_path, quick=False)
@@ -52,7 +59,12 @@ def test_blocks_that_are_shortened_elsewhere_show_what_they_print(page, tmp_path
 
 def test_blocks_of_other_pages_are_of_kinds_that_need_no_run():
     others = {path for path in (ROOT / "docs").rglob("*.md") if path not in PAGES}
-    assert {block.language for page in others for block in blocks_of(page)} <= {"yaml", "csv", "console", "python"}
+    assert {block.language for page in others for block in blocks_of(page)} <= {
+        "yaml",
+        "csv",
+        "console",
+        "python",
+    }
 
 
 class TestDiffering:
@@ -69,7 +81,9 @@ class TestDiffering:
             ("one\ntwo\n", "one\n", True),
         ],
     )
-    def test_a_word_a_whole_number_and_a_line_count_and_a_decimal_by_more_than_a_hundredth(self, shown, real, counts):
+    def test_a_word_a_whole_number_and_a_line_count_and_a_decimal_by_more_than_a_hundredth(
+        self, shown, real, counts
+    ):
         assert differs(self.block(shown), real, quick=False) is counts
 
     def test_shorter_runs_keep_their_rows(self):
@@ -94,13 +108,23 @@ def test_the_set_up_commands_name_what_the_package_declares():
 
 
 def test_ci_runs_the_readme_s_test_command():
-    pattern = re.search(r'grep -m 1 -o "(.*)" README\.md', (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
+    pattern = re.search(
+        r'grep -m 1 -o "(.*)" README\.md', (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    )
     assert pattern is not None
-    assert re.search(pattern[1].replace("[test", r"[test"), README.read_text(encoding="utf-8"))[0] == TEST_ALL
+    assert (
+        re.search(pattern[1].replace("[test", r"[test"), README.read_text(encoding="utf-8"))[0]
+        == TEST_ALL
+    )
 
 
 def test_every_picture_is_drawn_by_a_block_or_taken_by_the_script():
-    drawn = {block.marks["picture"] for page in PAGES for block in blocks_of(page) if "picture" in block.marks}
+    drawn = {
+        block.marks["picture"]
+        for page in PAGES
+        for block in blocks_of(page)
+        if "picture" in block.marks
+    }
     assert drawn | set(PICTURES) == {path.name for path in IMAGES.iterdir()}
 
 
@@ -116,7 +140,11 @@ SCANCEL = "#!/bin/sh\nkill $@\n"
 
 
 def test_the_slurm_script_runs(tmp_path):
-    (script,) = [block.text for block in blocks_of(ROOT / "docs" / "guides" / "cluster.md") if "title" in block.marks]
+    (script,) = [
+        block.text
+        for block in blocks_of(ROOT / "docs" / "guides" / "cluster.md")
+        if "title" in block.marks
+    ]
     for long, short in (("cores=32", "cores=1"), ("jobs=4", "jobs=1"), ("runs=100_000", "runs=2")):
         assert long in script
         script = script.replace(long, short)
@@ -137,7 +165,12 @@ def test_the_slurm_script_runs(tmp_path):
 
 
 def test_there_are_four():
-    assert [path.stem for path in NOTEBOOKS] == ["first-campaign", "own-manager", "rules", "sweep-with-salib"]
+    assert [path.stem for path in NOTEBOOKS] == [
+        "first-campaign",
+        "own-manager",
+        "rules",
+        "sweep-with-salib",
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +187,9 @@ def test_it_runs_and_shows_what_it_showed(path, kernel, tmp_path):
     kept = list(shown(nbformat.read(path, as_version=4)))
     assert kept, "it was never run"
     for text, now in zip(kept, shown(executed(path, tmp_path, kernel)), strict=True):
-        assert not differs(Block(path, 1, "text", {}, text), now, quick=False), f"{text}{now}{REFRESH}"
+        assert not differs(Block(path, 1, "text", {}, text), now, quick=False), (
+            f"{text}{now}{REFRESH}"
+        )
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -1,4 +1,6 @@
-"""What reference pages and README say of files, names and links is so, and the site is built of them."""
+"""What reference pages and README say of files, names and links is so, and the site is built of
+them.
+"""
 
 import re
 import tomllib
@@ -17,7 +19,12 @@ from suave_des.records.runs import suave_pieces
 from suave_des.scenario.models import FURTHER_METRICS
 from tests.helpers.command import python
 
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
 
 
@@ -29,21 +36,31 @@ def section(page, heading):
 def tables(text):
     """Cells of each table's rows, without its head."""
     found = re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE)
-    return [[[cell.strip() for cell in row.split("|")[1:-1]] for row in each.splitlines()[2:]] for each in found]
+    return [
+        [[cell.strip() for cell in row.split("|")[1:-1]] for row in each.splitlines()[2:]]
+        for each in found
+    ]
 
 
 def lists(text):
     """Names that each list explains; after `a_mean`, `_std` stands for a_std."""
     found = re.findall(r"(?:^- .*\n(?:  .*\n)*)+", text, flags=re.MULTILINE)
     return [
-        [name for names in re.findall(r"^- (`.*?`): ", each, flags=re.MULTILINE) for name in whole(names)]
+        [
+            name
+            for names in re.findall(r"^- (`.*?`): ", each, flags=re.MULTILINE)
+            for name in whole(names)
+        ]
         for each in found
     ]
 
 
 def whole(names):
     first, *others = [name.strip("`") for name in names.split(", ")]
-    return [first, *(first.removesuffix("_mean") + name if name.startswith("_") else name for name in others)]
+    return [
+        first,
+        *(first.removesuffix("_mean") + name if name.startswith("_") else name for name in others),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -74,7 +91,9 @@ def test_columns_of_the_exemplar_s_file_are_those_of_its_revision(revision, plac
         .replace('"', "")
         .replace("(x,y)", "(x;y)")
     )
-    assert [cell for cell in cells if cell] == [name.replace("(x;y)", "(x,y)") for name in header.split(",")]
+    assert [cell for cell in cells if cell] == [
+        name.replace("(x;y)", "(x,y)") for name in header.split(",")
+    ]
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended"])
@@ -112,7 +131,9 @@ PYTHON_PAGE = ROOT / "docs" / "reference" / "python-api.md"
 def test_the_python_page_lists_the_names_of_the_package_each_with_an_example():
     names = re.findall(r"^- `(\w+)`: ", PYTHON_PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert sorted(names) == sorted(suave_des.__all__) and len(names) <= 40
-    examples = "\n".join(block.text for block in blocks_of(PYTHON_PAGE) if block.language == "python")
+    examples = "\n".join(
+        block.text for block in blocks_of(PYTHON_PAGE) if block.language == "python"
+    )
     assert not [name for name in names if not re.search(rf"\b{name}\b", examples)]
 
 
@@ -147,7 +168,9 @@ def test_every_page_is_two_steps_from_the_readme_which_links_a_handful():
 
 def test_pages_write_into_folders_of_their_own_so_that_they_can_follow_each_other_in_one_checkout():
     out = re.compile(r"^\$ suave-des .*--out (\w+)(?![.\w/])", flags=re.MULTILINE)
-    written = {(folder, page) for page in PAGES for folder in out.findall(page.read_text(encoding="utf-8"))}
+    written = {
+        (folder, page) for page in PAGES for folder in out.findall(page.read_text(encoding="utf-8"))
+    }
     folders = [folder for folder, _ in written]
     assert sorted(folders) == sorted(set(folders))
 
@@ -158,12 +181,19 @@ def test_the_citation_names_this_version_and_the_readme_s_authors():
     bibtex = (ROOT / "README.md").read_text(encoding="utf-8").partition("@inproceedings")[2]
     for author in citation["preferred-citation"]["authors"]:
         assert author["given-names"].split()[-1] in bibtex
-    assert bibtex.partition("title")[0].count(" and") == len(citation["preferred-citation"]["authors"]) - 1
+    assert (
+        bibtex.partition("title")[0].count(" and")
+        == len(citation["preferred-citation"]["authors"]) - 1
+    )
 
 
 def test_what_the_container_copies_exists():
     text = (ROOT / "Containerfile").read_text(encoding="utf-8")
-    sources = [name for copied in re.findall(r"^COPY (.*) \S+$", text, flags=re.MULTILINE) for name in copied.split()]
+    sources = [
+        name
+        for copied in re.findall(r"^COPY (.*) \S+$", text, flags=re.MULTILINE)
+        for name in copied.split()
+    ]
     assert "suave_des" in sources
     assert all((ROOT / name).exists() for name in sources)
 
@@ -202,7 +232,9 @@ def test_nothing_is_loaded_from_elsewhere(site):
     for page in site.rglob("*.html"):
         text = page.read_text(encoding="utf-8")
         loaded = re.findall(r'<(?:script|img|iframe|link)\b[^>]*?(?:src|href)="?([^" >]+)', text)
-        assert not [address for address in loaded if "://" in address or address.startswith("//")], page
+        assert not [
+            address for address in loaded if "://" in address or address.startswith("//")
+        ], page
 
 
 def test_the_public_api_is_documented(site):

@@ -1,7 +1,8 @@
-"""What must stay the same while the code changes: result files to the byte, statistics and decisions to the digit.
+"""What must stay the same while the code changes: result files to the byte, statistics and
+decisions to the digit.
 
-`python -m tests.golden.golden` makes golden.json anew: after a change that is meant to change results, which
-CHANGELOG.md then names.
+`python -m tests.golden.golden` makes golden.json anew: after a change that is meant to change
+results, which CHANGELOG.md then names.
 """
 
 import hashlib
@@ -38,13 +39,34 @@ def digest(path: Path) -> str:
 
 def campaign(scenario: str, runs: int, folder: Path) -> str:
     """The hash of runs.csv of all managers."""
-    run("campaign", scenario, "--managers", MANAGERS[scenario], "--runs", str(runs), "--out", "c", cwd=folder)
+    run(
+        "campaign",
+        scenario,
+        "--managers",
+        MANAGERS[scenario],
+        "--runs",
+        str(runs),
+        "--out",
+        "c",
+        cwd=folder,
+    )
     return digest(folder / "c" / "runs.csv")
 
 
 def mission(scenario: str, manager: str, number: int, folder: Path) -> str:
     """The hashes of what one recorded mission writes as CSV."""
-    run("run", scenario, "--manager", manager, "--run", str(number), "--out", "m", "--overwrite", cwd=folder)
+    run(
+        "run",
+        scenario,
+        "--manager",
+        manager,
+        "--run",
+        str(number),
+        "--out",
+        "m",
+        "--overwrite",
+        cwd=folder,
+    )
     return " ".join(digest(folder / "m" / name) for name in ("events.csv", "trajectory.csv"))
 
 
@@ -60,19 +82,48 @@ def missions(scenario: str, manager: str, folder: Path) -> list[str]:
 
 def compared(scenario: str, folder: Path) -> str:
     """The numbers that compare prints for a campaign."""
-    run("campaign", scenario, "--managers", MANAGERS[scenario], "--runs", "100", "--out", "c", cwd=folder)
+    run(
+        "campaign",
+        scenario,
+        "--managers",
+        MANAGERS[scenario],
+        "--runs",
+        "100",
+        "--out",
+        "c",
+        cwd=folder,
+    )
     return numbers(run("compare", "c", "--format", "csv", cwd=folder))
 
 
 def validated(folder: Path) -> str:
     """The numbers that validate prints."""
-    shown = run("validate", "--runs", "100", "--out", "v", "--managers", "none,random,metacontrol", cwd=folder)
+    shown = run(
+        "validate",
+        "--runs",
+        "100",
+        "--out",
+        "v",
+        "--managers",
+        "none,random,metacontrol",
+        cwd=folder,
+    )
     return numbers(shown.partition("Files")[0])
 
 
 def policy(scenario: str, max_failed: int, folder: Path) -> str:
     """The hash of kb policy's table."""
-    run("kb", "policy", "--scenario", scenario, "--max-failed", str(max_failed), "--csv", "p.csv", cwd=folder)
+    run(
+        "kb",
+        "policy",
+        "--scenario",
+        scenario,
+        "--max-failed",
+        str(max_failed),
+        "--csv",
+        "p.csv",
+        cwd=folder,
+    )
     return digest(folder / "p.csv")
 
 
@@ -92,8 +143,13 @@ QUICK: dict[str, Callable[[Path], object]] = {
     "kb test": rule_tests,
 }
 SLOW: dict[str, Callable[[Path], object]] = {
-    **{f"many missions {scenario}": partial(campaign, scenario, MANY_RUNS) for scenario in MANAGERS},
-    **{f"compare {scenario}": partial(compared, scenario) for scenario in ("seams2023", "planta_exp1")},
+    **{
+        f"many missions {scenario}": partial(campaign, scenario, MANY_RUNS) for scenario in MANAGERS
+    },
+    **{
+        f"compare {scenario}": partial(compared, scenario)
+        for scenario in ("seams2023", "planta_exp1")
+    },
     "kb policy extended": partial(policy, "extended", 1),
     "validate": validated,
 }

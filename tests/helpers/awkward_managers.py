@@ -15,7 +15,9 @@ from suave_des.managing.simple import NoManager
 
 
 class _InRun(NoManager):
-    """Knows which run it is in, by the run's sea: tests give the start positions at which to misbehave."""
+    """Knows which run it is in, by the run's sea: tests give the start positions at which to
+    misbehave.
+    """
 
     def __init__(self, system: System) -> None:
         super().__init__(system)

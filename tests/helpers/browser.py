@@ -1,4 +1,6 @@
-"""Headless Chromium, as a reader's browser: the system's own, or the one that playwright has installed."""
+"""Headless Chromium, as a reader's browser: the system's own, or the one that playwright has
+installed.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,18 @@ class Opened:
 
     def outside(self, file: Path) -> list[str]:
         """Requests that leave the page; what it makes of itself (blob:, data:) does not."""
-        return [each for each in self.requests if not each.startswith((file.as_uri(), "blob:", "data:"))]
+        return [
+            each for each in self.requests if not each.startswith((file.as_uri(), "blob:", "data:"))
+        ]
 
     def value(self, script: str) -> Any:
         """The value of a JavaScript expression in the page."""
         return self.page.evaluate(script)
 
     def wait_until(self, script: str, timeout_s: float = 20.0) -> None:
-        """Wait until a JavaScript expression holds; playwright's own way needs eval, which pages forbid."""
+        """Wait until a JavaScript expression holds; playwright's own way needs eval, which pages
+        forbid.
+        """
         end_s = time.monotonic() + timeout_s
         while not self.page.evaluate(script):
             assert time.monotonic() < end_s, script
@@ -44,7 +50,9 @@ class Opened:
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """Start the browser; where there is none, skip the test, or fail it where the environment says CI=true."""
+    """Start the browser; where there is none, skip the test, or fail it where the environment says
+    CI=true.
+    """
     missing = pytest.fail if os.environ.get("CI") == "true" else pytest.skip
     try:
         playwright = import_module("playwright.sync_api")
@@ -54,7 +62,9 @@ def chromium() -> Iterator[Any]:
     with playwright.sync_playwright() as started:
         if system is None and not Path(started.chromium.executable_path).exists():
             missing("no Chromium: install the system's, or run `playwright install chromium`")
-        browser = started.chromium.launch(executable_path=system, args=["--no-sandbox", "--disable-dev-shm-usage"])
+        browser = started.chromium.launch(
+            executable_path=system, args=["--no-sandbox", "--disable-dev-shm-usage"]
+        )
         try:
             yield browser
         finally:
@@ -66,7 +76,9 @@ def opened(
     browser: Any, file: Path, size: tuple[int, int] = DESKTOP, hash_: str = "", theme: str = "light"
 ) -> Iterator[Opened]:
     """Open a file in a window of a size, and listen to it."""
-    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, color_scheme=theme)
+    context = browser.new_context(
+        viewport={"width": size[0], "height": size[1]}, color_scheme=theme
+    )
     page = context.new_page()
     found = Opened(page)
     page.on("console", lambda message: found.complaints.append(f"{message.type}: {message.text}"))

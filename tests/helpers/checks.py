@@ -19,17 +19,23 @@ SWRL = "http://www.w3.org/2003/11/swrl#"
 def subject(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> Subject:
     """A copy of the shipped suave.owl with things added at its end, and a file of rules."""
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
+    (tmp_path / "suave.owl").write_text(
+        text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8"
+    )
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
     return Subject([tmp_path / "suave.owl"], [tmp_path / "mine.swrl"], **options)  # type: ignore[arg-type]
 
 
-def found_by_pellet(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> tuple[Finding, ...]:
+def found_by_pellet(
+    tmp_path: Path, rules: str = "", extra: str = "", **options: object
+) -> tuple[Finding, ...]:
     """What `kb check` finds."""
     return check(subject(tmp_path, rules, extra, **options))
 
 
-def found(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> tuple[Finding, ...]:
+def found(
+    tmp_path: Path, rules: str = "", extra: str = "", **options: object
+) -> tuple[Finding, ...]:
     """What `kb check` finds without a reasoner."""
     return findings_of(subject(tmp_path, rules, extra, **options))
 

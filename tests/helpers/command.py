@@ -28,7 +28,9 @@ EXAMPLES = ("perl", "node", "c")
 
 
 def example_program(language: str) -> str:
-    """The command that runs the example of a manager in a language; C is compiled into the current folder."""
+    """The command that runs the example of a manager in a language; C is compiled into the current
+    folder.
+    """
     folder = Path(__file__).resolve().parents[2] / "docs" / "examples" / "exec"
     needed, command = {
         "perl": ("perl", f"perl {shlex.quote(str(folder / 'manager.pl'))}"),
@@ -42,21 +44,29 @@ def example_program(language: str) -> str:
     return command
 
 
-def python(*arguments: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+def python(
+    *arguments: str, cwd: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Run `python ARGUMENTS` in a folder, with the package that is under test."""
     path = os.pathsep.join(filter(None, [_PACKAGE_PARENT, os.environ.get("PYTHONPATH")]))
     environment = {**os.environ, "PYTHONPATH": path, **environment}
     command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(
+        command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
 
 
-def suave_des_command(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def suave_des_command(
+    *arguments: str, cwd: Path, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Run `suave-des ARGUMENTS` in a folder, with the package that is under test."""
     return python("-m", "suave_des", *arguments, cwd=cwd, **environment)
 
 
 def command_here(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run `suave-des ARGUMENTS` in a folder, in this process; modules of that folder are forgotten at the end."""
+    """Run `suave-des ARGUMENTS` in a folder, in this process; modules of that folder are forgotten
+    at the end.
+    """
     path, out, err = list(sys.path), io.StringIO(), io.StringIO()
     with contextlib.chdir(cwd), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
@@ -93,7 +103,9 @@ class Ended(NamedTuple):
 
 
 @pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
+def command(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., Ended]:
     """Runs the command line in this process, in the current folder."""
     monkeypatch.setattr(sys, "path", list(sys.path))
 

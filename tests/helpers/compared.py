@@ -30,7 +30,9 @@ def row(frame: pandas.DataFrame, **wanted: str) -> Any:
     return found
 
 
-def difference(comparison: Comparison, first: str, second: str, metric: str = "search_time_s") -> Any:
+def difference(
+    comparison: Comparison, first: str, second: str, metric: str = "search_time_s"
+) -> Any:
     """How two groups differ in a metric."""
     return row(comparison.differences, group=first, other=second, metric=metric)
 

@@ -1,7 +1,9 @@
-"""Three ontology files split the exemplar's way, made from the shipped two: tomasys.owl, mros.owl, suave.owl.
+"""Three ontology files split the exemplar's way, made from the shipped two: tomasys.owl, mros.owl,
+suave.owl.
 
-In the exemplar the terms and rules for robots have a file of their own, which suave.owl imports; the oldest rules
-speak of INTERNAL_ERROR, and a recovered component gives its objectives the status UPDATABLE.
+In the exemplar the terms and rules for robots have a file of their own, which suave.owl imports;
+the oldest rules speak of INTERNAL_ERROR, and a recovered component gives its objectives the status
+UPDATABLE.
 """
 
 from __future__ import annotations
@@ -20,7 +22,17 @@ TOMASYS_IMPORT = "http://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/r
 SWRL = "http://www.w3.org/2003/11/swrl#"
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
-MROS_RULES = {"compError", "compErrFG", "compRecov", "QAenergy", "QAsafety", "mros_S4", "S1a", "S1b", "S1c"}
+MROS_RULES = {
+    "compError",
+    "compErrFG",
+    "compRecov",
+    "QAenergy",
+    "QAsafety",
+    "mros_S4",
+    "S1a",
+    "S1b",
+    "S1c",
+}
 OLDEST_STATUS = {"IN_ERROR_NFR": "INTERNAL_ERROR", "IN_ERROR_COMPONENT": "INTERNAL_ERROR"}
 
 
@@ -42,12 +54,16 @@ def _move(source: Graph, target: Graph, nodes: set[Node]) -> None:
 
 
 def _oldest_forms(graph: Graph) -> None:
-    """o_status UPDATABLE instead of o_updatable, INTERNAL_ERROR instead of the IN_ERROR statuses."""
+    """o_status UPDATABLE instead of o_updatable, INTERNAL_ERROR instead of the IN_ERROR
+    statuses.
+    """
     for subject, predicate, value in list(graph):
         if isinstance(value, Literal) and str(value) in OLDEST_STATUS:
             graph.remove((subject, predicate, value))
             graph.add((subject, predicate, Literal(OLDEST_STATUS[str(value)])))
-    for atom in list(graph.subjects(URIRef(SWRL + "propertyPredicate"), URIRef(TOMASYS + "o_updatable"))):
+    for atom in list(
+        graph.subjects(URIRef(SWRL + "propertyPredicate"), URIRef(TOMASYS + "o_updatable"))
+    ):
         graph.set((atom, URIRef(SWRL + "propertyPredicate"), URIRef(TOMASYS + "o_status")))
         graph.set((atom, URIRef(SWRL + "argument2"), Literal("UPDATABLE")))
 
@@ -57,7 +73,11 @@ def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -
     tomasys, mros, suave = Graph(), Graph(), Graph()
     tomasys.parse(shipped / "tomasys.owl", format="xml")
     suave.parse(shipped / "suave.owl", format="xml")
-    rules = {str(label): rule for rule, label in tomasys.subject_objects(RDFS.label) if isinstance(rule, BNode)}
+    rules = {
+        str(label): rule
+        for rule, label in tomasys.subject_objects(RDFS.label)
+        if isinstance(rule, BNode)
+    }
     for name in MROS_RULES:
         _move(tomasys, mros, _parts(tomasys, rules[name]))
     _move(tomasys, mros, {s for s in tomasys.subjects() if str(s).startswith(MROS)})
@@ -82,7 +102,8 @@ def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -
 
 
 def write_files_of_2023(shipped: Path, folder: Path) -> dict[str, Path]:
-    """Write the three files in their oldest form, without the properties that TOMASys got later; returns them by stem.
+    """Write the three files in their oldest form, without the properties that TOMASys got later;
+    returns them by stem.
 
     Statuses are any text there, so that rules that ask for a status of false never match.
     """
@@ -90,7 +111,10 @@ def write_files_of_2023(shipped: Path, folder: Path) -> dict[str, Path]:
     for path in files.values():
         graph = Graph().parse(path, format="xml")
         for name in ("o_always_improve", "o_updatable", "qa_comparison_operator"):
-            for pattern in ((URIRef(TOMASYS + name), None, None), (None, URIRef(TOMASYS + name), None)):
+            for pattern in (
+                (URIRef(TOMASYS + name), None, None),
+                (None, URIRef(TOMASYS + name), None),
+            ):
                 graph.remove(pattern)
         for name in ("b_status", "c_status", "fg_status", "o_status"):
             if (URIRef(TOMASYS + name), RDF.type, None) in graph:
@@ -100,7 +124,8 @@ def write_files_of_2023(shipped: Path, folder: Path) -> dict[str, Path]:
 
 
 def write_as_owlready2_saves_it(path: Path, placeholder: str = "") -> Path:
-    """Write suave.owl as the files of 2023 are: no comparison operators, "xsd:string" for the datatype, a placeholder.
+    """Write suave.owl as the files of 2023 are: no comparison operators, "xsd:string" for the
+    datatype, a placeholder.
 
     Args:
         path: of the file.
@@ -115,5 +140,7 @@ def write_as_owlready2_saves_it(path: Path, placeholder: str = "") -> Path:
         '<owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#placeholder">'
         f'<rdf:type rdf:resource="{TOMASYS}{placeholder}"/></owl:NamedIndividual>'
     )
-    path.write_text(text.replace("</rdf:RDF>", f"{extra if placeholder else ''}</rdf:RDF>"), encoding="utf-8")
+    path.write_text(
+        text.replace("</rdf:RDF>", f"{extra if placeholder else ''}</rdf:RDF>"), encoding="utf-8"
+    )
     return path

@@ -34,8 +34,9 @@ def searching(
     )
 
 
-#: Values of a scenario: the designs' performance keeps its order, in numbers that the ontology has anyway, so that
-#: there are 8 ranges of measured values in place of 16, and half as many states of a policy.
+#: Values of a scenario: the designs' performance keeps its order, in numbers that the ontology has
+# anyway, so that : there are 8 ranges of measured values in place of 16, and half as many states of
+# a policy.
 FEWER_NUMBERS = {
     "knowledge.values": {
         "qa_performance_low": 1.25,

@@ -61,7 +61,12 @@ def system_of(
 ) -> System:
     """What a manager sees, without a vehicle and a knowledge base."""
     recorder = SimpleNamespace(log=lambda source, event, detail: None)
-    parts = {"_manager": "m", "_coordinator": coordinator, "_vehicle": None, "_draws": Streams(seed, 1)}
+    parts = {
+        "_manager": "m",
+        "_coordinator": coordinator,
+        "_vehicle": None,
+        "_draws": Streams(seed, 1),
+    }
     further = {"_recorder": recorder, "_files": {}, "_open_knowledge": lambda: None}
     return System(env, modes, measurements, scenario, settings or {}, recorded, **parts, **further)
 
@@ -69,7 +74,9 @@ def system_of(
 class AtWork:
     """One manager in one revision."""
 
-    def __init__(self, name: str, revision: str = "1.5", *, seed: int = 1, battery: bool = False) -> None:
+    def __init__(
+        self, name: str, revision: str = "1.5", *, seed: int = 1, battery: bool = False
+    ) -> None:
         self.per_task = revision == "1.5"
         self.modes = AskedModes()
         self.measurements: defaultdict[str, Published] = defaultdict(Published)
@@ -78,7 +85,14 @@ class AtWork:
             scenario = scenario.model_copy(update={"battery": Battery()})
         self.mission_wide = () if self.per_task else (MOTION,)
         self.coordinator = SimpleNamespace(functions=self.mission_wide)
-        system = system_of(simpy.Environment(), scenario, self.modes, self.measurements, self.coordinator, seed=seed)
+        system = system_of(
+            simpy.Environment(),
+            scenario,
+            self.modes,
+            self.measurements,
+            self.coordinator,
+            seed=seed,
+        )
         self.manager: ManagingSubsystem = manager_class(name)(system)
 
     def task(self, name: str) -> Task:
@@ -109,11 +123,15 @@ class AtWork:
 
     def reported(self, thruster: int, status: str) -> None:
         """A component's status is published."""
-        self.manager.diagnostic(Diagnostic(0.0, Kind.COMPONENT_STATUS, f"c_thruster_{thruster}", status))
+        self.manager.diagnostic(
+            Diagnostic(0.0, Kind.COMPONENT_STATUS, f"c_thruster_{thruster}", status)
+        )
 
     def detected(self) -> list[tuple[str, str]]:
         """What is asked for when the pipeline is detected."""
-        return self._during(lambda: self.manager.diagnostic(Diagnostic(0.0, Kind.DETECTION, "pipeline", 0.0)))
+        return self._during(
+            lambda: self.manager.diagnostic(Diagnostic(0.0, Kind.DETECTION, "pipeline", 0.0))
+        )
 
     def _during(self, action) -> list[tuple[str, str]]:
         before = len(self.modes.asked)

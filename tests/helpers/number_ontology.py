@@ -1,4 +1,6 @@
-"""An ontology of things with a number each, in many datatypes and forms, and rules that match the numbers."""
+"""An ontology of things with a number each, in many datatypes and forms, and rules that match the
+numbers.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +35,24 @@ HEADER = f"""\
 
 
 def numbers_ontology(folder: Path) -> Ontology:
-    """Write and load it: rule is_NAME says of each thing with a number like that of thing NAME is(thing, NAME)."""
+    """Write and load it: rule is_NAME says of each thing with a number like that of thing NAME
+    is(thing, NAME).
+    """
     owl, rules = folder / "numbers.owl", folder / "numbers.swrl"
-    things = [f":{name} a :Thing ; :first {text} ; :second {text} .\n" for name, text in NUMBERS.items()]
-    before, rdflib.NORMALIZE_LITERALS = rdflib.NORMALIZE_LITERALS, False  # it would write numbers in one form
-    rdflib.Graph().parse(data=HEADER + "".join(things), format="turtle").serialize(owl, format="xml")
+    things = [
+        f":{name} a :Thing ; :first {text} ; :second {text} .\n" for name, text in NUMBERS.items()
+    ]
+    before, rdflib.NORMALIZE_LITERALS = (
+        rdflib.NORMALIZE_LITERALS,
+        False,
+    )  # it would write numbers in one form
+    rdflib.Graph().parse(data=HEADER + "".join(things), format="turtle").serialize(
+        owl, format="xml"
+    )
     rdflib.NORMALIZE_LITERALS = before
-    known = [f'is_{name}: first(?x, {text}) -> is(?x, "{name}")\n' for name, text in NUMBERS.items()]
+    known = [
+        f'is_{name}: first(?x, {text}) -> is(?x, "{name}")\n' for name, text in NUMBERS.items()
+    ]
     known += [
         "same: first(?x, ?v) ^ second(?y, ?v) -> same(?x, ?y)\n",
         "equal: first(?x, ?v) ^ second(?y, ?w) ^ swrlb:equal(?v, ?w) -> equals(?x, ?y)\n",

@@ -120,7 +120,9 @@ class DoesNotDeclare(EventTriggered):
 
 
 class NeverIdle(EventTriggered):
-    """Each call lets mission time pass, if only none; its settings say whether another one would change nothing."""
+    """Each call lets mission time pass, if only none; its settings say whether another one would
+    change nothing.
+    """
 
     depends_on: ClassVar = EventTriggered.depends_on
 
@@ -131,7 +133,9 @@ class NeverIdle(EventTriggered):
 
 
 class TakesTime(EventTriggered):
-    """Acts for some time in each region of the visibility and after each report, and is idle then."""
+    """Acts for some time in each region of the visibility and after each report, and is idle
+    then.
+    """
 
     depends_on: ClassVar = {"water_visibility": (2.0, 3.0)}
 
@@ -147,7 +151,10 @@ class TakesTime(EventTriggered):
     def adapt(self):
         super().adapt()
         visibility_m, edges_m = self.system.measured("water_visibility") or 0.0, (2.0, 3.0)
-        state = self.reports, bisect_left(edges_m, visibility_m) + bisect_right(edges_m, visibility_m)
+        state = (
+            self.reports,
+            bisect_left(edges_m, visibility_m) + bisect_right(edges_m, visibility_m),
+        )
         return None if state == self.handled else self._act(state)
 
     def _act(self, state):
@@ -185,7 +192,9 @@ class SearchesAsHighAsItCanSee(ManagingSubsystem):
         visibility_m = self.visibility_m()
         for name in self.functions:
             if name == "f_generate_search_path":
-                height = "high" if visibility_m >= 3.25 else "medium" if visibility_m >= 2.25 else "low"
+                height = (
+                    "high" if visibility_m >= 3.25 else "medium" if visibility_m >= 2.25 else "low"
+                )
                 self.system.change_mode(name, f"fd_spiral_{height}")
             elif name == "f_follow_pipeline":
                 self.system.change_mode(name, "fd_follow_pipeline")
@@ -213,7 +222,9 @@ class SubscribesToMeasuredValues(SearchesAsHighAsItCanSee):
 
 
 class ChangesModesInHooks(SearchesAsHighAsItCanSee):
-    """Requests a mode at once when a component's status is reported; its next call may take that back."""
+    """Requests a mode at once when a component's status is reported; its next call may take that
+    back.
+    """
 
     depends_on: ClassVar = SearchesAsHighAsItCanSee.depends_on
 
@@ -261,7 +272,9 @@ class PlansLow(Metacontrol):
     def plan(self, inference):
         low = {"f_generate_search_path": "fd_spiral_low"}
         decisions = super().plan(inference).decisions
-        return Plan(tuple(replace(each, design=low.get(each.function, each.design)) for each in decisions))
+        return Plan(
+            tuple(replace(each, design=low.get(each.function, each.design)) for each in decisions)
+        )
 
 
 class DoesMore(Metacontrol):

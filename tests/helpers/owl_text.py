@@ -1,4 +1,6 @@
-"""Pieces of RDF/XML for the tests: individuals and rules, as an author would add them to suave.owl."""
+"""Pieces of RDF/XML for the tests: individuals and rules, as an author would add them to
+suave.owl.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,13 @@ MakeOntology = Callable[..., Path]
 
 @pytest.fixture
 def suave_copy(tmp_path: Path) -> MakeOntology:
-    """A copy of the shipped suave.owl in a folder of its own, with text replaced and individuals added."""
+    """A copy of the shipped suave.owl in a folder of its own, with text replaced and individuals
+    added.
+    """
 
-    def make(extra: str = "", replace: Mapping[str, str] | None = None, name: str = "suave.owl") -> Path:
+    def make(
+        extra: str = "", replace: Mapping[str, str] | None = None, name: str = "suave.owl"
+    ) -> Path:
         text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
         for old, new in (replace or {}).items():
             assert old in text, f"{old!r} is not in the shipped suave.owl"
@@ -46,20 +52,35 @@ def iri(name: str) -> str:
 
 
 def individual(name: str, kind: str, *statements: tuple[str, str]) -> str:
-    """An individual; a value that starts with a digit is a decimal, true/false a boolean, ":x" an individual."""
-    lines = [f'<owl:NamedIndividual rdf:about="{iri(name)}">', f'<rdf:type rdf:resource="{TOMASYS}{kind}"/>']
+    """An individual; a value that starts with a digit is a decimal, true/false a boolean, ":x" an
+    individual.
+    """
+    lines = [
+        f'<owl:NamedIndividual rdf:about="{iri(name)}">',
+        f'<rdf:type rdf:resource="{TOMASYS}{kind}"/>',
+    ]
     for property_name, value in statements:
         tag = property_name if ":" in property_name else f"tomasys:{property_name}"
         if value.startswith(":"):
             lines.append(f'<{tag} rdf:resource="{iri(value[1:])}"/>')
         else:
-            kind_of = "decimal" if value[0].isdigit() else "boolean" if value in ("true", "false") else "string"
+            kind_of = (
+                "decimal"
+                if value[0].isdigit()
+                else "boolean"
+                if value in ("true", "false")
+                else "string"
+            )
             lines.append(f'<{tag} rdf:datatype="{XSD}{kind_of}">{escape(value)}</{tag}>')
     return "\n".join([*lines, "</owl:NamedIndividual>\n"])
 
 
-def rule(name: str, text: str, *, enabled: bool = True, data: frozenset[str] | set[str] = frozenset()) -> str:
-    """A SWRL rule from text such as 'QAvalue(?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> ...'."""
+def rule(
+    name: str, text: str, *, enabled: bool = True, data: frozenset[str] | set[str] = frozenset()
+) -> str:
+    """A SWRL rule from text such as 'QAvalue(?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) ->
+    ...'.
+    """
     body, head = text.split("->")
     variables = "".join(
         f'<rdf:Description rdf:about="urn:swrl:var#{v}"><rdf:type rdf:resource="{SWRL}Variable"/></rdf:Description>\n'
@@ -88,8 +109,23 @@ def _list(items: list[str]) -> str:
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 DATA = {
-    *("c_status", "fg_status", "o_status", "fd_realisability", "o_updatable", "o_always_improve", "hasValue"),
-    *("b_status", "cc_unique", "cc_availability", "cspec_availability", "fd_efficacy", "qa_critical"),
+    *(
+        "c_status",
+        "fg_status",
+        "o_status",
+        "fd_realisability",
+        "o_updatable",
+        "o_always_improve",
+        "hasValue",
+    ),
+    *(
+        "b_status",
+        "cc_unique",
+        "cc_availability",
+        "cspec_availability",
+        "fd_efficacy",
+        "qa_critical",
+    ),
 }
 
 
@@ -134,8 +170,13 @@ def _atom(text: str, data: frozenset[str] | set[str]) -> str:
         kind, predicate = "ClassAtom", "classPredicate"
     else:
         is_data = name in DATA or name in data
-        kind, predicate = "DatavaluedPropertyAtom" if is_data else "IndividualPropertyAtom", "propertyPredicate"
-    values = "".join(_element(f"swrl:argument{n}", argument) for n, argument in enumerate(arguments, start=1))
+        kind, predicate = (
+            "DatavaluedPropertyAtom" if is_data else "IndividualPropertyAtom",
+            "propertyPredicate",
+        )
+    values = "".join(
+        _element(f"swrl:argument{n}", argument) for n, argument in enumerate(arguments, start=1)
+    )
     return (
         f'<rdf:Description><rdf:type rdf:resource="{SWRL}{kind}"/><swrl:{predicate} rdf:resource="{term}"/>'
         f"{values}</rdf:Description>"

@@ -37,11 +37,16 @@ def tick(self: WaypointFunction) -> None:
             return
         if self._due is not Due.NOTHING:
             self.sender.send(*self.waypoints(1)[0, :2].tolist(), self.set_point_z_m())
-            self._resend_at = now + (check.resend_ticks if self._due is Due.SEND else check.resend_again_ticks)
+            self._resend_at = now + (
+                check.resend_ticks if self._due is Due.SEND else check.resend_again_ticks
+            )
             self._due = Due.NOTHING
             if check.first_check_ticks:
                 break
-        here, there = self.sender.vehicle.position(check.time_s(now)), self.waypoints(1)[0, :3].tolist()
+        here, there = (
+            self.sender.vehicle.position(check.time_s(now)),
+            self.waypoints(1)[0, :3].tolist(),
+        )
         x_m, y_m, z_m = (abs(a - b) for a, b in zip(here, there, strict=True))
         if max(x_m, y_m) <= check.half_width_m and z_m <= check.half_height_m:
             self.reached(1)
@@ -72,7 +77,10 @@ POLLING: Final = {
     "waypoints_changed": lambda self: None,  # the next tick asks for the way-point anyway
     "_control_changed": lambda self: None,
 }
-IN_EACH_CYCLE: Final = {"_analyze_and_plan": analyze_and_plan_anew, "_changes_nothing": lambda self, reasoning: False}
+IN_EACH_CYCLE: Final = {
+    "_analyze_and_plan": analyze_and_plan_anew,
+    "_changes_nothing": lambda self, reasoning: False,
+}
 
 
 @contextmanager
@@ -87,7 +95,9 @@ def polled() -> Iterator[None]:
 Effect = tuple[float, str]
 
 
-def effects(simulator: Simulator, manager: str, run: int, *, record: bool) -> tuple[MissionMetrics, list[Effect]]:
+def effects(
+    simulator: Simulator, manager: str, run: int, *, record: bool
+) -> tuple[MissionMetrics, list[Effect]]:
     """Metrics of a mission, and the modes that took effect with their times."""
     found: list[Effect] = []
     take_effect = ModeManager._take_effect
@@ -101,9 +111,13 @@ def effects(simulator: Simulator, manager: str, run: int, *, record: bool) -> tu
 
 
 def each_pair(fewest: Iterable[Any], second: Iterable[Any], third: Iterable[Any]) -> list[Any]:
-    """Make all cells parameters of a test; quick are those in which the levels of the factor with fewest take turns."""
+    """Make all cells parameters of a test; quick are those in which the levels of the factor with
+    fewest take turns.
+    """
     levels = [list(enumerate(each)) for each in (fewest, second, third)]
     return [
-        pytest.param(one, two, three, marks=() if i == (j + k) % len(levels[0]) else pytest.mark.slow)
+        pytest.param(
+            one, two, three, marks=() if i == (j + k) % len(levels[0]) else pytest.mark.slow
+        )
         for (i, one), (j, two), (k, three) in product(*levels)
     ]

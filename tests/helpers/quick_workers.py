@@ -1,8 +1,10 @@
-"""Processes that have imported everything before they start, for tests that are not about how processes start.
+"""Processes that have imported everything before they start, for tests that are not about how
+processes start.
 
-A campaign spawns its workers, as a fork of a process with a Java machine or with threads may hang; each then takes a
-second of CPU time to import what missions need. Here they are forked from a process of the tests that has imported
-that once, and has neither. Everything else is the campaign's own. So may a command be, whose workers are spawned.
+A campaign spawns its workers, as a fork of a process with a Java machine or with threads may hang;
+each then takes a second of CPU time to import what missions need. Here they are forked from a
+process of the tests that has imported that once, and has neither. Everything else is the campaign's
+own. So may a command be, whose workers are spawned.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Stand-ins for what a function of the managed subsystem needs around it, and the shipped vehicle."""
+"""Stand-ins for what a function of the managed subsystem needs around it, and the shipped
+vehicle.
+"""
 
 import random
 from collections.abc import Callable
@@ -27,7 +29,11 @@ class PlacedVehicle:
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
         self.control_listeners: list[Callable[[], None]] = []
-        self.duration_s, self.expected_changes_s, self.thrusters = 1000.0, dict[str, float](), list[str]()
+        self.duration_s, self.expected_changes_s, self.thrusters = (
+            1000.0,
+            dict[str, float](),
+            list[str](),
+        )
         self._place, self.obeys = place, obeys
         self.sends = False  # whether a way-point is being sent
         self.rise_m, self.altitude_error_m = rise_m, 0.0
@@ -48,7 +54,9 @@ class PlacedVehicle:
         return self.place
 
     def queue_waypoints(self, t_s, courses, until_s, *, send):
-        """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
+        """Look at the first way-point only: where a later set-point takes the vehicle cannot be
+        known beforehand.
+        """
         ((check, waypoints, sent_as_m, (first, again, _), _),) = courses
         if send:
             self.sends = True
@@ -56,7 +64,10 @@ class PlacedVehicle:
             self.sends = False
         halves_m = check.half_width_m, check.half_width_m, check.half_height_m
         for tick in range(first, again + 1):
-            errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
+            errors_m = [
+                abs(a - b)
+                for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)
+            ]
             if all(error_m <= half_m for error_m, half_m in zip(errors_m, halves_m, strict=True)):
                 return [[tick, 0, 1, tick + check.resend_ticks]], True
         return [[again, 0, 0, again]], True
@@ -94,7 +105,9 @@ class MovingVehicle(PlacedVehicle):
 @cache
 def revision(name: str) -> Revision:
     """The shipped revision "2023", "2025" or "1.5"."""
-    return load_scenario({"2023": "seams2023", "2025": "planta_exp1", "1.5": "release15"}[name]).scenario.revision
+    return load_scenario(
+        {"2023": "seams2023", "2025": "planta_exp1", "1.5": "release15"}[name]
+    ).scenario.revision
 
 
 def sender(env: simpy.Environment, vehicle: PlacedVehicle) -> SetPointSender:

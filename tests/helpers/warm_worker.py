@@ -1,4 +1,6 @@
-"""What a process has imported and loaded before its first mission, or its first campaign: modules and machine code."""
+"""What a process has imported and loaded before its first mission, or its first campaign: modules
+and machine code.
+"""
 
 import gc
 

@@ -50,7 +50,9 @@ print(json.dumps(answer), flush=True)
 def test_the_examples_carry_out_the_same_missions(language, tmp_path):
     (tmp_path / "same.py").write_text(SAME)
     frame = run_campaign("seams2023", ["same:Same", f"exec:{example_program(language)}"], runs=5)
-    one, other = (part.reset_index(drop=True) for _, part in frame.groupby("manager", observed=True))
+    one, other = (
+        part.reset_index(drop=True) for _, part in frame.groupby("manager", observed=True)
+    )
     assert (one["search_time_s"] == other["search_time_s"]).all()
     assert (one["distance_inspected_m"] == other["distance_inspected_m"]).all()
 
@@ -86,7 +88,9 @@ def test_it_is_told_what_happens():
     assert first["type"] == "mission_started" and first["protocol"] == 1
     assert "fd_spiral_high" in first["functions"]["f_generate_search_path"]
     assert last["type"] == "mission_ended" and last["metrics"]["run"] == 1
-    assert {"task_requested", "task_cancelled", "adapt", "diagnostic"} <= {each["type"] for each in messages}
+    assert {"task_requested", "task_cancelled", "adapt", "diagnostic"} <= {
+        each["type"] for each in messages
+    }
     assert [each["time_s"] for each in messages] == sorted(each["time_s"] for each in messages)
 
 
@@ -94,7 +98,10 @@ def test_it_is_told_what_happens():
     ("body", "words"),
     [
         ("time.sleep(60)", "gave no answer within 0.5 s"),
-        ("print('{', end='', flush=True); time.sleep(60)", "gave no answer but half a line within 3 s"),
+        (
+            "print('{', end='', flush=True); time.sleep(60)",
+            "gave no answer but half a line within 3 s",
+        ),
         ("sys.exit(7)", "ProgramError: the program ended with status 7"),
         ("os.kill(os.getpid(), 9)", "ended with status -9"),
         ("sys.stdout.close(); os.close(1); time.sleep(60)", "closed its output"),
@@ -107,14 +114,19 @@ def test_it_is_told_what_happens():
         ('print(\'{"subscribes_to": ["poses"]}\', flush=True)', "did you mean 'pose'"),
         ('print(\'{"period_s": 2, "starts_s": -50}\', flush=True)', "starts_s is -50.0"),
         ('print(\'{"depends_on": {"water_visibility": [NaN]}}\', flush=True)', "depends_on is"),
-        ('print(\'{"modes": {"f_generate_search_path": "fd_spiral_hihg"}}\', flush=True)', "'fd_spiral_high'"),
+        (
+            'print(\'{"modes": {"f_generate_search_path": "fd_spiral_hihg"}}\', flush=True)',
+            "'fd_spiral_high'",
+        ),
         ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
     ],
 )
 def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body, words):
     manager = program(body)
     told = re.search(r"within (\S+) s", words)
-    time_out_s = float(told[1]) if told else 60.0  # a busy machine takes its time to start a program
+    time_out_s = (
+        float(told[1]) if told else 60.0
+    )  # a busy machine takes its time to start a program
     assert words in failure(manager, manager_options={manager: {"time_out_s": time_out_s}})
 
 
@@ -150,13 +162,35 @@ def test_the_children_of_a_program_that_fails_end_with_its_mission():
     assert_all_ended()
 
 
-@pytest.mark.parametrize(("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (1, signal.SIGKILL)])
+@pytest.mark.parametrize(
+    ("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (1, signal.SIGKILL)]
+)
 def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers, number):
     manager = program(WITH_A_CHILD + "time.sleep(600)\n")
-    options = ("--manager-option", "time_out_s=600", "--workers", str(workers), "--runs", "9", "--out", "out")
-    command = (sys.executable, "-m", "suave_des", "campaign", "seams2023", "--managers", manager, *options)
+    options = (
+        "--manager-option",
+        "time_out_s=600",
+        "--workers",
+        str(workers),
+        "--runs",
+        "9",
+        "--out",
+        "out",
+    )
+    command = (
+        sys.executable,
+        "-m",
+        "suave_des",
+        "campaign",
+        "seams2023",
+        "--managers",
+        manager,
+        *options,
+    )
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        wait_until(lambda: Path("pids").exists() and len(Path("pids").read_text().splitlines()) >= workers)
+        wait_until(
+            lambda: Path("pids").exists() and len(Path("pids").read_text().splitlines()) >= workers
+        )
         process.send_signal(number)
     assert_all_ended()
 

@@ -36,7 +36,12 @@ def test_it_passes_gymnasiums_own_checker_without_a_warning(scenario):
 
 def test_the_snippet_of_the_guide_works_when_it_is_copied_alone():
     page = Path(__file__).parents[2] / "docs" / "guides" / "other-programs.md"
-    snippet = page.read_text().partition("## Gymnasium")[2].partition("```python\n")[2].partition("```")[0]
+    snippet = (
+        page.read_text()
+        .partition("## Gymnasium")[2]
+        .partition("```python\n")[2]
+        .partition("```")[0]
+    )
     done = python("-c", snippet)
     assert done.returncode == 0 and done.stdout.splitlines()[-1] == "47.4 87.0", done.stderr
 
@@ -46,7 +51,10 @@ def test_an_episode_is_the_mission_of_its_seed(simulator):
     _, _, info = play(environment, [0, 0], seed=7)
     expected = simulator.run("none", 1, 7).metrics
     found = info["metrics"]
-    assert (found.search_time_s, found.distance_inspected_m) == (expected.search_time_s, expected.distance_inspected_m)
+    assert (found.search_time_s, found.distance_inspected_m) == (
+        expected.search_time_s,
+        expected.distance_inspected_m,
+    )
 
 
 def test_an_observation_has_what_monitors_measured(simulator):
@@ -58,16 +66,25 @@ def test_an_observation_has_what_monitors_measured(simulator):
     assert last["c_thruster_1"] == 0.0 and last["c_thruster_2"] == 1.0
     first = dict(zip(names, seen[0].tolist(), strict=True))
     assert first["water_visibility"] == -1.0 and first["time_share"] == 0.0
-    high = [dict(zip(names, each.tolist(), strict=True))["f_generate_search_path"] for each in seen[1:20]]
+    high = [
+        dict(zip(names, each.tolist(), strict=True))["f_generate_search_path"]
+        for each in seen[1:20]
+    ]
     assert set(high) == {2.0}
 
 
 def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simulator):
-    made = Simulator(load_scenario("release15"))  # there maintain_motion ends and begins with each task
+    made = Simulator(
+        load_scenario("release15")
+    )  # there maintain_motion ends and begins with each task
     environment = gymnasium.make(NAME, scenario=made)
     names = environment.unwrapped.observation_names
     seen, _, info = play(environment, [2, 1], seed=1)
-    inspecting = [named for each in seen if (named := dict(zip(names, each.tolist(), strict=True)))["inspects"]]
+    inspecting = [
+        named
+        for each in seen
+        if (named := dict(zip(names, each.tolist(), strict=True)))["inspects"]
+    ]
     assert info["metrics"].pipeline_found
     assert {named["f_maintain_motion"] for named in inspecting[1:]} == {1.0}
 
@@ -84,12 +101,18 @@ def test_the_reward_adds_up_to_what_it_weighs(simulator):
         if is_over:
             break
     metrics = info["metrics"]
-    expected = 2.0 * metrics.distance_inspected_m - 0.5 * metrics.search_time_s + 10.0 * metrics.pipeline_found
+    expected = (
+        2.0 * metrics.distance_inspected_m
+        - 0.5 * metrics.search_time_s
+        + 10.0 * metrics.pipeline_found
+    )
     assert metrics.pipeline_found and metrics.adaptations > 5
     assert total == pytest.approx(expected - 3.0 * metrics.adaptations)
 
 
-@pytest.mark.parametrize("action", [[3, 0], [0, 2], [-1, 0], [0], [0, 0, 0], 1, [0.5, 0], "no", None])
+@pytest.mark.parametrize(
+    "action", [[3, 0], [0, 2], [-1, 0], [0], [0, 0, 0], 1, [0.5, 0], "no", None]
+)
 def test_actions_out_of_range_are_refused(simulator, action):
     environment = gymnasium.make(NAME, scenario=simulator).unwrapped
     environment.reset(seed=1)
@@ -126,9 +149,32 @@ def test_observations_are_within_the_bounds_of_the_scenario(simulator):
     ("signal", "low", "high"),
     [
         ({"kind": "step", "time_s": 5.0, "before": -4.0, "after": 2.0}, -4.0, 2.0),
-        ({"kind": "constant", "value": 2.0, "noise": {"distribution": "normal", "mean": 0.0, "std": 0.5}}, -1.0, 5.0),
-        ({"kind": "constant", "value": {"distribution": "uniform", "minimum": 1.0, "maximum": 6.0}}, -1.0, 6.0),
-        ({"kind": "constant", "value": 0.0, "noise": {"distribution": "exponential", "mean": 0.1}}, -1.0, 3.6),
+        (
+            {
+                "kind": "constant",
+                "value": 2.0,
+                "noise": {"distribution": "normal", "mean": 0.0, "std": 0.5},
+            },
+            -1.0,
+            5.0,
+        ),
+        (
+            {
+                "kind": "constant",
+                "value": {"distribution": "uniform", "minimum": 1.0, "maximum": 6.0},
+            },
+            -1.0,
+            6.0,
+        ),
+        (
+            {
+                "kind": "constant",
+                "value": 0.0,
+                "noise": {"distribution": "exponential", "mean": 0.1},
+            },
+            -1.0,
+            3.6,
+        ),
     ],
 )
 def test_bounds_follow_from_what_the_scenario_says_of_a_signal(signal, low, high):

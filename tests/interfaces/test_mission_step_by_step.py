@@ -24,13 +24,18 @@ def test_a_requested_mode_takes_effect_after_the_latency():
     mission.change_mode(SEARCH, "fd_spiral_high")
     assert mission.current_mode(SEARCH) == "fd_spiral_high"
     mission.advance(20.0)
-    times_s = [each.t_s for each in mission.result().events if each.detail == f"{SEARCH} = fd_spiral_high"]
+    times_s = [
+        each.t_s for each in mission.result().events if each.detail == f"{SEARCH} = fd_spiral_high"
+    ]
     assert times_s == [pytest.approx(10.5, abs=0.5)]
 
 
 def test_it_shows_what_a_manager_would_see(simulator):
     mission = Mission(simulator, run=1)
-    assert mission.measured("water_visibility") is None and mission.measured("water_visibility", 0.0) == 0.0
+    assert (
+        mission.measured("water_visibility") is None
+        and mission.measured("water_visibility", 0.0) == 0.0
+    )
     mission.advance(60.0)
     assert mission.searches and SEARCH in mission.functions
     assert mission.components == {"c_thruster_1": "FALSE"}
@@ -42,7 +47,9 @@ def test_it_shows_what_a_manager_would_see(simulator):
 def test_it_stops_at_its_end(simulator):
     mission = Mission(simulator, run=1)
     mission.advance(1e6)
-    assert mission.is_over and mission.now_s == simulator.run("none", 1, 1).metrics.mission_duration_s
+    assert (
+        mission.is_over and mission.now_s == simulator.run("none", 1, 1).metrics.mission_duration_s
+    )
     assert mission.task is None
 
 

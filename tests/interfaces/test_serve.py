@@ -1,4 +1,6 @@
-"""The mission over HTTP: what UPISAS expects of an exemplar, and what a server may expect of clients."""
+"""The mission over HTTP: what UPISAS expects of an exemplar, and what a server may expect of
+clients.
+"""
 
 import json
 import socket
@@ -28,10 +30,16 @@ def port(simulator: Simulator) -> Iterator[int]:
         server.shutdown()
 
 
-def request(port: int, method: str, path: str, body: object = None, **headers: str) -> tuple[int, bytes]:
-    """Send a request; further headers, in which an underscore stands for a dash, replace those that it has."""
+def request(
+    port: int, method: str, path: str, body: object = None, **headers: str
+) -> tuple[int, bytes]:
+    """Send a request; further headers, in which an underscore stands for a dash, replace those that
+    it has.
+    """
     connection = HTTPConnection("127.0.0.1", port, timeout=10.0)
-    content = None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+    content = (
+        None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+    )
     given = {name.replace("_", "-"): value for name, value in headers.items()}
     connection.request(method, path, content, {"Content-Type": "application/json", **given})
     answer = connection.getresponse()
@@ -45,11 +53,16 @@ def validate_schema(data: dict, schema: dict) -> None:
 
 
 class Strategy:
-    """An adaptation loop as UPISAS has it: schemas first, then monitor, analyze, plan, execute, each validated."""
+    """An adaptation loop as UPISAS has it: schemas first, then monitor, analyze, plan, execute,
+    each validated.
+    """
 
     def __init__(self, port: int) -> None:
         self.port, self.seen = port, b""
-        schemas = {name: self.get(f"{name}_schema") for name in ("monitor", "execute", "adaptation_options")}
+        schemas = {
+            name: self.get(f"{name}_schema")
+            for name in ("monitor", "execute", "adaptation_options")
+        }
         for schema in schemas.values():
             jsonschema.Draft202012Validator.check_schema(schema)
         self.schemas = schemas
@@ -83,7 +96,9 @@ def whole_mission(port: int, seed: int) -> tuple[bytes, dict]:
         if found["task"] == "search_pipeline":
             low, medium, high = strategy.options[SEARCH]
             visibility_m = found["water_visibility"] or 0.0
-            adaptation[SEARCH] = high if visibility_m >= 3.25 else medium if visibility_m >= 2.25 else low
+            adaptation[SEARCH] = (
+                high if visibility_m >= 3.25 else medium if visibility_m >= 2.25 else low
+            )
         strategy.execute(adaptation)
     return strategy.seen, json.loads(request(port, "GET", "/metrics")[1])
 
@@ -152,7 +167,10 @@ def test_what_it_cannot_use_is_refused_and_changes_nothing(port, method, path, b
 )
 def test_a_web_page_of_somebody_else_may_neither_read_nor_steer(port, headers, status):
     before = request(port, "GET", "/monitor")
-    for method, path, body in (("PUT", "/execute", {SEARCH: "fd_spiral_high"}), ("POST", "/start", {"seed": 7})):
+    for method, path, body in (
+        ("PUT", "/execute", {SEARCH: "fd_spiral_high"}),
+        ("POST", "/start", {"seed": 7}),
+    ):
         found, answer = request(port, method, path, body, **headers)
         assert found == status and "error" in json.loads(answer)
     if status != 415:  # a GET has no body
@@ -162,7 +180,11 @@ def test_a_web_page_of_somebody_else_may_neither_read_nor_steer(port, headers, s
 
 @pytest.mark.parametrize("host", ["localhost", "localhost:3000", "127.0.0.1:80", "[::1]:3000"])
 def test_it_may_be_called_by_the_names_of_this_machine(port, host):
-    own = {"Host": host, "Origin": f"http://{host}", "Content_Type": "application/json; charset=utf-8"}
+    own = {
+        "Host": host,
+        "Origin": f"http://{host}",
+        "Content_Type": "application/json; charset=utf-8",
+    }
     assert request(port, "POST", "/advance", {"advance_s": 1}, **own)[0] == 200
 
 
@@ -188,7 +210,9 @@ def test_a_body_without_a_sensible_length_is_refused(port, head, status):
 def test_clients_that_leave_in_the_middle_are_not_reported(port, capfd):
     for _ in range(50):
         stream = socket.create_connection(("127.0.0.1", port), timeout=10.0)
-        stream.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # leave with a reset
+        stream.setsockopt(
+            socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)
+        )  # leave with a reset
         stream.sendall(b"PUT /execute HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9")
         stream.close()
     assert request(port, "GET", "/monitor")[0] == 200
@@ -198,7 +222,9 @@ def test_clients_that_leave_in_the_middle_are_not_reported(port, capfd):
 
 def test_several_clients_at_once_get_whole_answers(port):
     with ThreadPoolExecutor(8) as pool:
-        answers = list(pool.map(lambda _: request(port, "POST", "/advance", {"advance_s": 0.5}), range(40)))
+        answers = list(
+            pool.map(lambda _: request(port, "POST", "/advance", {"advance_s": 0.5}), range(40))
+        )
     times_s = sorted(json.loads(body)["time_s"] for _, body in answers)
     assert times_s == [0.5 * number for number in range(1, 41)]
 

@@ -15,7 +15,9 @@ def knowledge():
 
 @pytest.fixture(scope="session")
 def small():
-    """The shipped knowledge base with fewer ranges of measured values, for what goes through all of them."""
+    """The shipped knowledge base with fewer ranges of measured values, for what goes through all of
+    them.
+    """
     return KnowledgeBase.load(values=FEWER_NUMBERS)
 
 

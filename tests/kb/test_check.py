@@ -22,7 +22,9 @@ from tests.helpers.owl_text import individual
 def test_the_shipped_ontology_has_one_note(tmp_path):
     (note,) = check(Subject())
     assert (str(note)[:4], note.rule) == ("NOTE", None)
-    assert note.message.startswith("rules for other models, which never fire in this one: QAenergy, ")
+    assert note.message.startswith(
+        "rules for other models, which never fire in this one: QAenergy, "
+    )
     assert [each.level for each in found_by_pellet(tmp_path)] == [Level.NOTE]
 
 
@@ -57,7 +59,8 @@ def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report
         assert {(state.grounded(function), state.components[0][1]) for state in states} == wanted
         wanted = set(itertools.product(base.designs(function), regions_of(base).thresholds))
         assert {
-            (state.grounded(function), dict(state.measurements).get("water_visibility")) for state in states
+            (state.grounded(function), dict(state.measurements).get("water_visibility"))
+            for state in states
         } > wanted
 
 
@@ -86,7 +89,12 @@ def test_formats_and_exit_status(tmp_path, command):
     status, out, _ = command("check", "--rules", rules, "--fail-on", "warn", "--format", "json")
     assert status == 1
     first = json.loads(out)[0]
-    assert (first["level"], first["file"], first["line"], first["column"]) == ("WARN", str(rules), 1, 4)
+    assert (first["level"], first["file"], first["line"], first["column"]) == (
+        "WARN",
+        str(rules),
+        1,
+        4,
+    )
     rules.write_text("A: Rol(?g) -> Role(?g)", encoding="utf-8")
     assert command("check", "--rules", rules)[0] == 1
 
@@ -96,17 +104,25 @@ def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_cons
     rules = f"""
 one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 2.2) -> fg_status(?fg, "IN_ERROR_FR")
 """
-    (error,) = errors(found_by_pellet(tmp_path, rules))  # QAWaterVisibility says that it is IN_ERROR_NFR
+    (error,) = errors(
+        found_by_pellet(tmp_path, rules)
+    )  # QAWaterVisibility says that it is IN_ERROR_NFR
     assert "contradiction" in error.message
-    rules_in_it = r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line \d+\)"
+    rules_in_it = (
+        r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line \d+\)"
+    )
     assert re.search(rules_in_it, error.message)
 
 
 def test_values_of_the_scenario_are_used(tmp_path):
     body = "typeFD(?fg, fd_spiral_low) ^ hasValue(qa_water_visibility_low, ?v) ^ lessThan(?v, 0.2)"
-    rules = "".join(f'{name}: {body} -> fg_status(?fg, "IN_ERROR_{name}")\n' for name in ("FR", "NFR"))
+    rules = "".join(
+        f'{name}: {body} -> fg_status(?fg, "IN_ERROR_{name}")\n' for name in ("FR", "NFR")
+    )
     assert errors(found_by_pellet(tmp_path, rules)) == []
-    (error,) = errors(found_by_pellet(tmp_path, rules, values={"qa_water_visibility_low": Decimal("0.125")}))
+    (error,) = errors(
+        found_by_pellet(tmp_path, rules, values={"qa_water_visibility_low": Decimal("0.125")})
+    )
     assert "by the rules FR (mine.swrl, line 1), NFR (mine.swrl, line 2)" in error.message
     with pytest.raises(KnowledgeError, match="qa_water_visibility_lo"):
         found_by_pellet(tmp_path, values={"qa_water_visibility_lo": Decimal(1)})
@@ -140,7 +156,9 @@ def test_a_rule_that_never_comes_to_an_end_is_an_error(tmp_path):
         'rdf:datatype="http://www.w3.org/2001/XMLSchema#decimal">1</tomasys:fd_efficacy></rdf:Description>'
     )
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", start + "</rdf:RDF>"), encoding="utf-8")
+    (tmp_path / "suave.owl").write_text(
+        text.replace("</rdf:RDF>", start + "</rdf:RDF>"), encoding="utf-8"
+    )
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
     files = ("--ontology", "suave.owl", "--rules", "mine.swrl")
     ended = suave_des_command("kb", "infer", *files, "--time-limit", "2", cwd=tmp_path)

@@ -8,7 +8,14 @@ from pathlib import Path
 import pandas
 import pytest
 
-from suave_des.kb.difference import METRICS, compare_axioms, compare_decisions, compare_missions, firing_states, paired
+from suave_des.kb.difference import (
+    METRICS,
+    compare_axioms,
+    compare_decisions,
+    compare_missions,
+    firing_states,
+    paired,
+)
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.space import Outcome, Situation, States
 from suave_des.knowledge.ontology import Ontology
@@ -42,16 +49,23 @@ def test_a_changed_value_is_one_axiom_removed_and_one_added(bolder):
 
 
 def test_class_expressions_are_compared_whatever_their_nodes_are_called(suave_copy):
-    one, again = Ontology.load([suave_copy(FAILED)]), Ontology.load([suave_copy(FAILED, name="again.owl")])
+    one, again = (
+        Ontology.load([suave_copy(FAILED)]),
+        Ontology.load([suave_copy(FAILED, name="again.owl")]),
+    )
     assert compare_axioms(one, again) == ([], [])
-    (added,) = [text for text in compare_axioms(Ontology.load(), one)[1] if "equivalentClass" in text]
+    (added,) = [
+        text for text in compare_axioms(Ontology.load(), one)[1] if "equivalentClass" in text
+    ]
     assert 'hasValue "FALSE"' in added
     assert "onProperty c_status" in added
 
 
 def test_rules_count_with_their_text(tmp_path):
     rules = tmp_path / "mine.swrl"
-    rules.write_text("S1a: Component(?c) -> fd_realisability(fd_spiral_low, false)\n", encoding="utf-8")
+    rules.write_text(
+        "S1a: Component(?c) -> fd_realisability(fd_spiral_low, false)\n", encoding="utf-8"
+    )
     removed, added = compare_axioms(Ontology.load(), Ontology.load(rules=[rules]))
     assert [text.partition(":")[0] for text in (*removed, *added)] == ["rule S1a", "rule S1a"]
 
@@ -65,12 +79,18 @@ def test_missions_with_the_second_knowledge_base_are_those_that_are_called_other
 
 @pytest.mark.parametrize("number", [0, 9])
 def test_states_are_counted_in_which_a_rule_fires_that_only_one_of_two_has(tmp_path, number):
-    """Visibility is above 0 in every mission, and never above 9 m, whichever of the two has the rule."""
+    """Visibility is above 0 in every mission, and never above 9 m, whichever of the two has the
+    rule.
+    """
     body = f"isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ greaterThan(?v, {number})"
-    more = {"rules": [rules_file(tmp_path, f"own: {body} -> fd_realisability(fd_spiral_high, false)")]}
+    more = {
+        "rules": [rules_file(tmp_path, f"own: {body} -> fd_realisability(fd_spiral_high, false)")]
+    }
     short = {"values": {"mission.time_limit_s": 20}}
     for one, other in ((more, {}), ({}, more)):
-        firing, states = firing_states("seams2023", 1, {**short, **one}, {**short, **other}, seed=1, limit=TimeLimit())
+        firing, states = firing_states(
+            "seams2023", 1, {**short, **one}, {**short, **other}, seed=1, limit=TimeLimit()
+        )
         assert states > 0
         assert firing == (states if number == 0 else 0)
 
@@ -100,7 +120,11 @@ def test_the_difference_of_missions_is_the_second_less_the_first():
 
 def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_missions():
     before = pandas.DataFrame(
-        {**{name: [1.0, 1.0] for name in METRICS}, "mean_reaction_time_s": [2.0, nan], "adaptations": [3, 4]},
+        {
+            **{name: [1.0, 1.0] for name in METRICS},
+            "mean_reaction_time_s": [2.0, nan],
+            "adaptations": [3, 4],
+        },
         index=[1, 2],
     )
     after = before.assign(mean_reaction_time_s=[2.5, 3.0])
@@ -110,9 +134,15 @@ def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_mis
 
 
 @pytest.mark.parametrize("change", ["inconsistent", "none left", "other statuses"])
-def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_design_differ(small, change):
+def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_design_differ(
+    small, change
+):
     states = States.of(small.base, small.settings, 0, small.space)
-    changed = next(each for each in states if each.grounded(SEARCH) and not small.outcome(Situation(each)).statuses)
+    changed = next(
+        each
+        for each in states
+        if each.grounded(SEARCH) and not small.outcome(Situation(each)).statuses
+    )
 
     def other(situation):
         found = small.outcome(situation)
@@ -123,7 +153,9 @@ def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_desig
         if change == "none left":
             return Outcome(replace(found.reasoning, plan=Plan((Decision(SEARCH, None, ""),))))
         fact = Fact(f"o_{SEARCH[2:]}", "o_status", "X")
-        inference = replace(found.reasoning.inference, facts=found.reasoning.inference.facts | {fact})
+        inference = replace(
+            found.reasoning.inference, facts=found.reasoning.inference.facts | {fact}
+        )
         return Outcome(replace(found.reasoning, inference=inference))
 
     found = compare_decisions(states, small.outcome, other, ())
@@ -140,11 +172,18 @@ def rules_file(tmp_path: Path, text: str) -> Path:
 class TestDiff:
     def test_a_moved_threshold_differs_between_old_and_new_only(self, small, tmp_path):
         file = rules_file(tmp_path, MOVED)
-        difference = small.diff(KnowledgeBase.load(rules=[file], values=FEWER_NUMBERS), max_failed=0)
+        difference = small.diff(
+            KnowledgeBase.load(rules=[file], values=FEWER_NUMBERS), max_failed=0
+        )
         cells = difference.cells
         high = cells[cells[f"{SEARCH}_now"] == "fd_spiral_high"]
-        assert set(map(difference.space.scale.text, high["water_visibility"])) == {"3", "3 < . < 3.25"}
-        assert set(high[f"{SEARCH}_then_a"]) == {"fd_spiral_medium"} and set(high[f"{SEARCH}_then_b"]) == {"stays"}
+        assert set(map(difference.space.scale.text, high["water_visibility"])) == {
+            "3",
+            "3 < . < 3.25",
+        }
+        assert set(high[f"{SEARCH}_then_a"]) == {"fd_spiral_medium"} and set(
+            high[f"{SEARCH}_then_b"]
+        ) == {"stays"}
 
     def test_the_command_takes_ontologies_and_rules(self, command, suave_copy, tmp_path):
         same = suave_copy()
@@ -152,15 +191,25 @@ class TestDiff:
         assert (status, text) == (0, "0 of 288 states are decided differently\n")
         file = rules_file(tmp_path, MOVED)
         _, text, _ = command("diff", same, file, "--max-failed", "0")
-        assert f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n" in text
+        assert (
+            f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n"
+            in text
+        )
 
     def test_an_outcome_is_told_once(self, command, suave_copy, tmp_path):
-        file = rules_file(tmp_path, "low: FunctionDesign(?d) -> fd_realisability(fd_spiral_low, false)\n")
+        file = rules_file(
+            tmp_path, "low: FunctionDesign(?d) -> fd_realisability(fd_spiral_low, false)\n"
+        )
         _, text, _ = command("diff", suave_copy(), file, "--max-failed", "0")
-        assert f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n" in text
+        assert (
+            f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n"
+            in text
+        )
         assert "none left, none left" not in text
 
-    def test_a_function_without_designs_on_one_side_is_decided_differently(self, command, suave_copy):
+    def test_a_function_without_designs_on_one_side_is_decided_differently(
+        self, command, suave_copy
+    ):
         same, without = suave_copy(), suave_copy(name="without.owl")
         designs = r'(?s)<owl:NamedIndividual rdf:about="[^"]*#fd_spiral_(?:low|medium|high)">.*?</owl:NamedIndividual>'
         without.write_text(re.sub(designs, "", without.read_text()))

@@ -1,4 +1,6 @@
-"""Every kb command on what it cannot use: one line or a finding, the right exit status, and the file as it was."""
+"""Every kb command on what it cannot use: one line or a finding, the right exit status, and the
+file as it was.
+"""
 
 from pathlib import Path
 
@@ -22,7 +24,12 @@ ASKING = {
     "query": ("SELECT ?s WHERE { ?s a ?t } LIMIT 1", "--inferred"),
 }
 UNKNOWN_KEY = ("--set", "mission.time_limt_s=9")
-EDITING = {"add-rule": (RULE,), "remove-rule": ("S1a",), "enable-rule": ("S1a",), "disable-rule": ("S1a",)}
+EDITING = {
+    "add-rule": (RULE,),
+    "remove-rule": ("S1a",),
+    "enable-rule": ("S1a",),
+    "disable-rule": ("S1a",),
+}
 NAMESPACES = (
     'xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#" '
     'xmlns="http://x.org/wine#"'
@@ -77,9 +84,18 @@ def refused(command, name, arguments, said):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("infer", "--at", "c_thruster_7=FALSE"), "--at: there is no quality attribute, component or function 'c_thr"),
-        (("infer", "--at", "c_thruster_1=false"), "no rule mentions the c_status 'false' (did you mean 'FALSE'?"),
-        (("infer", "--at", "f_maintain_motion=ungrounded"), "--at: f_maintain_motion has no function design 'ungrou"),
+        (
+            ("infer", "--at", "c_thruster_7=FALSE"),
+            "--at: there is no quality attribute, component or function 'c_thr",
+        ),
+        (
+            ("infer", "--at", "c_thruster_1=false"),
+            "no rule mentions the c_status 'false' (did you mean 'FALSE'?",
+        ),
+        (
+            ("infer", "--at", "f_maintain_motion=ungrounded"),
+            "--at: f_maintain_motion has no function design 'ungrou",
+        ),
         (("infer", "--at", "nowhere@3"), "nowhere: no such folder"),
         (("infer", "--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
         (("infer", "--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
@@ -89,8 +105,14 @@ def refused(command, name, arguments, said):
         (("try", RULE, "--disable", "S1a", "--on", "flown"), "give a rule, or --disable NAME"),
         (("try", "--on", "flown"), "give a rule, or --disable NAME"),
         (("try", "--disable", "S1x", "--on", "flown"), "--disable: there is no rule S1x"),
-        (("try", "near: FunctionGroundin(?fg) -> fg_status(?fg, 3)", "--on", "flown"), "FunctionGroundin is not defin"),
-        *(((name, *asked, *UNKNOWN_KEY), "did you mean 'time_limit_s'") for name, asked in ASKING.items()),
+        (
+            ("try", "near: FunctionGroundin(?fg) -> fg_status(?fg, 3)", "--on", "flown"),
+            "FunctionGroundin is not defin",
+        ),
+        *(
+            ((name, *asked, *UNKNOWN_KEY), "did you mean 'time_limit_s'")
+            for name, asked in ASKING.items()
+        ),
         (("test", *UNKNOWN_KEY), "did you mean 'time_limit_s'"),
         (("diff", "suave.owl", "suave.owl", *UNKNOWN_KEY), "did you mean 'time_limit_s'"),
     ],
@@ -104,7 +126,9 @@ def test_words_that_no_command_can_use(folder, command, words, said):
 def test_no_command_takes_a_file_that_cannot_be_read(folder, command, kind):
     content, said = UNREADABLE[kind]
     suave = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    Path("bad.owl").write_text(suave[: len(suave) // 2] if content is None else content, encoding="utf-8")
+    Path("bad.owl").write_text(
+        suave[: len(suave) // 2] if content is None else content, encoding="utf-8"
+    )
     for name, arguments in ASKING.items():
         refused(command, name, (*arguments, "--ontology", "bad.owl"), said)
     refused(command, "diff", ("bad.owl", "bad.owl"), said)
@@ -114,7 +138,9 @@ def test_no_command_takes_a_file_that_cannot_be_read(folder, command, kind):
 
 @pytest.mark.parametrize("kind", ["another ontology", "an import cycle"])
 def test_an_ontology_of_something_else_is_told_apart_from_a_broken_one(folder, command, kind):
-    wine = document('<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Wine"/>')
+    wine = document(
+        '<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Wine"/>'
+    )
     Path("wine.owl").write_text(wine if kind == "another ontology" else importing("wine", "b"))
     Path("b.owl").write_text(importing("b", "wine"))
     assert command("rules", "--ontology", "wine.owl")[0] == 0
@@ -127,9 +153,18 @@ def test_an_ontology_of_something_else_is_told_apart_from_a_broken_one(folder, c
         "policy": "no function has a function design",
     }.items():
         refused(command, name, (*ASKING[name], "--ontology", "wine.owl"), said)
-    refused(command, "diff", ("wine.owl", "wine.owl", "--max-failed", "0"), "no function has a function design")
+    refused(
+        command,
+        "diff",
+        ("wine.owl", "wine.owl", "--max-failed", "0"),
+        "no function has a function design",
+    )
     for name, arguments in EDITING.items():
-        said = "FunctionGrounding is not defined" if name == "add-rule" else "there is no rule S1a (its rules: none)"
+        said = (
+            "FunctionGrounding is not defined"
+            if name == "add-rule"
+            else "there is no rule S1a (its rules: none)"
+        )
         refused(command, name, ("wine.owl", *arguments), said)
 
 
@@ -148,12 +183,16 @@ def test_a_rule_with_unbalanced_parentheses_is_refused_with_its_column(folder, c
 
 def test_names_that_are_not_ascii_are_names(folder, command):
     suave = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    Path("suave.owl").write_text(suave.replace("fd_spiral_high", "fd_spirale_größte"), encoding="utf-8")
+    Path("suave.owl").write_text(
+        suave.replace("fd_spiral_high", "fd_spirale_größte"), encoding="utf-8"
+    )
     rule = 'größer: typeFD(?größe, fd_spirale_größte) -> fg_status(?größe, "IN_ERROR_FR")'
     assert command("add-rule", "suave.owl", rule)[0] == 0
     assert rule in command("rules", "--ontology", "suave.owl")[1]
     state = ("--at", f"{SEARCH}=fd_spirale_größte")
-    status, text, _ = command("explain", "fg_status(fg_spirale_größte, IN_ERROR_FR)", "--ontology", "suave.owl", *state)
+    status, text, _ = command(
+        "explain", "fg_status(fg_spirale_größte, IN_ERROR_FR)", "--ontology", "suave.owl", *state
+    )
     assert status == 0
     assert "by rule größer with ?größe = fg_spirale_größte" in text
     assert command("remove-rule", "suave.owl", "größer")[0] == 0
@@ -168,4 +207,6 @@ def test_rules_that_contradict_each_other_are_named(folder, command):
         refused(command, asked, (*STATE, *rules), named)
     status, text, _ = command("check", *rules)
     assert status == 1
-    assert "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text  # what follows from them may clash, too
+    assert (
+        "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text
+    )  # what follows from them may clash, too

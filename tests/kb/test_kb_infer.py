@@ -1,4 +1,6 @@
-"""kb infer and kb query: states as people write them, what follows, the time limit, and SPARQL over all of it."""
+"""kb infer and kb query: states as people write them, what follows, the time limit, and SPARQL over
+all of it.
+"""
 
 import csv
 import io
@@ -16,7 +18,10 @@ from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import ObjectiveState
 from tests.helpers.command import python
 
-HIGH = {"groundings": {"f_generate_search_path": "fd_spiral_high"}, "measurements": {"water_visibility": 1.8}}
+HIGH = {
+    "groundings": {"f_generate_search_path": "fd_spiral_high"},
+    "measurements": {"water_visibility": 1.8},
+}
 _BODY = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
 EXPLOSION = f"explosion: {_BODY} -> o_updatable(o_generate_search_path, true)\n"
 
@@ -45,7 +50,9 @@ def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
         "measurements: {water_visibility: 1.8}\n"
     )
     assert knowledge.state(file).components == (("c_thruster_1", "FALSE"),)
-    state = knowledge.state(file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"})
+    state = knowledge.state(
+        file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"}
+    )
     assert str(dict(state.measurements)["water_visibility"]) == "3"
     assert state.components == (("c_thruster_1", "RECOVERED"),)
 
@@ -53,10 +60,22 @@ def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("measurements: {water_visibilty: 1}\n", "line 1, measurements.water_visibilty: there is no quality attribute"),
-        ("measurements:\n  water_visibility: deep\n", "line 2, measurements.water_visibility: 'deep' is not a number"),
-        ("groundings: {f_maintain_motion: fd_spiral_low}\n", "f_maintain_motion has no function design"),
-        ("components: {c_thruster_1: recoverd}\n", "no rule mentions the c_status 'recoverd' (did you mean 'REC"),
+        (
+            "measurements: {water_visibilty: 1}\n",
+            "line 1, measurements.water_visibilty: there is no quality attribute",
+        ),
+        (
+            "measurements:\n  water_visibility: deep\n",
+            "line 2, measurements.water_visibility: 'deep' is not a number",
+        ),
+        (
+            "groundings: {f_maintain_motion: fd_spiral_low}\n",
+            "f_maintain_motion has no function design",
+        ),
+        (
+            "components: {c_thruster_1: recoverd}\n",
+            "no rule mentions the c_status 'recoverd' (did you mean 'REC",
+        ),
         ("component: {}\n", "did you mean 'components'"),
         ("components: 3\n", "line 1, components: "),
         ("", "is empty"),
@@ -73,14 +92,18 @@ def test_a_wrong_file_is_told_with_its_place(knowledge, tmp_path, text, said):
 
 def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
     (tmp_path / "mine.swrl").write_text("mine: Objective(?o) -> o_updatable(?o, true)\n")
-    alone = KnowledgeBase.load("suave.owl", rules=tmp_path / "mine.swrl", disabled_rules="compError")
-    assert {rule.name: rule.enabled for rule in alone.base.rules if rule.name in ("mine", "compError")} == {
+    alone = KnowledgeBase.load(
+        "suave.owl", rules=tmp_path / "mine.swrl", disabled_rules="compError"
+    )
+    assert {
+        rule.name: rule.enabled for rule in alone.base.rules if rule.name in ("mine", "compError")
+    } == {
         "mine": True,
         "compError": False,
     }
-    assert [each.function for each in knowledge.state(objectives="f_maintain_motion").objectives] == [
-        "f_maintain_motion"
-    ]
+    assert [
+        each.function for each in knowledge.state(objectives="f_maintain_motion").objectives
+    ] == ["f_maintain_motion"]
 
 
 class TestTimeLimit:
@@ -88,12 +111,15 @@ class TestTimeLimit:
         monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
         released = threading.Event()
         monkeypatch.setattr(
-            "suave_des.knowledge.pellet.in_process.InProcessPellet.infer", lambda *_: released.wait(60.0)
+            "suave_des.knowledge.pellet.in_process.InProcessPellet.infer",
+            lambda *_: released.wait(60.0),
         )
         limit = TimeLimit()
         reasoner = Reasoner(knowledge.base, "pellet", limit)
         limit.seconds = 0.2
-        with pytest.raises(KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.2 s"):
+        with pytest.raises(
+            KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.2 s"
+        ):
             reasoner.analyze(knowledge.state(**HIGH))
         with pytest.raises(KnowledgeError, match="still reasoning"):
             reasoner.analyze(knowledge.state())
@@ -165,7 +191,8 @@ sys.exit(5)
         assert not starting.is_alive() and not done
 
     def test_abandoned_work_no_longer_calls_java_when_java_ends(self):
-        # A call that returns at that very moment keeps Python's lock for ever, and the process never ends.
+        # A call that returns at that very moment keeps Python's lock for ever, and the process
+        # never ends.
         program = """
 import atexit, sys, threading
 from suave_des.errors import KnowledgeError
@@ -190,17 +217,30 @@ SEARCH = "f_generate_search_path"
 
 
 def test_inferred_facts_are_there_when_asked_for(knowledge):
-    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
+    state = knowledge.state(
+        groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8}
+    )
     query = "SELECT ?g ?s WHERE { ?g tomasys:fg_status ?s }"
     assert knowledge.query(query, state).rows == ()
-    assert knowledge.query(query, state, inferred=True).rows == (("suave:fg_spiral_high", "IN_ERROR_NFR"),)
-    assert knowledge.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }", state).rows == (("true",),)
-    assert knowledge.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }").rows == (("false",),)
+    assert knowledge.query(query, state, inferred=True).rows == (
+        ("suave:fg_spiral_high", "IN_ERROR_NFR"),
+    )
+    assert knowledge.query(
+        "ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }", state
+    ).rows == (("true",),)
+    assert knowledge.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }").rows == (
+        ("false",),
+    )
 
 
 def test_answers_are_the_same_each_time():
-    queries = ("SELECT ?s ?o WHERE { ?s ?p ?o } LIMIT 9", "SELECT ?s ?o WHERE { ?s owl:unionOf ?o }")
-    first, second = ([KnowledgeBase.load().query(query).rows for query in queries] for _ in range(2))
+    queries = (
+        "SELECT ?s ?o WHERE { ?s ?p ?o } LIMIT 9",
+        "SELECT ?s ?o WHERE { ?s owl:unionOf ?o }",
+    )
+    first, second = (
+        [KnowledgeBase.load().query(query).rows for query in queries] for _ in range(2)
+    )
     assert first == second
     assert all(first)
 
@@ -208,15 +248,27 @@ def test_answers_are_the_same_each_time():
 @pytest.mark.parametrize(
     ("query", "notes"),
     [
-        ("SELECT ?d WHERE { ?d tomasys:solvsF ?f }", ["tomasys:solvsF (did you mean tomasys:solvesF?)"]),
-        ("ASK { ?d a tomasys:FunctionDesing }", ["tomasys:FunctionDesing (did you mean tomasys:FunctionDesign?)"]),
-        ("ASK { ?g suave:fg_status 1 FILTER NOT EXISTS { suave:f_x a ?c } }", ["suave:f_x", "suave:fg_status"]),
+        (
+            "SELECT ?d WHERE { ?d tomasys:solvsF ?f }",
+            ["tomasys:solvsF (did you mean tomasys:solvesF?)"],
+        ),
+        (
+            "ASK { ?d a tomasys:FunctionDesing }",
+            ["tomasys:FunctionDesing (did you mean tomasys:FunctionDesign?)"],
+        ),
+        (
+            "ASK { ?g suave:fg_status 1 FILTER NOT EXISTS { suave:f_x a ?c } }",
+            ["suave:f_x", "suave:fg_status"],
+        ),
         (
             "SELECT ?d WHERE { ?d tomasys:solvesF/tomasys:fg_stat ?f }",
             ["tomasys:fg_stat (did you mean tomasys:fg_status?)"],
         ),
         ("SELECT ?d WHERE { ?d a tomasys:Wrench }", ["tomasys:Wrench"]),
-        ("SELECT ?d WHERE { ?d tomasys:solvesF ?f . ?d rdfs:seeAlso 2 . ?f a suave:fd_spiral_low. }", []),
+        (
+            "SELECT ?d WHERE { ?d tomasys:solvesF ?f . ?d rdfs:seeAlso 2 . ?f a suave:fd_spiral_low. }",
+            [],
+        ),
     ],
 )
 def test_names_that_the_knowledge_base_does_not_have_are_noted(knowledge, query, notes):
@@ -228,7 +280,10 @@ def test_names_that_the_knowledge_base_does_not_have_are_noted(knowledge, query,
 def test_the_command_notes_unknown_names_on_its_error_stream(command):
     status, answer, noted = command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")
     assert (status, answer) == (0, "d\nno rows\n")
-    assert noted == "suave-des: the knowledge base does not have tomasys:solvsF (did you mean tomasys:solvesF?)\n"
+    assert (
+        noted
+        == "suave-des: the knowledge base does not have tomasys:solvsF (did you mean tomasys:solvesF?)\n"
+    )
 
 
 @pytest.mark.parametrize(
@@ -236,10 +291,19 @@ def test_the_command_notes_unknown_names_on_its_error_stream(command):
     [
         ("SELECT WHERE", "not a SPARQL query"),
         ("", "not a SPARQL query"),
-        ("SELECT ?s WHERE { ?s nowhere:is ?o }", "not a SPARQL query: Unknown namespace prefix : nowhere"),
+        (
+            "SELECT ?s WHERE { ?s nowhere:is ?o }",
+            "not a SPARQL query: Unknown namespace prefix : nowhere",
+        ),
         ("DELETE WHERE { ?s ?p ?o }", "not a SPARQL query"),
-        ("SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }", "SERVICE and FROM read from other sources"),
-        ("SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }", "SERVICE and FROM read from other sources"),
+        (
+            "SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }",
+            "SERVICE and FROM read from other sources",
+        ),
+        (
+            "SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }",
+            "SERVICE and FROM read from other sources",
+        ),
     ],
 )
 def test_what_is_no_query_of_the_knowledge_base_is_refused(knowledge, text, said):
@@ -256,6 +320,8 @@ def test_the_command_prints_tables(command):
     assert status == 0
     assert text.splitlines()[1].split() == ["suave:fg_spiral_high", "IN_ERROR_NFR"]
     _, text, _ = command(*words, *state, "--format", "csv")
-    assert list(csv.DictReader(io.StringIO(text))) == [{"g": "suave:fg_spiral_high", "s": "IN_ERROR_NFR"}]
+    assert list(csv.DictReader(io.StringIO(text))) == [
+        {"g": "suave:fg_spiral_high", "s": "IN_ERROR_NFR"}
+    ]
     _, text, _ = command(*words, "--format", "json")
     assert json.loads(text) == []

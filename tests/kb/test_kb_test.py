@@ -51,7 +51,9 @@ def test_a_fact_that_does_not_follow_is_a_failure_that_names_rule_and_values(sui
         """)
     (failure,) = run(test).failures
     assert failure[0] == "fg_status(fg_spiral_high, IN_ERROR_NFR) does not follow"
-    assert "QAWaterVisibility: lessThan(?measured, ?expected) does not hold: found 3.4" in failure[2]
+    assert (
+        "QAWaterVisibility: lessThan(?measured, ?expected) does not hold: found 3.4" in failure[2]
+    )
 
 
 def test_a_fact_that_must_not_follow_is_a_failure_with_its_derivation(suite, run):
@@ -119,11 +121,18 @@ def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_p
     assert "1 failed, 1 passed" in out
     root = ElementTree.parse(tmp_path / "out.xml").getroot()
     assert [(suite.get("tests"), suite.get("failures")) for suite in root] == [("2", "1")]
-    assert [case.get("name") for case in root.iter("testcase")] == ["not high below 3.5 m", "wrong <&>"]
+    assert [case.get("name") for case in root.iter("testcase")] == [
+        "not high below 3.5 m",
+        "wrong <&>",
+    ]
 
 
-def test_a_test_whose_state_cannot_be_decided_fails_and_the_others_run(suave_copy, command, tmp_path):
-    """Planning compares required values with an operator, which this quality attribute does not have."""
+def test_a_test_whose_state_cannot_be_decided_fails_and_the_others_run(
+    suave_copy, command, tmp_path
+):
+    """Planning compares required values with an operator, which this quality attribute does not
+    have.
+    """
     required = f'<rdf:Description rdf:about="{iri("o_maintain_motion")}"><tomasys:hasNFR rdf:resource="{iri("nfr")}"/>'
     depth = individual("depth", "QualityAttributeType")
     nfr = individual("nfr", "QAvalue", ("isQAtype", ":depth"), ("hasValue", "1.0"))
@@ -138,13 +147,19 @@ def test_a_test_whose_state_cannot_be_decided_fails_and_the_others_run(suave_cop
     status, out, _ = command("test", tests, "--ontology", ontology)
     assert status == 1
     assert "1 failed, 1 passed" in out
-    assert f"FAILED {tests}:2: undecided: the state cannot be decided: " in out and "qa_comparison_operator" in out
+    assert (
+        f"FAILED {tests}:2: undecided: the state cannot be decided: " in out
+        and "qa_comparison_operator" in out
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("- name: x\n  folows: []", "line 3, tests[0].folows: unknown key 'folows' (did you mean 'follows'?"),
+        (
+            "- name: x\n  folows: []",
+            "line 3, tests[0].folows: unknown key 'folows' (did you mean 'follows'?",
+        ),
         ("- name: x", "line 2, tests[0]: this test expects nothing"),
         ("- name: x\n  contradiction: maybe", "line 3, tests[0].contradiction: "),
     ],
@@ -160,28 +175,42 @@ def test_a_file_that_is_not_as_it_must_be_is_refused_with_line_key_and_remedy(su
     ("text", "said"),
     [
         ("follows: [fg_status(fg_spiral_high, IN)]", "in quotes in a YAML list"),
-        ('follows: ["fg_stats(fg_spiral_high, IN)"]', "no property 'fg_stats' (did you mean fg_status?)"),
+        (
+            'follows: ["fg_stats(fg_spiral_high, IN)"]',
+            "no property 'fg_stats' (did you mean fg_status?)",
+        ),
         ('follows: ["fg_status(fg_spiral_hig, IN)"]', "did you mean fg_spiral_high?"),
         ('follows: ["fg_status(?fg, IN)"]', "has a variable"),
         (
             'follows_not: ["fg_status(fg_spiral_low, IN_EROR_NFR)"]',
             "is not among the values of fg_status: it never matches (did you mean IN_ERROR_NFR?)",
         ),
-        ('follows_not: ["fd_realisability(fd_spiral_low, False)"]', "is not a boolean, the range of fd_realisability"),
+        (
+            'follows_not: ["fd_realisability(fd_spiral_low, False)"]',
+            "is not a boolean, the range of fd_realisability",
+        ),
         ("decides: {f_generate_search_path: fd_spiral_hihg}", "did you mean 'fd_spiral_high'?"),
         ("decides: {f_search: stays}", "there is no function 'f_search'"),
-        ('given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true', "'1 << 2' is not a region"),
+        (
+            'given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true',
+            "'1 << 2' is not a region",
+        ),
         (
             'given: {measurements: {water_visibility: "2 <= . < 1"}}\n  contradiction: true',
             "no number is in the region",
         ),
         ("given: {mission: nowhere, at_s: 3}\n  contradiction: true", "nowhere: no such folder"),
-        ("given: {mission: nowhere}\n  contradiction: true", "mission and at_s must be given together"),
+        (
+            "given: {mission: nowhere}\n  contradiction: true",
+            "mission and at_s must be given together",
+        ),
     ],
 )
 def test_what_a_knowledge_base_does_not_have_fails_the_test_with_a_remedy(suite, run, text, said):
     """So the others run: the same tests may be tried on other files."""
-    wrong, right = suite(f"- name: x\n  {text}\n- name: y\n  decides: {{f_generate_search_path: fd_spiral_high}}\n")
+    wrong, right = suite(
+        f"- name: x\n  {text}\n- name: y\n  decides: {{f_generate_search_path: fd_spiral_high}}\n"
+    )
     (failure,) = run(wrong).failures
     assert said in failure[0]
     assert run(right).passed
@@ -191,11 +220,22 @@ def test_regions_are_read_as_policies_write_them():
     scale = Scale((Decimal(1), Decimal(2)))
     for first, last in itertools.combinations_with_replacement(range(1, len(scale)), 2):
         region = parse_region(scale.text(first, last))
-        inside = [at for at in range(len(scale)) if region is not None and is_in(region, scale.value(at))]
-        assert inside == ([] if scale.text(first, last) in ("1", "2", "any") else list(range(first, last + 1)))
+        inside = [
+            at for at in range(len(scale)) if region is not None and is_in(region, scale.value(at))
+        ]
+        assert inside == (
+            [] if scale.text(first, last) in ("1", "2", "any") else list(range(first, last + 1))
+        )
     assert is_in(parse_region("not measured"), None)
 
 
 def test_ends_of_a_region_divide_the_kinds_of_values(knowledge):
-    found = [words for _, words in measurements_in(knowledge.base, {"water_visibility": parse_region("3 < . < 3.5")})]
-    assert found == [f"water_visibility {each}" for each in ("3 < . < 3.25", "3.25", "3.25 < . < 3.5")]
+    found = [
+        words
+        for _, words in measurements_in(
+            knowledge.base, {"water_visibility": parse_region("3 < . < 3.5")}
+        )
+    ]
+    assert found == [
+        f"water_visibility {each}" for each in ("3 < . < 3.25", "3.25", "3.25 < . < 3.5")
+    ]

@@ -49,11 +49,14 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
     expected = [
         record.t_s
         for record in result.knowledge
-        if record.state.grounded(SEARCH) is not None and dict(record.state.measurements)["water_visibility"] < 2.5
+        if record.state.grounded(SEARCH) is not None
+        and dict(record.state.measurements)["water_visibility"] < 2.5
     ]
     assert expected
     assert trial.times(FIRES) == pytest.approx(expected, abs=1e-6)
-    assert "?q = obs_water_visibility" in next(text for _, kind, text in trial.found if kind == FIRES)
+    assert "?q = obs_water_visibility" in next(
+        text for _, kind, text in trial.found if kind == FIRES
+    )
     assert trial.states == len(result.knowledge)
 
 
@@ -61,18 +64,26 @@ def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     folder, result = mission
     (trial,) = try_rules(folder, disabled="QAWaterVisibility")
     lost = [text for _, kind, text in trial.found if kind == DECIDES]
-    adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
+    adapted = [
+        event
+        for event in result.events
+        if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail
+    ]
     assert len(lost) == len(adapted) > 0
     assert all(each.startswith(f"{SEARCH}: no change instead of fd_") for each in lost)
 
 
 def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     folder, _ = mission
-    clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
+    clash = (
+        NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
+    )
     (trial,) = try_rules(folder, clash)
     problems = [text for _, kind, text in trial.found if kind == CONTRADICTS]
     assert problems
-    assert all("by the rules QAWaterVisibility (" in text and ", clash (" in text for text in problems)
+    assert all(
+        "by the rules QAWaterVisibility (" in text and ", clash (" in text for text in problems
+    )
     status, text, _ = command("try", clash, "--on", folder)
     assert status == 0
     assert f"states that would contradict themselves: {len(problems)}" in text
@@ -87,13 +98,23 @@ def test_a_folder_of_missions_is_tried_one_by_one(mission, command):
 
 @pytest.fixture(scope="module")
 def campaign(mission, tmp_path_factory):
-    """Two points of a sweep, each the mission: at the second the design that sees furthest is expected to see less."""
+    """Two points of a sweep, each the mission: at the second the design that sees furthest is
+    expected to see less.
+    """
     folder, result = mission
-    scenario = Scenario.model_validate(json.loads((folder / "mission.json").read_text())["scenario"])
+    scenario = Scenario.model_validate(
+        json.loads((folder / "mission.json").read_text())["scenario"]
+    )
     lines = [
         scenario_line(scenario),
         mission_line("metacontrol", 0, 1, result.knowledge),
-        mission_line("metacontrol", 1, 1, result.knowledge, {"knowledge.values": {"qa_water_visibility_high": 1.3}}),
+        mission_line(
+            "metacontrol",
+            1,
+            1,
+            result.knowledge,
+            {"knowledge.values": {"qa_water_visibility_high": 1.3}},
+        ),
     ]
     campaign = tmp_path_factory.mktemp("campaign")
     (campaign / CAMPAIGN_KNOWLEDGE_FILE).write_text("".join(lines))
@@ -104,12 +125,18 @@ def test_a_campaign_keeps_the_same_states_in_less_room(mission, campaign):
     folder, result = mission
     path = campaign / CAMPAIGN_KNOWLEDGE_FILE
     first, second = read_missions(path)
-    assert knowledge_text(first.records) == knowledge_text(second.records) == knowledge_text(result.knowledge)
+    assert (
+        knowledge_text(first.records)
+        == knowledge_text(second.records)
+        == knowledge_text(result.knowledge)
+    )
     assert (first.manager, first.point, first.run, second.point) == ("metacontrol", 0, 1, 1)
     assert len(path.read_text().splitlines()[1]) < len((folder / KNOWLEDGE_FILE).read_text()) / 2
 
 
-def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission, campaign, command):
+def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(
+    mission, campaign, command
+):
     alone = next(try_rules(mission[0], disabled="QAWaterVisibility"))
     first, second = try_rules(campaign, disabled="QAWaterVisibility")
     assert (first.mission, second.mission) == ("metacontrol, run 1", "metacontrol, run 1, point 1")
@@ -137,7 +164,9 @@ def test_a_damaged_record_of_a_campaign_is_reported(tmp_path, command, line, sai
 
 
 def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):
-    with pytest.raises(InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"):
+    with pytest.raises(
+        InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"
+    ):
         list(try_rules(tmp_path, NEAR))
     (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
     with pytest.raises(InputError, match=r"mission\.json: no such file"):

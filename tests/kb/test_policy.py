@@ -1,4 +1,6 @@
-"""kb policy: exhaustive over ranges of values, right at their ends, with what is wrong marked, each decision once."""
+"""kb policy: exhaustive over ranges of values, right at their ends, with what is wrong marked, each
+decision once.
+"""
 
 import csv
 import io
@@ -28,8 +30,12 @@ VISIBLE = "FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_vis
 
 
 def policy_between(knowledge, *numbers):
-    """A policy without failures, that tells measured values apart by few numbers: the fewer, the less to infer."""
-    space = replace(PolicySpace.of(knowledge.base, knowledge.settings), numbers=tuple(map(Decimal, numbers)))
+    """A policy without failures, that tells measured values apart by few numbers: the fewer, the
+    less to infer.
+    """
+    space = replace(
+        PolicySpace.of(knowledge.base, knowledge.settings), numbers=tuple(map(Decimal, numbers))
+    )
     return knowledge.policy(0, space=space)
 
 
@@ -41,15 +47,37 @@ def policy(knowledge):
 class TestScale:
     def test_places_follow_one_another_and_have_a_value_of_their_own(self):
         scale = Scale((Decimal(1), Decimal("2.5")))
-        assert list(map(scale.text, range(len(scale)))) == ["not measured", "< 1", "1", "1 < . < 2.5", "2.5", "> 2.5"]
+        assert list(map(scale.text, range(len(scale)))) == [
+            "not measured",
+            "< 1",
+            "1",
+            "1 < . < 2.5",
+            "2.5",
+            "> 2.5",
+        ]
         values = list(map(scale.value, range(len(scale))))
         assert values[0] is None
-        assert Decimal(0) < values[1] < values[2] == 1 < values[3] < values[4] == Decimal("2.5") < values[5]
+        assert (
+            Decimal(0)
+            < values[1]
+            < values[2]
+            == 1
+            < values[3]
+            < values[4]
+            == Decimal("2.5")
+            < values[5]
+        )
         assert scale.value(1) < scale.value(1, 2, 3) < 1 and scale.value(5, 0, 3) > Decimal("2.5")
 
     def test_neighbours_are_told_as_one_range(self):
         scale = Scale((Decimal(1), Decimal("2.5")))
-        spans = {(1, 2): "<= 1", (2, 3): "1 <= . < 2.5", (3, 4): "1 < . <= 2.5", (4, 5): ">= 2.5", (1, 5): "any"}
+        spans = {
+            (1, 2): "<= 1",
+            (2, 3): "1 <= . < 2.5",
+            (3, 4): "1 < . <= 2.5",
+            (4, 5): ">= 2.5",
+            (1, 5): "any",
+        }
         assert {span: scale.text(*span) for span in spans} == spans
         assert scale.text(0, 2) == "not measured or <= 1"
 
@@ -69,7 +97,8 @@ def test_combinations_count_what_they_stand_for():
 
 class TestPolicy:
     def test_says_how_many_states_it_covers(self, policy):
-        # 16 ranges, 13 reports, 4 search and 3 motion groundings, or 2 follow groundings in its place
+        # 16 ranges, 13 reports, 4 search and 3 motion groundings, or 2 follow groundings in its
+        # place
         assert policy.states == 16 * 13 * (3 * 4 + 3 * 2)
         assert len(policy.cases) == 16 * 3 * 18
 
@@ -89,22 +118,33 @@ class TestPolicy:
             reasoning = knowledge.infer(state)
             for function in policy.functions:
                 then = case[f"{function}_then"]
-                assert then == ("" if not case[f"{function}_now"] else reasoning.changes.get(function, "stays"))
+                assert then == (
+                    "" if not case[f"{function}_now"] else reasoning.changes.get(function, "stays")
+                )
             assert "; ".join(sorted(reasoning.inference.statuses)) == case["statuses"]
 
     def test_the_search_table_has_the_deployed_thresholds(self, policy):
         table, _, _ = function_table(policy, SEARCH)
         ranges = ["not measured", "< 1.25", "1.25 <= . < 2.25", "2.25 <= . < 3.25", ">= 3.25"]
         assert table.headings == ["now", "components", *ranges]
-        (from_high,) = {tuple(row[2:]) for row in table.rows if row[0] == "fd_spiral_high" and "no report" in row[1]}
+        (from_high,) = {
+            tuple(row[2:])
+            for row in table.rows
+            if row[0] == "fd_spiral_high" and "no report" in row[1]
+        }
         assert from_high == ("stays", "none left", "fd_spiral_low", "fd_spiral_medium", "stays")
 
     def test_a_contradiction_is_marked_where_it_is(self, tmp_path):
-        file = rules_file(tmp_path, f'clash: {VISIBLE} ^ lessThan(?v, 1.5) -> fg_status(?fg, "IN_ERROR_FR")\n')
+        file = rules_file(
+            tmp_path, f'clash: {VISIBLE} ^ lessThan(?v, 1.5) -> fg_status(?fg, "IN_ERROR_FR")\n'
+        )
         found = policy_between(KnowledgeBase.load(rules=[file]), "1.25", "1.5")
         marked = found.marked("inconsistent")
         by_design = marked.groupby(f"{SEARCH}_now")["water_visibility"].agg(set).to_dict()
-        low, high = ({found.space.scale.text(at) for at in by_design[f"fd_spiral_{name}"]} for name in ("low", "high"))
+        low, high = (
+            {found.space.scale.text(at) for at in by_design[f"fd_spiral_{name}"]}
+            for name in ("low", "high")
+        )
         assert set(by_design) == {"fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"}
         assert "1.25 < . < 1.5" in high - low and "1.5" not in high
         for problem in marked["problem"]:
@@ -128,9 +168,12 @@ class TestPolicy:
 
     def test_a_rule_that_computes_takes_the_proof_away(self, tmp_path):
         file = rules_file(
-            tmp_path, f'sum: {VISIBLE} ^ add(?w, ?v, 1) ^ lessThan(?w, 2) -> fg_status(?fg, "IN_ERROR_NFR")\n'
+            tmp_path,
+            f'sum: {VISIBLE} ^ add(?w, ?v, 1) ^ lessThan(?w, 2) -> fg_status(?fg, "IN_ERROR_NFR")\n',
         )
-        assert policy_between(KnowledgeBase.load(rules=[file]), "2").no_proof == ("rule sum computes with add",)
+        assert policy_between(KnowledgeBase.load(rules=[file]), "2").no_proof == (
+            "rule sum computes with add",
+        )
 
     def test_an_attribute_that_nothing_looks_at_is_left_out(self, knowledge, tmp_path):
         settings = ManagingSettings(measured=("battery_level", "water_visibility"))
@@ -140,10 +183,15 @@ class TestPolicy:
             "flat: isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.2) -> "
             "fd_realisability(fd_spiral_high, false)\n",
         )
-        assert PolicySpace.of(KnowledgeBase.load(rules=[file]).base, settings).attributes == settings.measured
+        assert (
+            PolicySpace.of(KnowledgeBase.load(rules=[file]).base, settings).attributes
+            == settings.measured
+        )
 
     def test_too_many_states_are_refused(self, knowledge):
-        many = PolicySpace(("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ())
+        many = PolicySpace(
+            ("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ()
+        )
         with pytest.raises(InputError, match="kinds of states, which is too many"):
             knowledge.policy(9, space=many)
 
@@ -157,7 +205,8 @@ def test_the_csv_file_has_every_cell(command, tmp_path, policy):
     row = next(
         row
         for row in rows
-        if (row["water_visibility"], row[f"{SEARCH}_now"]) == ("2.25", "fd_spiral_high") and not row["components"]
+        if (row["water_visibility"], row[f"{SEARCH}_now"]) == ("2.25", "fd_spiral_high")
+        and not row["components"]
     )
     assert row[f"{SEARCH}_then"] == "fd_spiral_medium"
     assert picture.read_bytes().startswith(b"\x89PNG")
@@ -194,11 +243,18 @@ def extended(tmp_path: Path, rule: str) -> KnowledgeBase:
 
 
 def check_like_deciding_each(knowledge: KnowledgeBase, policy: Policy, most: int) -> None:
-    for case in policy.cases.sample(min(most, len(policy.cases)), random_state=5).to_dict("records"):
+    for case in policy.cases.sample(min(most, len(policy.cases)), random_state=5).to_dict(
+        "records"
+    ):
         alone = knowledge.outcome(Situation(case["state"]))
         asked = [each.function for each in case["state"].objectives]
-        assert [case[f"{name}_then"] for name in asked] == list(map(alone.choice, asked)), str(case["state"])
-        assert (case["statuses"], case["problem"]) == ("; ".join(alone.statuses), alone.contradiction)
+        assert [case[f"{name}_then"] for name in asked] == list(map(alone.choice, asked)), str(
+            case["state"]
+        )
+        assert (case["statuses"], case["problem"]) == (
+            "; ".join(alone.statuses),
+            alone.contradiction,
+        )
 
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
@@ -218,7 +274,11 @@ def test_the_policy_of_one_attribute_is_that_of_deciding_each_state(small):
 
 def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_path: Path) -> None:
     with_numbers = f"own: {OF_TWO} ^ lessThan(?v, 3.5) ^ lessThan(?w, 0.5) -> fd_realisability(fd_spiral_high, false)"
-    for rule, are_independent in (("", True), (with_numbers, True), (RULES["two attributes are compared"], False)):
+    for rule, are_independent in (
+        ("", True),
+        (with_numbers, True),
+        (RULES["two attributes are compared"], False),
+    ):
         knowledge = extended(tmp_path, rule)
         states = States.of(knowledge.base, knowledge.settings, 0, knowledge.space)
         different = len(set(map(kind_of(knowledge.base, knowledge.space), states)))
@@ -228,6 +288,8 @@ def test_attributes_that_no_rule_relates_count_each_for_its_own_functions(tmp_pa
 @pytest.mark.slow
 def test_all_states_of_the_extended_mission_are_decided_in_a_minute():
     counts: list[tuple[int, int]] = []
-    policy = KnowledgeBase.load(scenario="extended").policy(2, on_count=lambda *count: counts.append(count))
+    policy = KnowledgeBase.load(scenario="extended").policy(
+        2, on_count=lambda *count: counts.append(count)
+    )
     assert len(policy.cases) > 90_000
     assert counts[0][0] == 0 < counts[0][1] < len(policy.cases) / 10

@@ -1,4 +1,6 @@
-"""kb explain: derivations hold in Pellet step by step, decisions name the filter, contradictions name the rules."""
+"""kb explain: derivations hold in Pellet step by step, decisions name the filter, contradictions
+name the rules.
+"""
 
 import pytest
 from hypothesis import given, settings
@@ -36,7 +38,9 @@ def nodes(derivation):
     statuses=st.lists(st.sampled_from(["FALSE", "RECOVERED"]), max_size=2),
     visibility=st.sampled_from(["1", "1.25", "1.2500001", "2.25", "3", "4"]),
 )
-def test_every_inferred_fact_has_a_tree_down_to_asserted_facts(knowledge, search, motion, statuses, visibility):
+def test_every_inferred_fact_has_a_tree_down_to_asserted_facts(
+    knowledge, search, motion, statuses, visibility
+):
     state = knowledge.state(
         groundings={SEARCH: search, MOTION: motion},
         components={f"c_thruster_{n}": status for n, status in enumerate(statuses, start=1)},
@@ -50,8 +54,12 @@ def test_every_inferred_fact_has_a_tree_down_to_asserted_facts(knowledge, search
         assert node.fact in inference.facts | inference.asserted
         if node.source == "rule":
             body = rules[node.rule].body
-            assert {name for name, _ in node.bindings} == {name for atom in body for name in atom.variables()}
-            assert len(node.premises) == sum(atom.kind in ("class", "object", "data") for atom in body)
+            assert {name for name, _ in node.bindings} == {
+                name for atom in body for name in atom.variables()
+            }
+            assert len(node.premises) == sum(
+                atom.kind in ("class", "object", "data") for atom in body
+            )
         else:
             assert node.fact in inference.asserted
             assert not node.premises
@@ -61,7 +69,9 @@ def test_a_chain_of_rules_is_told_with_its_bindings(knowledge, in_error):
     (tree,) = knowledge.explain(in_error, f"o_status(o_{SEARCH[2:]}, IN_ERROR_NFR)").facts
     assert (tree.rule, tree.rules()) == ("S1b", {"S1b", "QAWaterVisibility"})
     error = next(each for each in tree.premises if each.source == "rule")
-    assert {("expected", "3.25"), ("measured", "1.8")} <= {(name, str(value)) for name, value in error.bindings}
+    assert {("expected", "3.25"), ("measured", "1.8")} <= {
+        (name, str(value)) for name, value in error.bindings
+    }
 
 
 def test_a_fact_that_the_schema_adds_names_it(suave_copy):
@@ -86,7 +96,10 @@ def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path
         "fd_realisability(fd_spiral_high, false)\n"
     )
     knowledge = KnowledgeBase.load(rules=[rules])
-    trees = [knowledge.explain(knowledge.state(), "fd_realisability(fd_spiral_high, false)").facts[0] for _ in range(3)]
+    trees = [
+        knowledge.explain(knowledge.state(), "fd_realisability(fd_spiral_high, false)").facts[0]
+        for _ in range(3)
+    ]
     assert len(set(trees)) == 1
     assert dict(trees[0].bindings)["q"] == "qa_water_visibility_high"
 
@@ -109,28 +122,48 @@ class TestDecisions:
 
     def test_a_design_that_is_merely_worse_is_compared_with_the_best(self, knowledge):
         (decision,) = knowledge.explain(knowledge.state(), "why not fd_spiral_low?").decisions
-        assert decision[0].endswith(": fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high")
+        assert decision[0].endswith(
+            ": fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
+        )
 
     def test_nothing_to_adapt_is_said(self, knowledge):
-        state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
+        state = knowledge.state(
+            groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25}
+        )
         (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
         assert "requires no adaptation, so fd_spiral_low stays" in decision[0]
         (decision,) = knowledge.explain(state, "why fd_recover_thrusters?").decisions
         assert "f_maintain_motion has no objective in this state" in decision[0]
 
     def test_with_no_design_left_the_present_one_stays(self, knowledge):
-        state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1})
+        state = knowledge.state(
+            groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1}
+        )
         (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
-        assert ": no design is left, fd_spiral_low stays; fd_spiral_high is left out: " in decision[0]
+        assert (
+            ": no design is left, fd_spiral_low stays; fd_spiral_high is left out: " in decision[0]
+        )
 
 
 @pytest.mark.parametrize(
     ("question", "said"),
     [
-        ("fg_status(fg_spiral_high, IN_ERROR_FR)", "does not follow in this state (fg_status of fg_spiral_high: IN_E"),
-        ("fg_status(fg_spiral_hi, IN_ERROR_FR)", "there is no individual 'fg_spiral_hi' (did you mean fg_spiral_high?"),
-        ("why fd_spiral_lo?", "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'"),
-        ("fg_statu(fg_spiral_high, IN_ERROR_FR)", "there is no property 'fg_statu' (did you mean fg_status?"),
+        (
+            "fg_status(fg_spiral_high, IN_ERROR_FR)",
+            "does not follow in this state (fg_status of fg_spiral_high: IN_E",
+        ),
+        (
+            "fg_status(fg_spiral_hi, IN_ERROR_FR)",
+            "there is no individual 'fg_spiral_hi' (did you mean fg_spiral_high?",
+        ),
+        (
+            "why fd_spiral_lo?",
+            "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'",
+        ),
+        (
+            "fg_statu(fg_spiral_high, IN_ERROR_FR)",
+            "there is no property 'fg_statu' (did you mean fg_status?",
+        ),
         ("because", "'because' is not a question about a state"),
         ("fg_status(", "is not a fact"),
     ],
@@ -143,7 +176,9 @@ def test_a_question_that_has_no_answer_is_told_so(knowledge, in_error, question,
 
 def test_of_what_does_not_hold_that_is_told_which_no_state_can_make_hold(knowledge):
     """No thruster is required by fd_spiral_high: whether one has failed does not matter."""
-    with pytest.raises(InputError, match=r"rule compError: requiredBy\(\?c, \?fd\) does not hold: found requiredBy"):
+    with pytest.raises(
+        InputError, match=r"rule compError: requiredBy\(\?c, \?fd\) does not hold: found requiredBy"
+    ):
         knowledge.explain(knowledge.state(), "fd_realisability(fd_spiral_high, false)")
 
 
@@ -152,7 +187,8 @@ def test_a_fact_that_does_not_follow_names_the_rule_that_comes_nearest(knowledge
     status, _, error = command("explain", "fg_status(fg_spiral_high, IN_ERROR_NFR)", *clear)
     assert (status, error.count("\n")) == (2, 1)
     assert (
-        "does not follow in this state (fg_status of fg_spiral_high: none; rule QAWaterVisibility: lessThan(" in error
+        "does not follow in this state (fg_status of fg_spiral_high: none; rule QAWaterVisibility: lessThan("
+        in error
     )
     assert "does not hold: found 3.5 (?measured), needed less than 3.25" in error
 
@@ -161,10 +197,14 @@ def test_a_contradiction_names_the_rules(tmp_path):
     rules = tmp_path / "clash.swrl"
     rules.write_text(CLASH)
     knowledge = KnowledgeBase.load(rules=[rules])
-    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
+    state = knowledge.state(
+        groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8}
+    )
     with pytest.raises(KnowledgeError, match=r"by the rules QAWaterVisibility \(.*, clash \("):
         knowledge.explain(state)
-    above = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2})
+    above = knowledge.state(
+        groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2}
+    )
     assert knowledge.explain(above).facts
 
 
@@ -198,7 +238,9 @@ def test_what_axioms_conclude_is_explained_inferred_and_queried(suave_copy):
         (derivation,) = knowledge.explain(state, fact).facts
         assert derivation.source == "axioms"
         assert derivation.axioms
-    result = knowledge.query("SELECT ?p WHERE { suave:hull suave:hasPart ?p }", state, inferred=True)
+    result = knowledge.query(
+        "SELECT ?p WHERE { suave:hull suave:hasPart ?p }", state, inferred=True
+    )
     assert result.rows == (("suave:c_thruster_1",), ("suave:motor",))
     assert knowledge.decide(state).plan == knowledge.infer(state).plan
 
@@ -227,7 +269,9 @@ def test_a_reason_does_not_rest_on_what_it_explains(tmp_path, circular, told, un
     """The first two rules alone conclude each other's bodies; only the third starts from a fact."""
     (tmp_path / "own.swrl").write_text(circular + "\n", encoding="utf-8")
     knowledge = KnowledgeBase.load(rules=tmp_path / "own.swrl")
-    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, components={"c_thruster_1": "FALSE"})
+    state = knowledge.state(
+        groundings={SEARCH: "fd_spiral_high"}, components={"c_thruster_1": "FALSE"}
+    )
     text = str(knowledge.explain(state, "fd_realisability(fd_spiral_high, false)"))
     places = [text.index(name) for name in told]
     assert places == sorted(places) and not any(name in text for name in untold)

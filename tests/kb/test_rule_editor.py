@@ -1,4 +1,6 @@
-"""Rules of OWL files are suave_copy in place: the rest of the file stays as it was, byte for byte."""
+"""Rules of OWL files are suave_copy in place: the rest of the file stays as it was, byte for
+byte.
+"""
 
 import re
 import stat
@@ -40,7 +42,9 @@ def as_protege_writes(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     entities = '<!DOCTYPE rdf:RDF [\n    <!ENTITY swrl "http://www.w3.org/2003/11/swrl#" >\n]>\n'
     head, _, rest = text.partition("?>\n")
-    rest = rest.replace('rdf:resource="http://www.w3.org/2003/11/swrl#', 'rdf:resource="&swrl;').replace("    ", "\t")
+    rest = rest.replace(
+        'rdf:resource="http://www.w3.org/2003/11/swrl#', 'rdf:resource="&swrl;'
+    ).replace("    ", "\t")
     path.write_bytes(f"{head}?>\n{entities}{rest}".replace("\n", "\r\n").encode())
 
 
@@ -63,9 +67,13 @@ def test_add_switch_and_remove(owl, style):
     (new,) = said(owl) - before
     assert new == ("Battery", BATTERY.partition(": ")[2], True)
     assert (owl.parent / "suave.owl.bak").read_bytes() == original
-    at = next(n for n, (one, other) in enumerate(zip(original, added, strict=False)) if one != other)
+    at = next(
+        n for n, (one, other) in enumerate(zip(original, added, strict=False)) if one != other
+    )
     rest = original[at:]
-    assert original[:at] + added[at : len(added) - len(rest)] + rest == added  # nothing but an insertion
+    assert (
+        original[:at] + added[at : len(added) - len(rest)] + rest == added
+    )  # nothing but an insertion
 
     assert set_enabled(owl, "Battery", enabled=False)
     assert said(owl) == {*before, (new[0], new[1], False)}
@@ -105,7 +113,9 @@ def test_a_file_of_rules_is_added_and_a_rule_alone_or_none(owl, tmp_path):
     assert [rule.name for rule in add_rules(owl, str(rules))] == ["Battery", "Second"]
     added = said(owl) - before
     assert {(name, enabled) for name, _, enabled in added} == {("Battery", True), ("Second", False)}
-    rules.write_text("Third: Objective(?o) -> Role(?o)\nBattery: Objective(?o) -> Role(?o)\n", encoding="utf-8")
+    rules.write_text(
+        "Third: Objective(?o) -> Role(?o)\nBattery: Objective(?o) -> Role(?o)\n", encoding="utf-8"
+    )
     with pytest.raises(KnowledgeError, match="there is a rule Battery already"):
         add_rules(owl, str(rules))
     assert said(owl) == before | added
@@ -114,7 +124,9 @@ def test_a_file_of_rules_is_added_and_a_rule_alone_or_none(owl, tmp_path):
 def test_of_what_is_added_nothing_stays_in_a_file_whose_rules_are_marked_but_whose_terms_are_declared_elsewhere(
     tmp_path,
 ):
-    """As in the exemplar's mros.owl: neither the mark of its rules nor greaterThan is declared in it."""
+    """As in the exemplar's mros.owl: neither the mark of its rules nor greaterThan is declared in
+    it.
+    """
     path = write_exemplar_files(shipped_folder("ontology"), tmp_path)["mros"]
     original = path.read_bytes()
     add_rules(path, "Mine: hasValue(?mine, ?v) ^ greaterThan(?v, 1) -> QAvalue(?mine)")
@@ -124,12 +136,16 @@ def test_of_what_is_added_nothing_stays_in_a_file_whose_rules_are_marked_but_who
 
 def test_only_the_mark_is_written_when_there_is_none(owl):
     text = owl.read_text(encoding="utf-8")
-    mark = next(line for line in text.splitlines(keepends=True) if "<swrla:isRuleEnabled rdf" in line)
+    mark = next(
+        line for line in text.splitlines(keepends=True) if "<swrla:isRuleEnabled rdf" in line
+    )
     owl.write_text(text.replace(mark, ""), encoding="utf-8")
     set_enabled(owl, "QAWaterVisibility", enabled=False)
     assert {name for name, _, enabled in said(owl) if not enabled} == {"QAWaterVisibility"}
     written = re.sub(
-        r"<swrla:isRuleEnabled xmlns[^>]*>false</swrla:isRuleEnabled>", "", owl.read_text(encoding="utf-8")
+        r"<swrla:isRuleEnabled xmlns[^>]*>false</swrla:isRuleEnabled>",
+        "",
+        owl.read_text(encoding="utf-8"),
     )
     assert written == text.replace(mark, "")
 
@@ -137,9 +153,13 @@ def test_only_the_mark_is_written_when_there_is_none(owl):
 def test_an_added_rule_infers_what_it_does_as_text(owl, tmp_path):
     (tmp_path / "mine.swrl").write_text(BATTERY, encoding="utf-8")
     state = KnowledgeState.of(
-        [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 4}
+        [ObjectiveState(SEARCH)],
+        groundings={SEARCH: "fd_spiral_high"},
+        measurements={"water_visibility": 4},
     )
-    as_text = Reasoner(Ontology.load([owl], rules=[tmp_path / "mine.swrl"]), "pellet").analyze(state)
+    as_text = Reasoner(Ontology.load([owl], rules=[tmp_path / "mine.swrl"]), "pellet").analyze(
+        state
+    )
     add_rules(owl, BATTERY)
     assert Reasoner(Ontology.load([owl]), "pellet").analyze(state).facts == as_text.facts
     assert as_text.values("fd_spiral_low", "fd_error_log") == ("o_generate_search_path",)
@@ -168,9 +188,15 @@ def test_rules_without_a_prefix_for_swrl_declare_it(tmp_path):
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (lambda path: add_rules(path, "A: Objective(?o -> Role(?o)"), "the rule: line 1, column 17"),
+        (
+            lambda path: add_rules(path, "A: Objective(?o -> Role(?o)"),
+            "the rule: line 1, column 17",
+        ),
         (lambda path: add_rules(path, "A: Objective(?o) -> Role(?p)"), "?p occurs in the head"),
-        (lambda path: add_rules(path, "QAWaterVisibility: Objective(?o) -> Role(?o)"), "there is a rule"),
+        (
+            lambda path: add_rules(path, "QAWaterVisibility: Objective(?o) -> Role(?o)"),
+            "there is a rule",
+        ),
         (lambda path: add_rules(path, ""), "0 rules instead of one"),
         (lambda path: remove_rule(path, "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
         (lambda path: set_enabled(path, "S1a", enabled=False), "there is no rule S1a"),

@@ -31,7 +31,8 @@ WHOLE = f"""
 rdf:datatype="{XSD}double">3.0</suave:depth_class></rdf:Description>
 """
 
-# What is asked, the rule, the state (and what is asserted besides), what the ontology has more, and the answer.
+# What is asked, the rule, the state (and what is asserted besides), what the ontology has more, and
+# the answer.
 CASES = {
     "a comparison that is misspelt": (
         f"r: {MEASURED} ^ swrlb:lesThan(?v, 3.0) -> fd_realisability(fd_spiral_high, false)",
@@ -92,7 +93,10 @@ CASES = {
     ),
     "a truth value where there is text": (
         None,
-        {"components": {"c_thruster_1": "FALSE"}, "facts": ["Binding(b)", "binding_component(b, c_thruster_1)"]},
+        {
+            "components": {"c_thruster_1": "FALSE"},
+            "facts": ["Binding(b)", "binding_component(b, c_thruster_1)"],
+        },
         "",
         'c_status(?c, false) does not hold: found c_status "FALSE" of c_thruster_1, needed false; string and boolean '
         'never match, even where they look alike: write "FALSE"',
@@ -159,7 +163,8 @@ CASES = {
     ),
     "a state that contradicts itself": (
         None,
-        HIGH | {"measurements": {"water_visibility": 1}, "facts": ["fg_status(fg_spiral_high, OK)"]},
+        HIGH
+        | {"measurements": {"water_visibility": 1}, "facts": ["fg_status(fg_spiral_high, OK)"]},
         "",
         "nothing follows, as the state contradicts itself: ",
         "S1b",
@@ -210,11 +215,18 @@ def test_numbers_match_where_they_do_in_pellet(tmp_path):
         for name, thing in itertools.product(NUMBERS, repeat=2)
         if questions.of(rules[f"is_{name}"], KnowledgeState(), {"x": NS + thing}).fires
     }
-    assert answers == {(fact.subject, fact.value) for fact in found if fact.property == "is" and fact.value != "sum"}
+    assert answers == {
+        (fact.subject, fact.value)
+        for fact in found
+        if fact.property == "is" and fact.value != "sum"
+    }
 
 
 ASKED = {  # with differentFrom(?x, ?y), or several rules with sameAs and differentFrom, Pellet's inferences are chance
-    "what is the same": (("c_thruster_4", "owl:sameAs", "c_thruster_5"), "sameAs(c_thruster_4, ?x) ^ Component(?x)"),
+    "what is the same": (
+        ("c_thruster_4", "owl:sameAs", "c_thruster_5"),
+        "sameAs(c_thruster_4, ?x) ^ Component(?x)",
+    ),
     "what is different": (
         ("c_thruster_4", "owl:sameAs", "c_thruster_5"),
         ("c_thruster_6", "owl:differentFrom", "c_thruster_5"),
@@ -227,20 +239,33 @@ ASKED = {  # with differentFrom(?x, ?y), or several rules with sameAs and differ
         *(f"note(?x, {text})" for text in ('""', '"()"', '"hallo"', '"hallo"@de', '"hallo"@en')),
         "note(?x, ?v) ^ stringConcat(?w, ?v, ?v) ^ note(?y, ?w) ^ Component(?y)",
     ),
-    "not a number": (("c_thruster_1", f'suave:note rdf:datatype="{XSD}double"', "NaN"), "note(?x, ?v) ^ Component(?x)"),
+    "not a number": (
+        ("c_thruster_1", f'suave:note rdf:datatype="{XSD}double"', "NaN"),
+        "note(?x, ?v) ^ Component(?x)",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", ASKED)
 def test_a_rule_fires_and_is_explained_where_it_fires_in_owlready2(name, suave_copy, tmp_path):
-    asserted, bodies = ([each for each in ASKED[name] if isinstance(each, kind)] for kind in (tuple, str))
+    asserted, bodies = (
+        [each for each in ASKED[name] if isinstance(each, kind)] for kind in (tuple, str)
+    )
     extra = f'<owl:DatatypeProperty rdf:about="{SUAVE}note"/><owl:DatatypeProperty rdf:about="{SUAVE}got"/>'
     for thing, element, value in asserted:
         tag = element.split()[0]
-        filled = f'<{element} rdf:resource="{SUAVE}{value}"/>' if "owl:" in tag else f"<{element}>{value}</{tag}>"
+        filled = (
+            f'<{element} rdf:resource="{SUAVE}{value}"/>'
+            if "owl:" in tag
+            else f"<{element}>{value}</{tag}>"
+        )
         extra += f'<rdf:Description rdf:about="{SUAVE}{thing}" xmlns:suave="{SUAVE}">{filled}</rdf:Description>'
-    (tmp_path / "own.swrl").write_text("".join(f'r{n}: {each} -> got(?x, "r{n}")\n' for n, each in enumerate(bodies)))
-    loaded = KnowledgeBase.load(suave_copy(extra), rules=tmp_path / "own.swrl", reasoner="owlready2")
+    (tmp_path / "own.swrl").write_text(
+        "".join(f'r{n}: {each} -> got(?x, "r{n}")\n' for n, each in enumerate(bodies))
+    )
+    loaded = KnowledgeBase.load(
+        suave_copy(extra), rules=tmp_path / "own.swrl", reasoner="owlready2"
+    )
     facts = loaded.infer(loaded.state()).inference.facts
     got = {(str(fact.subject), str(fact.value)) for fact in facts if fact.property == "got"}
     questions = RuleQuestions(loaded.base)
@@ -248,10 +273,16 @@ def test_a_rule_fires_and_is_explained_where_it_fires_in_owlready2(name, suave_c
     components = loaded.base.model.components.items()
     pairs = itertools.product(components, own)
     fires = {
-        (thing[0], rule.name) for thing, rule in pairs if questions.of(rule, loaded.state(), {"x": thing[1]}).fires
+        (thing[0], rule.name)
+        for thing, rule in pairs
+        if questions.of(rule, loaded.state(), {"x": thing[1]}).fires
     }
     assert fires == got != set()
-    trees = {(str(each.fact.subject), each.rule) for each in loaded.explain(loaded.state()).facts if each.rule}
+    trees = {
+        (str(each.fact.subject), each.rule)
+        for each in loaded.explain(loaded.state()).facts
+        if each.rule
+    }
     assert got <= trees
 
 
@@ -259,17 +290,26 @@ def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(kno
     from tests.helpers.owl_text import rule
 
     broken = rule(
-        "broken", "QAvalue(?q) ^ hasValue(?q, ?v) ^ lessThn(?v, 3.0) -> fd_realisability(:fd_spiral_high, false)"
+        "broken",
+        "QAvalue(?q) ^ hasValue(?q, ?v) ^ lessThn(?v, 3.0) -> fd_realisability(:fd_spiral_high, false)",
     )
-    questions = RuleQuestions(open_base(load_scenario("seams2023", ontologies=[suave_copy(broken)])))
-    assert "there is no builtin lessThn in Pellet" in str(questions.why_not("broken", knowledge.state()))
-    assert "it fires" in str(questions.why_not("compRecov", knowledge.state(components={"c_thruster_2": "RECOVERED"})))
+    questions = RuleQuestions(
+        open_base(load_scenario("seams2023", ontologies=[suave_copy(broken)]))
+    )
+    assert "there is no builtin lessThn in Pellet" in str(
+        questions.why_not("broken", knowledge.state())
+    )
+    assert "it fires" in str(
+        questions.why_not("compRecov", knowledge.state(components={"c_thruster_2": "RECOVERED"}))
+    )
 
 
 def test_the_command_takes_states_by_name_by_file_and_from_a_mission(command, tmp_path):
     state = tmp_path / "state.yaml"
     state.write_text("groundings: {f_generate_search_path: fd_spiral_high}\n", encoding="utf-8")
-    status, out, _ = command("why-not", "QAWaterVisibility", "--at", state, "--at", "water_visibility=3.4")
+    status, out, _ = command(
+        "why-not", "QAWaterVisibility", "--at", state, "--at", "water_visibility=3.4"
+    )
     assert status == 0
     assert out.endswith("found 3.4 (?measured), needed less than 3.25 (?expected)\n")
     status, _, said = command("why-not", "S1a", "--at", "water_visibilty=3.4")

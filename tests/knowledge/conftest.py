@@ -1,4 +1,6 @@
-"""What the tests of the knowledge room share: the shipped ontologies, edited copies, states, and no network."""
+"""What the tests of the knowledge room share: the shipped ontologies, edited copies, states, and no
+network.
+"""
 
 import socket
 from pathlib import Path

@@ -22,7 +22,13 @@ from tests.helpers.number_ontology import numbers_ontology
 from tests.helpers.owl_text import XSD
 
 NS = Namespace("http://example.org/generated#")
-_BODIES = ("related1(?x, ?y)", "related2(?x, ?y)", "Kind1(?x)", "Kind2(?x)", "size1(?x, ?s) ^ swrlb:greaterThan(?s, 2)")
+_BODIES = (
+    "related1(?x, ?y)",
+    "related2(?x, ?y)",
+    "Kind1(?x)",
+    "Kind2(?x)",
+    "size1(?x, ?s) ^ swrlb:greaterThan(?s, 2)",
+)
 _HEADS = ("Kind3(?x)", "Kind4(?x)", "related3(?x, ?x)", "flag1(?x, true)", 'label1(?x, "seen")')
 
 
@@ -35,7 +41,11 @@ def write_ontology(number: int, folder: Path) -> tuple[Path, Path]:
     data = [NS["size1"], NS["size2"], NS["flag1"], NS["label1"]]
     things = [NS[f"thing{n}"] for n in range(1, 6)]
     graph.add((URIRef(str(NS)[:-1]), RDF.type, OWL.Ontology))
-    for kind, names in ((OWL.Class, classes), (OWL.ObjectProperty, objects), (OWL.DatatypeProperty, data)):
+    for kind, names in (
+        (OWL.Class, classes),
+        (OWL.ObjectProperty, objects),
+        (OWL.DatatypeProperty, data),
+    ):
         for name in names:
             graph.add((name, RDF.type, kind))
     for thing in things:
@@ -44,20 +54,39 @@ def write_ontology(number: int, folder: Path) -> tuple[Path, Path]:
         for name in draw.sample(objects, 2):
             graph.add((thing, name, draw.choice(things)))
         if draw.random() < 0.7:
-            graph.add((thing, NS.size1, Literal(str(draw.choice([1, 2, 3])), datatype=URIRef(XSD + "decimal"))))
+            graph.add(
+                (
+                    thing,
+                    NS.size1,
+                    Literal(str(draw.choice([1, 2, 3])), datatype=URIRef(XSD + "decimal")),
+                )
+            )
         if draw.random() < 0.4:
-            graph.add((thing, NS.label1, Literal(draw.choice(["one", "two"]), datatype=URIRef(XSD + "string"))))
+            graph.add(
+                (
+                    thing,
+                    NS.label1,
+                    Literal(draw.choice(["one", "two"]), datatype=URIRef(XSD + "string")),
+                )
+            )
     for _ in range(draw.randint(4, 8)):
         _add_axiom(graph, draw, classes, objects, things)
     owl, rules = folder / f"generated{number}.owl", folder / f"generated{number}.swrl"
     graph.serialize(owl, format="xml")
-    chosen = [f"rule{n}: {draw.choice(_BODIES)} -> {draw.choice(_HEADS)}\n" for n in range(draw.randint(0, 3))]
+    chosen = [
+        f"rule{n}: {draw.choice(_BODIES)} -> {draw.choice(_HEADS)}\n"
+        for n in range(draw.randint(0, 3))
+    ]
     rules.write_text("".join(chosen))
     return owl, rules
 
 
 def _add_axiom(
-    graph: Graph, draw: random.Random, classes: list[URIRef], objects: list[URIRef], things: list[URIRef]
+    graph: Graph,
+    draw: random.Random,
+    classes: list[URIRef],
+    objects: list[URIRef],
+    things: list[URIRef],
 ) -> None:
     one, other = draw.sample(classes, 2)
     name, second = draw.sample(objects, 2)
@@ -73,7 +102,9 @@ def _add_axiom(
         case 4:
             graph.add((name, RDF.type, OWL.SymmetricProperty))
         case 5:
-            graph.add((name, RDF.type, OWL.FunctionalProperty))  # two values are then the same individual
+            graph.add(
+                (name, RDF.type, OWL.FunctionalProperty)
+            )  # two values are then the same individual
         case 6:
             graph.add((name, RDFS.domain, one))
             graph.add((second, RDFS.range, other))
@@ -82,12 +113,16 @@ def _add_axiom(
             graph.add((first, OWL.sameAs, same))
         case 8:
             value = Literal(draw.choice(["one", "two"]), datatype=URIRef(XSD + "string"))
-            graph.add((one, OWL.equivalentClass, _restriction(graph, NS.label1, OWL.hasValue, value)))
+            graph.add(
+                (one, OWL.equivalentClass, _restriction(graph, NS.label1, OWL.hasValue, value))
+            )
         case 9:
             restriction = _restriction(graph, name, OWL.hasValue, draw.choice(things))
             graph.add((one, draw.choice([OWL.equivalentClass, RDFS.subClassOf]), restriction))
         case 10:
-            graph.add((one, OWL.equivalentClass, _restriction(graph, name, OWL.someValuesFrom, other)))
+            graph.add(
+                (one, OWL.equivalentClass, _restriction(graph, name, OWL.someValuesFrom, other))
+            )
         case 11:
             graph.add((one, RDFS.subClassOf, _restriction(graph, name, OWL.allValuesFrom, other)))
         case 12:
@@ -117,7 +152,8 @@ def _restriction(graph: Graph, name: URIRef, kind: URIRef, value: Node) -> BNode
 
 
 THRESHOLDS = ("1.25", "2.25", "3.25")
-#: Just below, on and just above each threshold, and numbers that binary floats write with an exponent.
+#: Just below, on and just above each threshold, and numbers that binary floats write with an
+# exponent.
 VISIBILITIES = [
     *(f"{float(t) + step:.9f}" for t in THRESHOLDS for step in (-1e-9, 0.0, 1e-9)),
     *("0.00001", "2.71828182845904523536", "12345678901234567890"),
@@ -133,7 +169,9 @@ def random_state(draw: random.Random) -> KnowledgeState:
     functions = draw.sample(sorted(designs), draw.randint(1, 3))
     grounded = {name: draw.choice(designs[name]) for name in functions if draw.random() < 0.8}
     statuses = {
-        name: draw.choice([None, "UNGROUNDED", "IN_ERROR_NFR", "IN_ERROR_FR"]) if name not in grounded else None
+        name: draw.choice([None, "UNGROUNDED", "IN_ERROR_NFR", "IN_ERROR_FR"])
+        if name not in grounded
+        else None
         for name in functions
     }
     hit = draw.sample(range(1, 7), draw.choice([0, 0, 1, 2]))
@@ -169,7 +207,9 @@ def test_both_backends_infer_the_same_on_random_states(kb, pellet, count):
     assert found == reference
     consistent = [one for one in found if isinstance(one, Inference)]
     assert any(isinstance(one, str) for one in found)
-    assert len({one.facts for one in consistent}) >= min(10, count // 2)  # what follows from the states does differ
+    assert len({one.facts for one in consistent}) >= min(
+        10, count // 2
+    )  # what follows from the states does differ
     for ours, theirs in zip(found, reference, strict=True):
         if isinstance(ours, Inference) and isinstance(theirs, Inference):
             assert pellet.plan(ours) == pellet.plan(theirs)
@@ -186,21 +226,29 @@ def test_an_inference_does_not_depend_on_those_before_it(kb):
 
 
 def everything(backend: str, number: int, folder: Path) -> frozenset[Fact] | str:
-    """All that a backend infers from generated ontology `number`; where that contradicts itself, that it does.
+    """All that a backend infers from generated ontology `number`; where that contradicts itself,
+    that it does.
 
-    Of several contradictions Pellet names the one that it meets first, which is not the same in each of its processes.
+    Of several contradictions Pellet names the one that it meets first, which is not the same in
+    each of its processes.
     """
     owl, rules = write_ontology(number, folder)
     base = Ontology.load([owl], rules=[rules])
     try:
-        return Reasoner(base, backend, TimeLimit(180.0), base.content.all_terms()).analyze(KnowledgeState()).facts
+        return (
+            Reasoner(base, backend, TimeLimit(180.0), base.content.all_terms())
+            .analyze(KnowledgeState())
+            .facts
+        )
     except KnowledgeError as error:
         assert "contradiction" in str(error)
         return "contradiction"
 
 
 class TestSchemas:
-    """What axioms conclude: subclasses, defined classes, inverses, chains, sameness, and rules on all of them."""
+    """What axioms conclude: subclasses, defined classes, inverses, chains, sameness, and rules on
+    all of them.
+    """
 
     def compare(self, numbers: range, folder: Path) -> list[frozenset[Fact] | str]:
         found = [everything("pellet", number, folder) for number in numbers]
@@ -220,7 +268,17 @@ def test_numbers_that_a_rule_takes_for_the_same_are_those_of_stock_pellet(tmp_pa
     numbers = numbers_ontology(tmp_path)
     terms = numbers.content.all_terms()
     found = Reasoner(numbers, "pellet", terms=terms).analyze(KnowledgeState()).facts
-    assert found == Reasoner(numbers, "owlready2", TimeLimit(180.0), terms).analyze(KnowledgeState()).facts
+    assert (
+        found
+        == Reasoner(numbers, "owlready2", TimeLimit(180.0), terms).analyze(KnowledgeState()).facts
+    )
     matching = {(fact.subject, fact.value) for fact in found if fact.property == "is"}
-    assert {("integer", "int"), ("padded", "integer"), ("decimal", "whole_decimal"), ("half", "long_half")} <= matching
-    assert matching.isdisjoint({("integer", "decimal"), ("whole_decimal", "int"), ("double", "decimal")})
+    assert {
+        ("integer", "int"),
+        ("padded", "integer"),
+        ("decimal", "whole_decimal"),
+        ("half", "long_half"),
+    } <= matching
+    assert matching.isdisjoint(
+        {("integer", "decimal"), ("whole_decimal", "int"), ("double", "decimal")}
+    )

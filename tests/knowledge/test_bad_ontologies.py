@@ -1,4 +1,6 @@
-"""Each way in which an ontology file can be unusable is one clear line with file and place; other formats are read."""
+"""Each way in which an ontology file can be unusable is one clear line with file and place; other
+formats are read.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +36,14 @@ BAD_FILES: dict[str, tuple[str, str]] = {
     "functional": ("Prefix(:=<http://x.org/y#>)\n", "this is OWL in Functional Syntax"),
     "manchester": ("Prefix: : <http://x.org/y#>\n", "this is OWL in Manchester Syntax"),
     "json": ('{"@context": {}}', "this is JSON-LD"),
-    "bad rdf": (HEAD + '<owl:Ontology rdf:about="http://x.org/y" rdf:ID="z"/></rdf:RDF>', "not RDF/XML"),
-    "spaces in an iri": (HEAD + '<owl:Ontology rdf:about="http://x.org/a b"/></rdf:RDF>', "is not an IRI"),
+    "bad rdf": (
+        HEAD + '<owl:Ontology rdf:about="http://x.org/y" rdf:ID="z"/></rdf:RDF>',
+        "not RDF/XML",
+    ),
+    "spaces in an iri": (
+        HEAD + '<owl:Ontology rdf:about="http://x.org/a b"/></rdf:RDF>',
+        "is not an IRI",
+    ),
     "external entity": (
         '<!DOCTYPE r [\n<!ENTITY x SYSTEM "file:///etc/passwd">]>' + HEAD + "</rdf:RDF>",
         "line 2: its DOCTYPE or an entity refers to another file",
@@ -57,7 +65,9 @@ BAD_FILES: dict[str, tuple[str, str]] = {
         "expand to far more than its size",
     ),
     "entity bomb in an attribute": (
-        f'<!DOCTYPE r [<!ENTITY e0 "lol">\n{NESTED}]>' + HEAD + '<owl:Ontology rdf:about="&e9;"/></rdf:RDF>',
+        f'<!DOCTYPE r [<!ENTITY e0 "lol">\n{NESTED}]>'
+        + HEAD
+        + '<owl:Ontology rdf:about="&e9;"/></rdf:RDF>',
         "expand to far more than its size",
     ),
     "much repeated entity": (
@@ -113,7 +123,13 @@ def test_simple_entities_as_protege_writes_them_are_read(suave_copy, kb):
 
 @pytest.mark.parametrize(
     ("value", "datatype"),
-    [("deep", "decimal"), ("2.25", "double"), ("2.25", "string"), ("1e3", "decimal"), ("NaN", "decimal")],
+    [
+        ("deep", "decimal"),
+        ("2.25", "double"),
+        ("2.25", "string"),
+        ("1e3", "decimal"),
+        ("NaN", "decimal"),
+    ],
 )
 def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy, value, datatype):
     old = '#decimal">3.25<'
@@ -122,14 +138,19 @@ def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy, value, datatyp
     line = 1 + path.read_text().split(
         'NamedIndividual rdf:about="http://www.metacontrol.org/suave#qa_water_visibility_high"'
     )[0].count("\n")
-    assert f"{path}: line {line}: qa_water_visibility_high: hasValue '{value}' is not an xsd:decimal" in problem
+    assert (
+        f"{path}: line {line}: qa_water_visibility_high: hasValue '{value}' is not an xsd:decimal"
+        in problem
+    )
     subject = Subject([path], reaction_thresholds_m=(3.25, 2.25, 1.25))
     assert only(findings_of(subject), "is not an xsd:decimal").line == line
 
 
 def test_an_unknown_operator_is_reported(suave_copy):
     path = suave_copy(individual("noise", "QualityAttributeType", ("qa_comparison_operator", "=<")))
-    assert "qa_comparison_operator '=<' is unknown (one of < <= > >=)" in problem_of(lambda: Ontology.load([path]))
+    assert "qa_comparison_operator '=<' is unknown (one of < <= > >=)" in problem_of(
+        lambda: Ontology.load([path])
+    )
 
 
 def test_two_things_of_one_kind_and_name_are_reported(suave_copy):
@@ -159,11 +180,19 @@ def test_an_ontology_whose_rules_contradict_it_is_reported(suave_copy, name):
 
 
 @pytest.mark.parametrize("name", ["odd", "fd_spiral_high"])
-def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name_is(suave_copy, name):
+def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name_is(
+    suave_copy, name
+):
     odd = '<owl:NamedIndividual rdf:about="http://example.org/#odd"/>\n'
-    path = suave_copy(odd + rule(name, "QAvalue(?q) ^ isQAtype(?q, :water_visibility) -> hasValue(?q, 3.25)"))
+    path = suave_copy(
+        odd + rule(name, "QAvalue(?q) ^ isQAtype(?q, :water_visibility) -> hasValue(?q, 3.25)")
+    )
     problem = problem_of(lambda: Reasoner(Ontology.load([path]), "pellet").analyze(searching()))
-    labels = [line for line, text in enumerate(path.read_text().splitlines(), 1) if f"label>{name}<" in text]
+    labels = [
+        line
+        for line, text in enumerate(path.read_text().splitlines(), 1)
+        if f"label>{name}<" in text
+    ]
     assert f"by the rule {name} (suave.owl, line {labels[-1]})" in problem
 
 
@@ -197,7 +226,10 @@ def test_a_rule_that_uses_an_object_property_for_data_is_an_error(suave_copy):
     text = 'FunctionGrounding(?g) ^ solvesO(?g, ?o) -> typeFD(?g, "x")'
     path = suave_copy(rule("odd", text, data={"typeFD"}))
     problem = problem_of(lambda: Ontology.load([path]))
-    assert f"{path}: rule odd: typeFD is declared as object property, but used as data property" in problem
+    assert (
+        f"{path}: rule odd: typeFD is declared as object property, but used as data property"
+        in problem
+    )
 
 
 @pytest.mark.parametrize("encoding", ["UTF-16", "ISO-8859-1", "undefined"])
@@ -206,17 +238,24 @@ def test_xml_is_read_in_the_encoding_that_it_declares_or_as_utf_8(encoding, ship
     declared = re.sub(r"<\?xml[^>]*\?>", f'<?xml version="1.0" encoding="{encoding}"?>', text)
     path = tmp_path / "suave.owl"
     path.write_bytes(
-        declared.replace("fd_spiral_low", "fd_spiral_bröd").encode({"undefined": "utf-8"}.get(encoding, encoding))
+        declared.replace("fd_spiral_low", "fd_spiral_bröd").encode(
+            {"undefined": "utf-8"}.get(encoding, encoding)
+        )
     )
     base = Ontology.load([path])
-    assert "fd_spiral_bröd" in base.designs("f_generate_search_path") and base.sources[0].line_of("fd_spiral_bröd")
+    assert "fd_spiral_bröd" in base.designs("f_generate_search_path") and base.sources[0].line_of(
+        "fd_spiral_bröd"
+    )
 
 
 def test_a_datatype_as_owlready2_saves_it_is_that_of_xml_schema(shipped, tmp_path):
     text = (shipped / "suave.owl").read_text(encoding="utf-8")
     path = tmp_path / "suave.owl"
     path.write_text(
-        text.replace("<tomasys:qa_comparison_operator>", '<tomasys:qa_comparison_operator rdf:datatype="xsd:string">'),
+        text.replace(
+            "<tomasys:qa_comparison_operator>",
+            '<tomasys:qa_comparison_operator rdf:datatype="xsd:string">',
+        ),
         encoding="utf-8",
     )
     assert Ontology.load([path]).facts == Ontology.load().facts

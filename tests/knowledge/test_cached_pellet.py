@@ -1,4 +1,6 @@
-"""The cached reasoner's answers are Pellet's: on several ontologies, around every threshold, and from a file."""
+"""The cached reasoner's answers are Pellet's: on several ontologies, around every threshold, and
+from a file.
+"""
 
 import random
 from decimal import Decimal
@@ -20,13 +22,27 @@ from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import individual
 
 MORE_DESIGNS = "".join(
-    individual(f"qa_extra_{n}", "QAvalue", ("isQAtype", ":water_visibility"), ("hasValue", f"{n}.{n}"))
-    + individual(f"fd_extra_{n}", "FunctionDesign", ("solvesF", f":{SEARCH}"), ("hasQAestimation", f":qa_extra_{n}"))
+    individual(
+        f"qa_extra_{n}", "QAvalue", ("isQAtype", ":water_visibility"), ("hasValue", f"{n}.{n}")
+    )
+    + individual(
+        f"fd_extra_{n}",
+        "FunctionDesign",
+        ("solvesF", f":{SEARCH}"),
+        ("hasQAestimation", f":qa_extra_{n}"),
+    )
     for n in range(5)
 )
-MORE_ATTRIBUTES = individual("temperature", "QualityAttributeType", ("qa_comparison_operator", ">")) + "".join(
+MORE_ATTRIBUTES = individual(
+    "temperature", "QualityAttributeType", ("qa_comparison_operator", ">")
+) + "".join(
     individual(f"qa_{name}", "QAvalue", ("isQAtype", f":{name}"), ("hasValue", value))
-    + individual(f"fd_{name}", "FunctionDesign", ("solvesF", f":{SEARCH}"), ("hasQAestimation", f":qa_{name}"))
+    + individual(
+        f"fd_{name}",
+        "FunctionDesign",
+        ("solvesF", f":{SEARCH}"),
+        ("hasQAestimation", f":qa_{name}"),
+    )
     for name, value in (("battery_level", "0.25"), ("temperature", "40.0"))
 )
 BATTERY = (
@@ -64,7 +80,9 @@ def loaded(name: str) -> tuple[Ontology, Reasoner, Reasoner]:
     extra, rules = ONTOLOGIES[name]
     folder = Path(mkdtemp())
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    (folder / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
+    (folder / "suave.owl").write_text(
+        text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8"
+    )
     (folder / "mine.swrl").write_text(rules, encoding="utf-8")
     kb = Ontology.load([folder / "suave.owl"], rules=[folder / "mine.swrl"])
     return kb, Reasoner(kb, "pellet"), Reasoner(kb, folder=folder)
@@ -80,25 +98,34 @@ def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
 def near(kb: Ontology) -> st.SearchStrategy[Decimal]:
     """Just below, on and just above each number of the knowledge base, and anything else."""
     thresholds = st.sampled_from(regions_of(kb).thresholds)
-    steps = st.sampled_from([Decimal(0), *(sign * Decimal(10) ** -power for sign in (1, -1) for power in (1, 6, 25))])
+    steps = st.sampled_from(
+        [Decimal(0), *(sign * Decimal(10) ** -power for sign in (1, -1) for power in (1, 6, 25))]
+    )
     return st.builds(lambda a, b: a + b, thresholds, steps) | st.decimals(0, 50, places=3)
 
 
 @st.composite
 def states(draw: st.DrawFn, kb: Ontology) -> KnowledgeState:
-    grounded = {SEARCH: draw(st.sampled_from(kb.designs(SEARCH))), MOTION: draw(st.sampled_from(kb.designs(MOTION)))}
+    grounded = {
+        SEARCH: draw(st.sampled_from(kb.designs(SEARCH))),
+        MOTION: draw(st.sampled_from(kb.designs(MOTION))),
+    }
     functions = draw(st.lists(st.sampled_from([SEARCH, MOTION]), unique=True))
     measured = draw(st.lists(st.sampled_from(sorted(kb.model.attributes)), unique=True, max_size=3))
     return KnowledgeState.of(
         [ObjectiveState(name) for name in functions],
         groundings={name: grounded[name] for name in functions if draw(st.booleans())},
-        components=draw(st.dictionaries(st.just("c_thruster_1"), st.sampled_from(["FALSE", "RECOVERED"]))),
+        components=draw(
+            st.dictionaries(st.just("c_thruster_1"), st.sampled_from(["FALSE", "RECOVERED"]))
+        ),
         measurements={name: draw(near(kb)) for name in measured},
     )
 
 
 def moved(draw: random.Random, kb: Ontology, state: KnowledgeState) -> KnowledgeState:
-    """The state with its values moved about inside their gaps, if each value in a gap has it to itself."""
+    """The state with its values moved about inside their gaps, if each value in a gap has it to
+    itself.
+    """
     regions = regions_of(kb)
     bounds = [Decimal(-10), *regions.thresholds, Decimal(100)]
     gaps = [region for _, value in state.measurements if (region := regions.region(value)) % 2 == 0]
@@ -134,7 +161,8 @@ def test_cached_pellet_and_pellet_agree_around_thresholds(name, data, seed):
 
 
 @pytest.mark.parametrize(
-    ("visibility", "battery"), [("1.25", "0.5"), pytest.param("1.249999", "1.3", marks=pytest.mark.slow)]
+    ("visibility", "battery"),
+    [("1.25", "0.5"), pytest.param("1.249999", "1.3", marks=pytest.mark.slow)],
 )
 @pytest.mark.parametrize("name", [name for name in ONTOLOGIES if name != "shipped"])
 def test_stock_owlready2_agrees(name, visibility, battery):
@@ -151,7 +179,10 @@ def test_stock_owlready2_agrees(name, visibility, battery):
 
 
 @given(
-    data=st.data(), numbers=st.lists(st.decimals(-4, 4, places=1) | st.sampled_from([Decimal("0.1000000000000000001")]))
+    data=st.data(),
+    numbers=st.lists(
+        st.decimals(-4, 4, places=1) | st.sampled_from([Decimal("0.1000000000000000001")])
+    ),
 )
 def test_all_floats_between_the_bounds_of_a_value_are_in_its_region(data, numbers):
     regions = Regions(tuple(sorted(set(numbers))), ())
@@ -159,7 +190,9 @@ def test_all_floats_between_the_bounds_of_a_value_are_in_its_region(data, number
     above, below = regions.around(value)
     assert above < value < below or (above == below == value and value in map(float, numbers))
     if above < below:
-        other = data.draw(st.floats(max(above, -9.0), min(below, 9.0), exclude_min=True, exclude_max=True))
+        other = data.draw(
+            st.floats(max(above, -9.0), min(below, 9.0), exclude_min=True, exclude_max=True)
+        )
         assert regions.region(exact(other)) == regions.region(exact(value))
 
 
@@ -199,7 +232,11 @@ def no_pellet(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("suave_des.knowledge.pellet.in_process.InProcessPellet.__init__", refuse)
 
 
-STATES = [searching(f"fd_spiral_{name}", value) for name in ("low", "high") for value in ("1.0", "1.25", "2.0", "4")]
+STATES = [
+    searching(f"fd_spiral_{name}", value)
+    for name in ("low", "high")
+    for value in ("1.0", "1.25", "2.0", "4")
+]
 
 
 @pytest.fixture
@@ -225,7 +262,11 @@ def test_the_cache_depends_on_the_code_of_every_package_for_knowledge(kb, monkey
     assert cache_digest(kb) == before
     read = Path.read_bytes
     for changed in ("ontology.py", "pellet/in_process.py", "rules/parser.py"):
-        monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * path.as_posix().endswith(changed))  # noqa: B023
+
+        def altered(path, changed=changed):
+            return read(path) + b"#" * path.as_posix().endswith(changed)
+
+        monkeypatch.setattr(Path, "read_bytes", altered)
         assert cache_digest(kb) != before
 
 
@@ -245,7 +286,8 @@ def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb, tmp_path
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2), (2, 0, 1)])
 def test_a_value_on_a_threshold_is_not_one_beside_it(order, tmp_path):
-    # fd_spiral_high expects 3.25 m; the rule QAWaterVisibility says less than that is an error, so 3.25 itself is none.
+    # fd_spiral_high expects 3.25 m; the rule QAWaterVisibility says less than that is an error, so
+    # 3.25 itself is none.
     (tmp_path / "equal.swrl").write_text(
         "Level: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ equal(?v, 3.25) -> Binding(?q)\n"
     )
@@ -254,4 +296,6 @@ def test_a_value_on_a_threshold_is_not_one_beside_it(order, tmp_path):
     for value, status in (cases[place] for place in order):
         inference = cached.analyze(searching("fd_spiral_high", value))
         assert inference.grounding_status(SEARCH) == status, value
-        assert ("Binding(obs_water_visibility)" in map(str, inference.facts)) == (value == "3.25"), value
+        assert ("Binding(obs_water_visibility)" in map(str, inference.facts)) == (
+            value == "3.25"
+        ), value

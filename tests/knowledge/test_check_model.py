@@ -24,19 +24,31 @@ from tests.helpers.checks import (
     warnings,
 )
 from tests.helpers.command import command_here
-from tests.helpers.exemplar_files import write_as_owlready2_saves_it, write_exemplar_files, write_files_of_2023
+from tests.helpers.exemplar_files import (
+    write_as_owlready2_saves_it,
+    write_exemplar_files,
+    write_files_of_2023,
+)
 
 
 def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy, tmp_path):
     path = suave_copy(replace={'water_visibility"': 'water_visability"'}, name="mine.owl")
     findings = findings_of(Subject([path], measured=["water_visibility"]))
     unknown = only(findings, "missions measure water_visibility, but no ontology has")
-    assert (unknown.level, unknown.file, unknown.remedy) == (Level.WARN, str(path), "did you mean water_visability?")
-    assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
+    assert (unknown.level, unknown.file, unknown.remedy) == (
+        Level.WARN,
+        str(path),
+        "did you mean water_visability?",
+    )
+    assert not [
+        each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message
+    ]
 
 
 def test_components_that_nothing_reports_and_expectations_that_nothing_measures_are_noted(tmp_path):
-    status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
+    status = (
+        '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
+    )
     extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
     findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=[])
     notes = [one.message for one in findings if one.level is Level.NOTE and one.line]
@@ -60,8 +72,14 @@ def test_the_model(tmp_path):
     assert only(findings, "fd_new has no mode").level is Level.ERROR
     assert only(findings, "metacontrol never chooses: fd_old").level is Level.NOTE
     assert only(findings, "there is no function f_gone").level is Level.ERROR
-    assert only(findings, "fd_new: hasQAestimation: no performance is expected of it").level is Level.WARN
-    assert only(findings, "fd_lost: solvesF: a function design must solve a function").level is Level.ERROR
+    assert (
+        only(findings, "fd_new: hasQAestimation: no performance is expected of it").level
+        is Level.WARN
+    )
+    assert (
+        only(findings, "fd_lost: solvesF: a function design must solve a function").level
+        is Level.ERROR
+    )
     assert only(findings, "qa_empty: isQAtype: a QAvalue must be of exactly one").line is not None
 
 
@@ -75,10 +93,15 @@ def test_a_number_of_another_datatype_is_an_error_each_but_a_whole_number_is_a_d
 def test_a_quality_attribute_that_is_not_declared_or_twice(tmp_path):
     measured = individual("qa_current", "QAvalue", link("isQAtype", "water_current"))
     unknown = only(found(tmp_path, extra=measured), "isQAtype water_current is not defined")
-    assert (unknown.level, unknown.remedy) == (Level.ERROR, "declare a QualityAttributeType of this name")
+    assert (unknown.level, unknown.remedy) == (
+        Level.ERROR,
+        "declare a QualityAttributeType of this name",
+    )
     twice = '<owl:NamedIndividual rdf:about="http://ros/mros#performance">'
     twice += f'<rdf:type rdf:resource="{TOMASYS}QualityAttributeType"/></owl:NamedIndividual>'
-    again = only(found(tmp_path, extra=twice), "declares the quality attribute type performance, and so does")
+    again = only(
+        found(tmp_path, extra=twice), "declares the quality attribute type performance, and so does"
+    )
     assert again.level is Level.WARN
 
 
@@ -89,7 +112,12 @@ UNDEFINED = {
         "fd_all_thrusters: class FunctionDesgn",
         "FunctionDesign",
     ),
-    "property": ("tomasys:solvesF ", "tomasys:solvsF ", "fd_all_thrusters: property solvsF", "solvesF"),
+    "property": (
+        "tomasys:solvesF ",
+        "tomasys:solvsF ",
+        "fd_all_thrusters: property solvsF",
+        "solvesF",
+    ),
     "individual": (
         'solvesF rdf:resource="http://www.metacontrol.org/suave#f_follow_pipeline',
         'solvesF rdf:resource="http://www.metacontrol.org/suave#f_folow_pipeline',
@@ -107,21 +135,30 @@ def test_names_that_individuals_misspell_are_errors(case, tmp_path):
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     path.write_text(text.replace(right, wrong, 1), encoding="utf-8")
     error = only(findings_of(Subject([path])), f"{message} is not defined")
-    assert (error.level, error.file, error.remedy) == (Level.ERROR, str(path), f"did you mean {meant}?")
+    assert (error.level, error.file, error.remedy) == (
+        Level.ERROR,
+        str(path),
+        f"did you mean {meant}?",
+    )
     name = error.message.partition(":")[0]
     assert f"#{name}" in text.splitlines()[(error.line or 0) - 1]
 
 
 def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path):
     known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
-    warning = only(found(tmp_path, **known), "fd_spiral_medium expects 2.25 m of visibility, which is not a threshold")
+    warning = only(
+        found(tmp_path, **known),
+        "fd_spiral_medium expects 2.25 m of visibility, which is not a threshold",
+    )
     assert warning.level is Level.WARN
     assert "reaction_metric.visibility_thresholds_m" in str(warning.remedy)
     (tmp_path / "other").mkdir()
     assert not [each for each in found(tmp_path / "other") if "of visibility" in each.message]
 
 
-@pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"])
+@pytest.mark.parametrize(
+    "scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"]
+)
 def test_shipped_scenarios_have_no_warning(scenario, command):
     status, out, _ = command("kb", "check", "--scenario", scenario, "--fail-on", "warn")
     assert status == 0, out
@@ -129,7 +166,10 @@ def test_shipped_scenarios_have_no_warning(scenario, command):
 
 @pytest.mark.parametrize("kind", ["FunctionDesign", "QAvalue"])
 def test_a_file_as_owlready2_saves_it_with_a_placeholder_has_no_error(kind, tmp_path):
-    assert errors(findings_of(Subject([write_as_owlready2_saves_it(tmp_path / "suave.owl", kind)]))) == []
+    assert (
+        errors(findings_of(Subject([write_as_owlready2_saves_it(tmp_path / "suave.owl", kind)])))
+        == []
+    )
 
 
 def same(name: str) -> str:
@@ -143,13 +183,19 @@ def subclass(name: str, kind: str) -> str:
 
 ESTIMATE = individual("fd_spiral_low", inside=link("hasQAestimation", "qa_mine"))
 WRONG = {
-    "design as class": (subclass("fd_quick", "FunctionDesign"), "fd_quick: it is a class without members"),
+    "design as class": (
+        subclass("fd_quick", "FunctionDesign"),
+        "fd_quick: it is a class without members",
+    ),
     "class named like a design": (
         f'<owl:Class rdf:about="{SUAVE}fd_spiral_low"/>',
         "fd_spiral_low: it is the name of a class and of an individual",
     ),
     "two estimates": (
-        individual("qa_mine", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5")) + ESTIMATE,
+        individual(
+            "qa_mine", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5")
+        )
+        + ESTIMATE,
         "fd_spiral_low: several values are expected of one quality attribute",
     ),
     "no class": (individual("fd_new"), "fd_new: it has no class, and nothing is said of it"),
@@ -158,16 +204,23 @@ WRONG = {
         "c_thruster_1: c_status: missions and rules write statuses as FALSE",
     ),
     "fact of another class": (
-        individual("f_new", "Function", link("hasNFR", "qa_water_visibility_low")) + individual("fd_new"),
+        individual("f_new", "Function", link("hasNFR", "qa_water_visibility_low"))
+        + individual("fd_new"),
         "f_new: hasNFR: it is of another class than the one that the property is declared for",
     ),
     "fact that leads to another class": (
-        individual("c_new", "Component", f'<mros:requiredBy rdf:resource="{SUAVE}qa_water_visibility_low"/>'),
+        individual(
+            "c_new",
+            "Component",
+            f'<mros:requiredBy rdf:resource="{SUAVE}qa_water_visibility_low"/>',
+        ),
         "qa_water_visibility_low: requiredBy: it is of another class than the one that the property leads to",
     ),
     "measured value that is not measured": (
         individual("obs_current", "QAvalue", link("isQAtype", "current") + value("hasValue", "2.5"))
-        + individual("current", "QualityAttributeType", value("qa_comparison_operator", "&lt;", "string")),
+        + individual(
+            "current", "QualityAttributeType", value("qa_comparison_operator", "&lt;", "string")
+        ),
         "hasValue of obs_current is not used: current has the value that missions measure",
     ),
 }
@@ -176,7 +229,9 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_an_edit_that_means_something_else(case, tmp_path):
     extra, message = WRONG[case]
-    findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"])
+    findings = found(
+        tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]
+    )
     finding = next(each for each in warnings(findings) if each.message.startswith(message))
     assert finding.line is not None
 
@@ -188,20 +243,31 @@ def test_an_edit_that_means_something_else(case, tmp_path):
         subclass("SearchDesign", "FunctionDesign"),
         subclass("fd_quick", "FunctionDesign")
         + individual("fd_follow_pipeline", inside=f'<rdf:type rdf:resource="{SUAVE}fd_quick"/>'),
-        individual("qa_mine", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "1.25")) + ESTIMATE,
+        individual(
+            "qa_mine", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "1.25")
+        )
+        + ESTIMATE,
         individual("fd_spiral_low", inside="<rdfs:comment>no facts</rdfs:comment>"),
         individual("c_thruster_1", inside=value("c_status", "FALSE", "string")),
         individual("c_thruster_1", inside=value("c_status", "worn", "string")),
-        individual("obs_water_visibility", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5")),
+        individual(
+            "obs_water_visibility",
+            "QAvalue",
+            link("isQAtype", "water_visibility") + value("hasValue", "2.5"),
+        ),
     ],
 )
 def test_right_edits(extra, tmp_path):
-    assert not warnings(found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]))
+    assert not warnings(
+        found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"])
+    )
 
 
 def test_a_comparison_operator_with_and_without_its_datatype(tmp_path):
     def problems(operator: str) -> list[Finding]:
-        return errors(found(tmp_path, extra=individual("current", "QualityAttributeType", operator)))
+        return errors(
+            found(tmp_path, extra=individual("current", "QualityAttributeType", operator))
+        )
 
     assert not problems(value("qa_comparison_operator", "&gt;=", "string"))
     assert not problems("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>")
@@ -211,9 +277,16 @@ def test_a_comparison_operator_with_and_without_its_datatype(tmp_path):
 def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note(tmp_path):
     files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
     note = only(findings_of(Subject(files, operators={"water_visibility": "<"})), "comparison")
-    line = next(n for n, text in enumerate(files[0].read_text().splitlines(), 1) if '#water_visibility">' in text)
+    line = next(
+        n
+        for n, text in enumerate(files[0].read_text().splitlines(), 1)
+        if '#water_visibility">' in text
+    )
     assert (note.level, note.line) == (Level.NOTE, line)
-    assert "water_visibility has no qa_comparison_operator in the ontologies: < is assumed" in note.message
+    assert (
+        "water_visibility has no qa_comparison_operator in the ontologies: < is assumed"
+        in note.message
+    )
     (warning,) = warnings(findings_of(Subject(files, measured=["water_visibility"])))
     assert "has no qa_comparison_operator" in warning.message
 
@@ -223,7 +296,9 @@ MEASURED = individual("obs_water_visibility", "QAvalue", link("isQAtype", "water
 
 def exemplar_files(folder: Path, *, of_2023: bool = False) -> list[Path]:
     """The exemplar's three files, with the individual of a measured value in them."""
-    files = (write_files_of_2023 if of_2023 else write_exemplar_files)(shipped_folder("ontology"), folder)
+    files = (write_files_of_2023 if of_2023 else write_exemplar_files)(
+        shipped_folder("ontology"), folder
+    )
     text = files["suave"].read_text(encoding="utf-8")
     namespaces = f'<owl:NamedIndividual xmlns:tomasys="{TOMASYS}" xmlns:owl="{OWL}"'
     measured = MEASURED.replace("<owl:NamedIndividual", namespaces)
@@ -231,9 +306,13 @@ def exemplar_files(folder: Path, *, of_2023: bool = False) -> list[Path]:
     return list(files.values())
 
 
-@pytest.mark.parametrize(("scenario", "of_2023"), [("seams2023", True), ("seams2023", False), ("release15", False)])
+@pytest.mark.parametrize(
+    ("scenario", "of_2023"), [("seams2023", True), ("seams2023", False), ("release15", False)]
+)
 def test_files_of_the_exemplar_have_notes_of_one_line_only(scenario, of_2023, tmp_path):
-    findings = check(subject_of(load_scenario(scenario, ontologies=exemplar_files(tmp_path, of_2023=of_2023))))
+    findings = check(
+        subject_of(load_scenario(scenario, ontologies=exemplar_files(tmp_path, of_2023=of_2023)))
+    )
     assert {each.level for each in findings} == {Level.NOTE}, findings
     messages = [each.message for each in findings]
     assert sum("for other models" in each for each in messages) == 2  # tomasys.owl and mros.owl
@@ -250,16 +329,26 @@ def test_files_of_2023_under_another_revision_are_one_error_that_names_the_cause
         'write revision: "2023" in the scenario, or use ontologies of revision 1.5',
     )
     assert error.message.startswith("these are ontologies of revision 2023")
-    assert "label>compRecov<" in (tmp_path / "mros.owl").read_text().splitlines()[(error.line or 0) - 1]
-    with pytest.raises(KnowledgeError, match="these are ontologies of revision 2023"):  # before a mission, too
+    assert (
+        "label>compRecov<"
+        in (tmp_path / "mros.owl").read_text().splitlines()[(error.line or 0) - 1]
+    )
+    with pytest.raises(
+        KnowledgeError, match="these are ontologies of revision 2023"
+    ):  # before a mission, too
         open_base(loaded)
 
 
 def test_a_measured_attribute_without_operator_is_a_warning_before_missions(tmp_path, caplog):
-    """Without one the altitude is never adapted: each design counts as possible whatever is measured."""
+    """Without one the altitude is never adapted: each design counts as possible whatever is
+    measured.
+    """
     write_as_owlready2_saves_it(tmp_path / "suave.owl")
     options = ("--ontology", "suave.owl", "--set", "mission.time_limit_s=1")
-    for scenario, words in (("release15", "so what is measured never rules out"), ("seams2023", "< is assumed")):
+    for scenario, words in (
+        ("release15", "so what is measured never rules out"),
+        ("seams2023", "< is assumed"),
+    ):
         caplog.clear()
         assert command_here("run", scenario, *options, cwd=tmp_path).returncode == 0
         message = next(each for each in caplog.messages if "qa_comparison_operator" in each)

@@ -13,9 +13,17 @@ DECLARE = "declare it as {} property in the ontology"
 
 #: What Pellet drops or ignores (the table of its silent cases), each as a rule on one line.
 SILENT = {
-    "unknown builtin": ("A: hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "did you mean lessThan?"),
+    "unknown builtin": (
+        "A: hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)",
+        23,
+        "did you mean lessThan?",
+    ),
     "undeclared class": ("A: <http://x.org/#Rol>(?q) -> Role(?q)", 4, "did you mean Role?"),
-    "undeclared in the head": ('A: Role(?q) -> <http://x.org/#p>(?q, "x")', 16, DECLARE.format("data")),
+    "undeclared in the head": (
+        'A: Role(?q) -> <http://x.org/#p>(?q, "x")',
+        16,
+        DECLARE.format("data"),
+    ),
     "head literal outside the range": ("A: Role(?q) -> fg_status(?q, 1)", 30, "a value of string"),
     "syntax": ("A: Role(?q -> Role(?q)", 12, "parentheses must balance"),
 }
@@ -46,7 +54,9 @@ def test_rules_of_ontologies_are_checked_likewise(tmp_path):
     findings = errors(found(tmp_path, extra=OWL_RULE))
     text = (tmp_path / "suave.owl").read_text(encoding="utf-8")
     line = text[: text.index("mine</rdfs:label>")].count("\n") + 1
-    assert {(one.file, one.line, one.rule) for one in findings} == {(str(tmp_path / "suave.owl"), line, "mine")}
+    assert {(one.file, one.line, one.rule) for one in findings} == {
+        (str(tmp_path / "suave.owl"), line, "mine")
+    }
     assert sorted(one.message for one in findings) == [
         "?z occurs in the head, but the body does not bind it",
         "class Roel is not defined",
@@ -71,7 +81,9 @@ def test_all_mistakes_of_a_file_are_reported_at_once(tmp_path):
     assert [one.line for one in errors(found(tmp_path, rules))] == [1, 2]
 
 
-TWO_FAILED = 'two: c_status(?a, "FALSE") ^ c_status(?b, "FALSE") ^ differentFrom(?a, ?b) -> Role(?a)\n'
+TWO_FAILED = (
+    'two: c_status(?a, "FALSE") ^ c_status(?b, "FALSE") ^ differentFrom(?a, ?b) -> Role(?a)\n'
+)
 
 
 def test_different_names_alone_do_not_make_individuals_different(tmp_path):
@@ -94,24 +106,38 @@ def test_different_names_alone_do_not_make_individuals_different(tmp_path):
     ids=["all different", "different from", "disjoint classes"],
 )
 def test_individuals_that_are_declared_different(tmp_path, axiom):
-    assert not [each for each in found(tmp_path, TWO_FAILED, axiom) if "differentFrom" in each.message]
+    assert not [
+        each for each in found(tmp_path, TWO_FAILED, axiom) if "differentFrom" in each.message
+    ]
 
 
 def test_a_rule_may_conclude_that_individuals_are_different(tmp_path):
-    concluding = 'other: c_status(?a, "FALSE") ^ c_status(?b, "RECOVERED") -> differentFrom(?a, ?b)\n'
-    assert not [each for each in found(tmp_path, TWO_FAILED + concluding) if "declare" in str(each.remedy)]
+    concluding = (
+        'other: c_status(?a, "FALSE") ^ c_status(?b, "RECOVERED") -> differentFrom(?a, ?b)\n'
+    )
+    assert not [
+        each for each in found(tmp_path, TWO_FAILED + concluding) if "declare" in str(each.remedy)
+    ]
 
 
 def test_a_rule_that_never_fires(tmp_path):
     rules = "A: requiresO(?g, ?o) -> Role(?g)\nB: Role(?g) -> Binding(?g)\n"
     rules += 'C: c_status(?c, "ANYTHING") -> Binding(?c)\n'
-    findings = [one for one in found(tmp_path, rules) if one.file and one.file.endswith("mine.swrl")]
-    assert [(one.level, one.rule, one.column) for one in findings] == [(Level.WARN, "A", 4), (Level.WARN, "B", 4)]
+    findings = [
+        one for one in found(tmp_path, rules) if one.file and one.file.endswith("mine.swrl")
+    ]
+    assert [(one.level, one.rule, one.column) for one in findings] == [
+        (Level.WARN, "A", 4),
+        (Level.WARN, "B", 4),
+    ]
 
 
 def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path):
     rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
-    finding = only(found(tmp_path, rule.format("battery_level")), "no function design has an estimate of battery_level")
+    finding = only(
+        found(tmp_path, rule.format("battery_level")),
+        "no function design has an estimate of battery_level",
+    )
     assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
     assert not has_level(found(tmp_path, rule.format("water_visibility")), Level.WARN)
     given = "\nB: FunctionGrounding(?g) ^ isQAtype(?q, battery_level) -> hasQAvalue(?g, ?q)"
@@ -132,12 +158,18 @@ def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path):
 def test_a_component_status_that_nothing_reports(tmp_path, status, level, remedy):
     rules = f'A: c_status(?c, "{status}") -> Role(?c)\nB: Role(?c) -> c_status(?c, "WORN")\n'
     findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
-    named = [(one.level, one.rule, one.column, one.remedy) for one in findings if "reports c_status" in one.message]
+    named = [
+        (one.level, one.rule, one.column, one.remedy)
+        for one in findings
+        if "reports c_status" in one.message
+    ]
     assert named == ([] if level is None else [(level, "A", 17, remedy)])
 
 
 def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path):
-    finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in")
+    finding = only(
+        found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in"
+    )
     assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
     assert finding.message.endswith("tomasys.owl")
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
@@ -145,10 +177,16 @@ def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path):
     assert not [one for one in findings if "replaces the rule of this name" in one.message]
 
 
-def warned(tmp_path: Path, rule: str, **options: object) -> list[tuple[int | None, str, str | None]]:
+def warned(
+    tmp_path: Path, rule: str, **options: object
+) -> list[tuple[int | None, str, str | None]]:
     """Column, message and remedy of the warnings about a rule."""
     findings = found(tmp_path, rule, reported=REPORTED_STATUSES, **options)  # type: ignore[arg-type]
-    return [(one.column, one.message, one.remedy) for one in findings if one.rule == "A" and one.level is Level.WARN]
+    return [
+        (one.column, one.message, one.remedy)
+        for one in findings
+        if one.rule == "A" and one.level is Level.WARN
+    ]
 
 
 WITHOUT_FIRING = {
@@ -162,7 +200,10 @@ WITHOUT_FIRING = {
     ),
     "realisable": (
         "A: hasValue(?q, ?v) ^ greaterThan(?v, 3.5) -> fd_realisability(fd_spiral_high, true)",
-        (47, "fd_realisability true has no effect: a design counts as realisable unless it is false"),
+        (
+            47,
+            "fd_realisability true has no effect: a design counts as realisable unless it is false",
+        ),
     ),
     "another capital": (
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?Q, water_visibility) ^ hasValue(?Q, ?v) -> Role(?g)",
@@ -170,11 +211,17 @@ WITHOUT_FIRING = {
     ),
     "unmeasured": (
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> Role(?g)",
-        (25, "can never fire: missions do not measure performance, so no grounding has a value of it"),
+        (
+            25,
+            "can never fire: missions do not measure performance, so no grounding has a value of it",
+        ),
     ),
     "no value": (
         "A: isQAtype(?q, battery_level) ^ hasValue(?q, ?v) -> Role(?q)",
-        (4, "can never fire: missions do not measure battery_level, and no ontology has a value of it"),
+        (
+            4,
+            "can never fire: missions do not measure battery_level, and no ontology has a value of it",
+        ),
     ),
     "misspelt variable": (
         "A: hasQAvalue(?g, ?q) ^ hasValue(?q, ?vlaue) ^ hasValue(?other, ?value) ^ lessThan(?value, 2) -> Role(?q)",
@@ -223,7 +270,11 @@ def test_a_rule_that_can(rule, tmp_path):
 @pytest.mark.parametrize(
     ("rule", "column", "consequence"),
     [
-        ('A: FunctionGrounding(?g) -> fg_status(?g, "IN_EROR_NFR")', 43, "contradicts whatever it is concluded of"),
+        (
+            'A: FunctionGrounding(?g) -> fg_status(?g, "IN_EROR_NFR")',
+            43,
+            "contradicts whatever it is concluded of",
+        ),
         ('A: o_status(?o, "IN_EROR_NFR") -> o_updatable(?o, true)', 17, "never matches"),
     ],
 )

@@ -1,4 +1,6 @@
-"""Imports resolve to local files, whichever files were given and in whichever order; nothing is fetched."""
+"""Imports resolve to local files, whichever files were given and in whichever order; nothing is
+fetched.
+"""
 
 import itertools
 
@@ -16,9 +18,18 @@ STORY = [
     searching("fd_spiral_high", 3.3),
     searching("fd_spiral_high", 1.3),
     searching("fd_spiral_low", 1.0),
-    searching("fd_spiral_low", 1.5, motion="fd_all_thrusters", components={"c_thruster_1": "FALSE"}),
-    searching("fd_spiral_low", 1.5, motion="fd_recover_thrusters", components={"c_thruster_1": "FALSE"}),
-    searching("fd_spiral_low", 1.5, motion="fd_recover_thrusters", components={"c_thruster_1": "RECOVERED"}),
+    searching(
+        "fd_spiral_low", 1.5, motion="fd_all_thrusters", components={"c_thruster_1": "FALSE"}
+    ),
+    searching(
+        "fd_spiral_low", 1.5, motion="fd_recover_thrusters", components={"c_thruster_1": "FALSE"}
+    ),
+    searching(
+        "fd_spiral_low",
+        1.5,
+        motion="fd_recover_thrusters",
+        components={"c_thruster_1": "RECOVERED"},
+    ),
 ]
 
 
@@ -41,13 +52,19 @@ def test_the_exemplars_three_files_decide_as_the_shipped_two(kb, pellet, shipped
 
 def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped, tmp_path):
     files = write_exemplar_files(shipped, tmp_path / "owl")
-    given = [*itertools.permutations(files.values()), (files["suave"],), (files["suave"], files["tomasys"])]
+    given = [
+        *itertools.permutations(files.values()),
+        (files["suave"],),
+        (files["suave"], files["tomasys"]),
+    ]
     bases = [Ontology.load(one) for one in given]
     assert {base.files for base in bases} == {tuple(sorted(files.values()))}
     assert len({base.content_hash for base in bases}) == 1
 
 
-def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(suave_copy, shipped, tmp_path):
+def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
+    suave_copy, shipped, tmp_path
+):
     path = suave_copy()
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
     beside = path.with_name("tomasys.owl")
@@ -60,7 +77,13 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(suave_c
 
 
 @pytest.mark.parametrize(
-    "iri", ["http://metacontrol.org/tomasys", "http://metacontrol.org/tomasys#", MROS_IMPORT, "http://ros/mros#"]
+    "iri",
+    [
+        "http://metacontrol.org/tomasys",
+        "http://metacontrol.org/tomasys#",
+        MROS_IMPORT,
+        "http://ros/mros#",
+    ],
 )
 def test_known_iris_resolve_to_the_shipped_files(suave_copy, shipped, iri):
     path = suave_copy(replace={IMPORT: iri})
@@ -71,7 +94,9 @@ def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy):
     path = suave_copy(replace={IMPORT: "http://example.org/wind.owl"})
     with pytest.raises(KnowledgeError) as error:
         Ontology.load([path])
-    assert str(error.value).startswith(f"{path}: line 15: import http://example.org/wind.owl does not resolve")
+    assert str(error.value).startswith(
+        f"{path}: line 15: import http://example.org/wind.owl does not resolve"
+    )
 
 
 def test_import_cycles_end(suave_copy, shipped, kb):
@@ -85,7 +110,9 @@ def test_import_cycles_end(suave_copy, shipped, kb):
         assert len(Ontology.load([path.with_name(name)]).rules) == len(kb.rules)
 
 
-def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(suave_copy, shipped):
+def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(
+    suave_copy, shipped
+):
     path = suave_copy("<!-- mine -->")
     assert set(Ontology.load([path, path, path.parent / "." / path.name]).files) >= {path}
     with pytest.raises(KnowledgeError, match="supplies the ontology"):

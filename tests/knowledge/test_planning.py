@@ -1,4 +1,6 @@
-"""The loop's semantics: which objectives are adapted, which designs are left out and why, which one is chosen."""
+"""The loop's semantics: which objectives are adapted, which designs are left out and why, which one
+is chosen.
+"""
 
 from dataclasses import replace
 from decimal import Decimal
@@ -29,7 +31,9 @@ def decide_with(file: Path, state: KnowledgeState) -> Decision:
     ("visibility", "design"),
     [(None, "fd_spiral_high"), (3.25, "fd_spiral_high"), (2.25, "fd_spiral_medium"), (1.0, None)],
 )
-def test_an_ungrounded_search_gets_the_highest_altitude_that_visibility_allows(kb, pellet, visibility, design):
+def test_an_ungrounded_search_gets_the_highest_altitude_that_visibility_allows(
+    kb, pellet, visibility, design
+):
     decision = decide(pellet, searching(None, visibility, status="UNGROUNDED"))[SEARCH]
     assert decision.design == design
 
@@ -41,31 +45,43 @@ def test_each_design_left_out_has_its_numbers(kb, pellet):
         ("fd_spiral_high", "water_visibility 1.80 measured < 3.25 expected"),
         ("fd_spiral_medium", "water_visibility 1.80 measured < 2.25 expected"),
     ]
-    assert decision.reason == "o_status IN_ERROR_NFR: highest performance (0.25) among 1 eligible of 3 designs"
+    assert (
+        decision.reason
+        == "o_status IN_ERROR_NFR: highest performance (0.25) among 1 eligible of 3 designs"
+    )
 
 
 def test_numbers_that_look_alike_are_shown_with_more_digits(kb, pellet):
     decision = decide(pellet, searching("fd_spiral_medium", "2.2499999"))[SEARCH]
-    assert "water_visibility 2.2499999 measured < 2.25 expected" in [r.reason for r in decision.rejected]
+    assert "water_visibility 2.2499999 measured < 2.25 expected" in [
+        r.reason for r in decision.rejected
+    ]
 
 
 def test_with_no_design_left_the_present_one_is_kept_and_it_is_said(kb, pellet):
     decision = decide(pellet, searching("fd_spiral_low", 1.0))[SEARCH]
     assert decision.design is None
-    assert decision.reason == "o_status IN_ERROR_NFR: no function design is left, fd_spiral_low is kept"
+    assert (
+        decision.reason
+        == "o_status IN_ERROR_NFR: no function design is left, fd_spiral_low is kept"
+    )
     assert len(decision.rejected) == 3
 
 
 def test_an_objective_is_adapted_when_exceeded_or_always_to_be_improved(kb, pellet):
     exceeded = decide(pellet, searching("fd_spiral_low", 3.5), improve_exceeded=True)
     assert exceeded[SEARCH].design == "fd_spiral_high"
-    assert exceeded[SEARCH].reason.startswith("water_visibility 3.50 exceeds what fd_spiral_low expects")
+    assert exceeded[SEARCH].reason.startswith(
+        "water_visibility 3.50 exceeds what fd_spiral_low expects"
+    )
     always = decide(pellet, searching("fd_spiral_low", 3.5, always_improve=True))
     assert always[SEARCH].design == "fd_spiral_high"
     assert decide(pellet, searching("fd_spiral_low", 1.25), improve_exceeded=True) == {}
 
 
-@pytest.mark.parametrize("status", ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_NFR", "UPDATABLE"])
+@pytest.mark.parametrize(
+    "status", ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_NFR", "UPDATABLE"]
+)
 def test_statuses_that_call_for_adaptation(kb, pellet, status):
     design = "fd_spiral_low" if status == "UPDATABLE" else None  # as older models have it
     assert SEARCH in decide(pellet, searching(design, 3.5, status=status))
@@ -96,7 +112,9 @@ def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb, pe
 
 
 def test_a_design_in_the_error_log_is_left_out(suave_copy):
-    path = suave_copy(individual("fd_spiral_high", "FunctionDesign", ("fd_error_log", ":o_generate_search_path")))
+    path = suave_copy(
+        individual("fd_spiral_high", "FunctionDesign", ("fd_error_log", ":o_generate_search_path"))
+    )
     decision = decide_with(path, searching(None, 3.5, status="UNGROUNDED"))
     assert decision.design == "fd_spiral_medium"
     assert decision.rejected[0].reason == "o_generate_search_path is in its error log"
@@ -108,7 +126,9 @@ def test_a_value_that_the_objective_requires_is_compared_with_the_expected_one(s
         + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
         + individual("qa_energy_high", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.9"))
         + individual("fd_spiral_high", "FunctionDesign", ("hasQAestimation", ":qa_energy_high"))
-        + individual("qa_energy_medium", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.6"))
+        + individual(
+            "qa_energy_medium", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.6")
+        )
         + individual("fd_spiral_medium", "FunctionDesign", ("hasQAestimation", ":qa_energy_medium"))
     )
     decision = decide_with(path, searching(None, 3.5, status="UNGROUNDED"))
@@ -117,9 +137,13 @@ def test_a_value_that_the_objective_requires_is_compared_with_the_expected_one(s
 
 
 def test_a_value_is_bad_if_any_operator_of_its_attribute_says_so(suave_copy):
-    """The schema allows one operator; without that, expected and measured values are compared by each."""
+    """The schema allows one operator; without that, expected and measured values are compared by
+    each.
+    """
     designs = {"fd_spiral_low": "0.5", "fd_spiral_medium": "0.6", "fd_spiral_high": "0.7"}
-    added = individual("current", "QualityAttributeType", ("qa_comparison_operator", "<")) + "".join(
+    added = individual(
+        "current", "QualityAttributeType", ("qa_comparison_operator", "<")
+    ) + "".join(
         individual(f"qa_{name}", "QAvalue", ("isQAtype", ":current"), ("hasValue", value))
         + individual(name, "FunctionDesign", ("hasQAestimation", f":qa_{name}"))
         for name, value in designs.items()
@@ -129,9 +153,17 @@ def test_a_value_is_bad_if_any_operator_of_its_attribute_says_so(suave_copy):
 
     def decided(text: str, state: KnowledgeState) -> Decision:
         base = Ontology.load([suave_copy(text)])
-        facts = [each for each in base.content.triples if not (each[0] == QA_OPERATOR and "Functional" in str(each[2]))]
-        current = next(each for each in facts if each[1] == QA_OPERATOR and each[0].endswith("#current"))
-        content = replace(base.content, triples=(*facts, (*current[:2], Lit(">", current[2].datatype))))
+        facts = [
+            each
+            for each in base.content.triples
+            if not (each[0] == QA_OPERATOR and "Functional" in str(each[2]))
+        ]
+        current = next(
+            each for each in facts if each[1] == QA_OPERATOR and each[0].endswith("#current")
+        )
+        content = replace(
+            base.content, triples=(*facts, (*current[:2], Lit(">", current[2].datatype)))
+        )
         return decide(Reasoner(replace(base, content=content), "pellet"), state)[SEARCH]
 
     decision = decided(added + required, searching(None, None, status="UNGROUNDED"))
@@ -140,7 +172,10 @@ def test_a_value_is_bad_if_any_operator_of_its_attribute_says_so(suave_copy):
         ("fd_spiral_low", "current 0.50 expected < 0.60 required"),
         ("fd_spiral_high", "current 0.70 expected > 0.60 required"),
     }
-    measured = decided(added, KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": 0.6}))
+    measured = decided(
+        added,
+        KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": 0.6}),
+    )
     assert measured.design == "fd_spiral_medium"
     assert {r.reason for r in measured.rejected} == {
         "current 0.60 measured > 0.50 expected",
@@ -165,11 +200,15 @@ def test_a_required_value_without_operator_is_an_error(suave_copy):
         + individual("nfr", "QAvalue", ("isQAtype", ":noise"), ("hasValue", "0.5"))
         + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
     )
-    with pytest.raises(KnowledgeError, match="requires a value of noise, which has no qa_comparison_operator"):
+    with pytest.raises(
+        KnowledgeError, match="requires a value of noise, which has no qa_comparison_operator"
+    ):
         decide_with(path, searching(None, 2.5, status="UNGROUNDED"))
 
 
-@pytest.mark.parametrize(("operator", "allowed"), [("<", [0.5, 0.6]), ("<=", [0.6]), (">", [0.4, 0.5]), (">=", [0.4])])
+@pytest.mark.parametrize(
+    ("operator", "allowed"), [("<", [0.5, 0.6]), ("<=", [0.6]), (">", [0.4, 0.5]), (">=", [0.4])]
+)
 def test_the_operator_of_the_attribute_decides_what_is_bad(suave_copy, operator, allowed):
     path = suave_copy(
         individual("current", "QualityAttributeType", ("qa_comparison_operator", operator))
@@ -180,7 +219,9 @@ def test_the_operator_of_the_attribute_decides_what_is_bad(suave_copy, operator,
     reasoner = Reasoner(base, "pellet")
 
     def chosen(current: float) -> str | None:
-        state = KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": current})
+        state = KnowledgeState.of(
+            [ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": current}
+        )
         return decide(reasoner, state)[SEARCH].design
 
     assert [value for value in (0.4, 0.5, 0.6) if chosen(value) == "fd_spiral_high"] == allowed
@@ -191,7 +232,9 @@ def test_a_design_without_performance_counts_little_and_ties_go_by_name(suave_co
     path = suave_copy(silent)
     assert decide_with(path, searching(None, 2.5, status="UNGROUNDED")).design == "fd_spiral_medium"
     assert decide_with(path, searching(None, 0.5, status="UNGROUNDED")).design == "fd_a"
-    path = suave_copy(silent + individual("fd_0", "FunctionDesign", ("solvesF", ":f_generate_search_path")))
+    path = suave_copy(
+        silent + individual("fd_0", "FunctionDesign", ("solvesF", ":f_generate_search_path"))
+    )
     assert decide_with(path, searching(None, 0.5, status="UNGROUNDED")).design == "fd_0"
 
 

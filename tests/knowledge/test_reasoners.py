@@ -20,7 +20,9 @@ from tests.helpers.knowledge_states import SEARCH, searching
 
 
 def test_an_unknown_reasoner_is_told_with_those_known(kb):
-    with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of cached, owlready2, pellet\)"):
+    with pytest.raises(
+        InputError, match=r"there is no reasoner 'hermit' \(one of cached, owlready2, pellet\)"
+    ):
         Reasoner(kb, "hermit")
     assert all(Reasoner(kb, name).name == name for name in BACKENDS)
 
@@ -29,7 +31,9 @@ def test_the_same_state_is_reasoned_on_once_while_it_is_cached(kb, monkeypatch):
     monkeypatch.setattr("suave_des.knowledge.reasoner.CACHED_STATES", 2)
     asked = []
     infer = InProcessPellet.infer
-    monkeypatch.setattr(InProcessPellet, "infer", lambda *arguments: [asked.append(1), infer(*arguments)][1])
+    monkeypatch.setattr(
+        InProcessPellet, "infer", lambda *arguments: [asked.append(1), infer(*arguments)][1]
+    )
     reasoner = Reasoner(kb, "pellet")
     counts = []
     for visibility in (1.30, "1.3", 2, 3, 1.3):
@@ -108,7 +112,14 @@ def test_with_java_a_process_prints_nothing_hears_ctrl_c_and_a_fork_of_it_is_tol
 
 @pytest.mark.parametrize(
     ("number", "text"),
-    [(0.1, "0.1"), (2.50, "2.5"), (1e-5, "0.00001"), (1e16, "10000000000000000"), (3, "3"), ("1.20", "1.2")],
+    [
+        (0.1, "0.1"),
+        (2.50, "2.5"),
+        (1e-5, "0.00001"),
+        (1e16, "10000000000000000"),
+        (3, "3"),
+        ("1.20", "1.2"),
+    ],
 )
 def test_a_float_becomes_the_decimal_that_its_shortest_text_denotes(number, text):
     assert str(exact(number)) == text
@@ -122,9 +133,13 @@ def test_what_is_no_ordinary_number_is_refused(number):
 
 def test_the_order_in_which_a_state_is_given_does_not_matter():
     objectives = [ObjectiveState("f_b"), ObjectiveState("f_a", "UNGROUNDED")]
-    one = KnowledgeState.of(objectives, measurements={"x": 1.0, "w": 2}, components={"c2": "FALSE", "c1": "OK"})
+    one = KnowledgeState.of(
+        objectives, measurements={"x": 1.0, "w": 2}, components={"c2": "FALSE", "c1": "OK"}
+    )
     other = KnowledgeState.of(
-        reversed(objectives), measurements={"w": 2.0, "x": 1}, components={"c1": "OK", "c2": "FALSE"}
+        reversed(objectives),
+        measurements={"w": 2.0, "x": 1},
+        components={"c1": "OK", "c2": "FALSE"},
     )
     assert one == other
     assert hash(one) == hash(other)

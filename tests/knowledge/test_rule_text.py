@@ -1,4 +1,6 @@
-"""Rules as text: what is read, what is refused and where, and that what is written reads back the same."""
+"""Rules as text: what is read, what is refused and where, and that what is written reads back the
+same.
+"""
 
 import random
 from pathlib import Path
@@ -11,7 +13,16 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import MROS, SWRLB, TOMASYS, XSD, Lit
 from suave_des.knowledge.reasoner import Reasoner
-from suave_des.knowledge.rules import Atom, Named, Place, Rule, Variable, full_name, naming, write_rule
+from suave_des.knowledge.rules import (
+    Atom,
+    Named,
+    Place,
+    Rule,
+    Variable,
+    full_name,
+    naming,
+    write_rule,
+)
 from suave_des.knowledge.rules.files import fatal_problems, looked_up
 from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
 from tests.helpers.owl_text import rule as rule_in_owl
@@ -48,13 +59,17 @@ def test_every_construct_is_read():
     assert errors == ()
     assert (low.name, low.enabled, low.line) == ("LowBattery", True, 4)
     assert low.body[1] == Atom("", "hasQAvalue", (Variable("fg"), Variable("q")))
-    assert low.body[2] == Atom("", MROS + "requiredBy", (Variable("fg"), Named(full("suave:fd_spiral_low"))))
+    assert low.body[2] == Atom(
+        "", MROS + "requiredBy", (Variable("fg"), Named(full("suave:fd_spiral_low")))
+    )
     assert low.body[4].arguments[1] == Lit("-2.5", XSD + "decimal")
     assert low.body[4].places[2] == Place(6, 39)
     assert low.head[0].arguments[1] == Lit('IN "ERROR" é', XSD + "string")
     assert (quoted.name, quoted.enabled, quoted.body) == ("a rule, with: words", False, ())
     assert quoted.head[0] == Atom(
-        "", "http://example.org/my#seen", (Named("http://example.org/x"), Lit("true", XSD + "boolean"))
+        "",
+        "http://example.org/my#seen",
+        (Named("http://example.org/x"), Lit("true", XSD + "boolean")),
     )
     assert quoted.head[1].arguments == (Named("http://example.org/my#y"), Lit("3", XSD + "float"))
     assert (disabled.name, disabled.enabled) == ("disabled", True)
@@ -80,8 +95,16 @@ def full(name: str) -> str:
         ("A: B(?x) -> mors:C(?x)", "line 1, column 13", "did you mean mros?"),
         ("A: B(<no iri>) -> C(?x)", "line 1, column 6", "expected an argument"),
         (f"A: B({'9' * 500}) -> C(?x)", "line 1, column 6", "too many digits"),
-        ('A: B(?x)\n -> c(?x, "1,5"^^xsd:decimal)', "line 2, column 11", "'1,5' is not an xsd:decimal"),
-        ('A: c(?x, "2023-13-45"^^xsd:dateTime) -> B(?x)', "line 1, column 10", "'2023-13-45' is not an xsd:dateTime"),
+        (
+            'A: B(?x)\n -> c(?x, "1,5"^^xsd:decimal)',
+            "line 2, column 11",
+            "'1,5' is not an xsd:decimal",
+        ),
+        (
+            'A: c(?x, "2023-13-45"^^xsd:dateTime) -> B(?x)',
+            "line 1, column 10",
+            "'2023-13-45' is not an xsd:dateTime",
+        ),
         ("\x00", "line 1, column 1", "expected a rule's name instead of '\\x00'"),
     ],
 )
@@ -103,7 +126,11 @@ def test_mistakes_are_reported_with_line_and_column(text, place, problem, caplog
         ("A: B(?x) ∨ C(?x) -> D(?x)", 10, "SWRL has no 'or' (write a rule for each case)"),
         ("A: B(?x) and C(?x) -> D(?x)", 10, "expected ^ or -> instead of 'and'"),
         ("A: B(?x) -> C(?x) and D(?x)", 19, "expected ^ or -> instead of 'and'"),
-        ("A: B(?x) ^ and C(?x) -> D(?x)", 12, "expected an atom, such as Objective(?o), instead of 'and'"),
+        (
+            "A: B(?x) ^ and C(?x) -> D(?x)",
+            12,
+            "expected an atom, such as Objective(?o), instead of 'and'",
+        ),
         ("A: B(?x) => C(?x)", 10, "expected ^ or -> instead of '=>'"),
         ("A: b(?x, ?v) ^ ?v < 3.5 -> C(?x)", 16, "instead of '?v'"),
         ("A: b(?x, 'FALSE') -> C(?x)", 10, "expected an argument, such as ?o"),
@@ -132,22 +159,62 @@ def test_after_a_mistake_the_other_rules_are_read():
         ("hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "no builtin lessThn in Pellet"),
         ("hasValue(?q, ?v) ^ lessThan(?w, 1) -> Role(?q)", 32, "?w has no value in lessThan"),
         ("Role(?q) ^ differentFrom(?q, ?w) -> Role(?q)", 33, "?w has no value in differentFrom"),
-        ("hasValue(?q, ?v) -> Role(?g)", 29, "?g occurs in the head, but the body does not bind it"),
+        (
+            "hasValue(?q, ?v) -> Role(?g)",
+            29,
+            "?g occurs in the head, but the body does not bind it",
+        ),
         ("Objective(?o, ?x) -> Role(?o)", 4, "Objective is a class, but is used as a property"),
         ("o_status(?o) -> Role(?o)", 4, "o_status is a data property, but is used as a class"),
         ("solvesO(?f, ?o, ?p) -> Role(?o)", 4, "solvesO takes two arguments, not 3"),
         ('typeFD(?f, "x") -> Role(?f)', 15, "is a value, but an individual is needed"),
-        ("fg_status(?f, fd_spiral_low) -> Role(?f)", 18, "is an individual where a value is needed"),
-        ("FunctionGrounding(?f) -> fg_status(?f, false)", 43, "contradicts whatever it is concluded of"),
+        (
+            "fg_status(?f, fd_spiral_low) -> Role(?f)",
+            18,
+            "is an individual where a value is needed",
+        ),
+        (
+            "FunctionGrounding(?f) -> fg_status(?f, false)",
+            43,
+            "contradicts whatever it is concluded of",
+        ),
         ("hasValue(?f, 2) -> Role(?f)", 17, "write 2.0"),
-        ("hasValue(?q, ?v) ^ Role(?v) -> Role(?q)", 28, "?v stands for an individual and for a value"),
+        (
+            "hasValue(?q, ?v) ^ Role(?v) -> Role(?q)",
+            28,
+            "?v stands for an individual and for a value",
+        ),
         ("Role(?x) -> lessThan(1, 2)", 16, "occurs in the head"),
-        ("isQAtype(?q, turbidity) -> Role(?q)", 17, "declare it: an individual turbidity of QualityAttributeType"),
-        ("c_status(?c, FALSE) -> Role(?c)", 17, 'FALSE is not defined (declare it, or write "FALSE" for a text'),
-        ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (declare it"),
-        ("hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)", 23, "not 3 (arguments are separated by"),
-        ("Role(?q) ^ date(?d, 2020, 1, 15) -> Role(?q)", 20, "?d has no value in date: no other atom binds it"),
-        ("hasValue(?q, ?v) ^ xsd:decmal(?v) -> Role(?q)", 23, "datatype decmal is not defined (did you mean decimal?)"),
+        (
+            "isQAtype(?q, turbidity) -> Role(?q)",
+            17,
+            "declare it: an individual turbidity of QualityAttributeType",
+        ),
+        (
+            "c_status(?c, FALSE) -> Role(?c)",
+            17,
+            'FALSE is not defined (declare it, or write "FALSE" for a text',
+        ),
+        (
+            "Role(?r) -> fd_realisability(fd_spiral_low, False)",
+            48,
+            "False is not defined (declare it",
+        ),
+        (
+            "hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)",
+            23,
+            "not 3 (arguments are separated by",
+        ),
+        (
+            "Role(?q) ^ date(?d, 2020, 1, 15) -> Role(?q)",
+            20,
+            "?d has no value in date: no other atom binds it",
+        ),
+        (
+            "hasValue(?q, ?v) ^ xsd:decmal(?v) -> Role(?q)",
+            23,
+            "datatype decmal is not defined (did you mean decimal?)",
+        ),
         ('Role(?q) ^ anyURI(?d, "a") -> Role(?q)', 15, "anyURI takes 7 arguments, not 2"),
     ],
 )
@@ -161,14 +228,18 @@ def test_an_ambiguous_name_wants_a_prefix(suave_copy, tmp_path):
     twins = "".join(f'<owl:Class rdf:about="http://{one}.org/#Twin"/>' for one in "ab")
     path = tmp_path / "mine.swrl"
     path.write_text("A: Twin(?x) -> Role(?x)", encoding="utf-8")
-    with pytest.raises(RuleError, match=r"ambiguous \(write http://a.org/#Twin or http://b.org/#Twin\)"):
+    with pytest.raises(
+        RuleError, match=r"ambiguous \(write http://a.org/#Twin or http://b.org/#Twin\)"
+    ):
         Ontology.load([suave_copy(twins)], rules=[path])
     path.write_text("A: <http://a.org/#Twin>(?x) -> Role(?x)", encoding="utf-8")
     assert Ontology.load([suave_copy(twins)], rules=[path]).rules
 
 
 def test_a_file_takes_the_place_of_rules_of_its_names(kb, tmp_path):
-    changed = rules_with("disabled QAenergy: Role(?x) -> Role(?x)\ncompRecov: Role(?x) -> Role(?x)\n", tmp_path)
+    changed = rules_with(
+        "disabled QAenergy: Role(?x) -> Role(?x)\ncompRecov: Role(?x) -> Role(?x)\n", tmp_path
+    )
     assert len(changed.rules) == len(kb.rules)
     by_name = {rule.name: rule for rule in changed.rules}
     assert not by_name["QAenergy"].enabled
@@ -181,7 +252,9 @@ def test_rules_are_switched_off_by_name(kb, tmp_path):
     off = rules_with(RULE, tmp_path, disabled_rules=["LowBattery", "S1a"])
     assert [rule.name for rule in off.rules if not rule.enabled] == ["LowBattery", "S1a"]
     assert off.content_hash not in (kb.content_hash, rules_with(RULE, tmp_path).content_hash)
-    with pytest.raises(KnowledgeError, match=r"no rule LowBatery to switch off \(did you mean LowBattery"):
+    with pytest.raises(
+        KnowledgeError, match=r"no rule LowBatery to switch off \(did you mean LowBattery"
+    ):
         rules_with(RULE, tmp_path, disabled_rules=["LowBatery"])
 
 
@@ -201,34 +274,52 @@ def test_files_that_are_no_rules(content, words, tmp_path):
 
 
 def same(one: Rule, other: Rule) -> bool:
-    return (one.name, one.enabled, one.body, one.head) == (other.name, other.enabled, other.body, other.head)
+    return (one.name, one.enabled, one.body, one.head) == (
+        other.name,
+        other.enabled,
+        other.body,
+        other.head,
+    )
 
 
 def test_the_shipped_rules_written_and_read_back_are_the_same(kb, tmp_path):
     named = naming(lambda iri: not kb.vocabulary.means_itself(iri))
-    text = "\n".join(write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled) for rule in kb.rules)
+    text = "\n".join(
+        write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled)
+        for rule in kb.rules
+    )
     assert "<" not in text.replace("<http", "")
     again = rules_with(text, tmp_path)
     assert all(map(same, again.rules, kb.rules))
-    assert again.content.n_triples().count("BuiltinAtom") == kb.content.n_triples().count("BuiltinAtom")
+    assert again.content.n_triples().count("BuiltinAtom") == kb.content.n_triples().count(
+        "BuiltinAtom"
+    )
 
 
 words = st.from_regex(r"[A-Za-zé_][\w.-]{0,8}", fullmatch=True)
-texts = st.text(st.characters(exclude_categories=["Cs", "Cc"]) | st.sampled_from('"\\\n\t#'), max_size=12)
-iris = words.filter(lambda word: word[-1] not in ".-").map(lambda word: f"http://x.org/{word}#y") | st.sampled_from(
-    [TOMASYS + "Objective", MROS + "energy", SWRLB + "lessThan", "urn:a:b"]
+texts = st.text(
+    st.characters(exclude_categories=["Cs", "Cc"]) | st.sampled_from('"\\\n\t#'), max_size=12
 )
+iris = words.filter(lambda word: word[-1] not in ".-").map(
+    lambda word: f"http://x.org/{word}#y"
+) | st.sampled_from([TOMASYS + "Objective", MROS + "energy", SWRLB + "lessThan", "urn:a:b"])
 literals = (
     texts.map(lambda text: Lit(text, XSD + "string"))
     | texts.map(lambda text: Lit(text, "http://x.org/#t"))
-    | st.decimals(allow_nan=False, allow_infinity=False).map(lambda number: Lit(format(number, "f"), XSD + "decimal"))
+    | st.decimals(allow_nan=False, allow_infinity=False).map(
+        lambda number: Lit(format(number, "f"), XSD + "decimal")
+    )
     | st.integers().map(lambda number: Lit(str(number), XSD + "integer"))
-    | st.floats(allow_nan=False, allow_infinity=False).map(lambda number: Lit(repr(number), XSD + "double"))
+    | st.floats(allow_nan=False, allow_infinity=False).map(
+        lambda number: Lit(repr(number), XSD + "double")
+    )
     | st.booleans().map(lambda truth: Lit(str(truth).lower(), XSD + "boolean"))
     | texts.map(lambda text: Lit(text, "@en"))
 )
 terms = literals | iris.map(Named) | st.from_regex(r"\w[\w-]{0,6}", fullmatch=True).map(Variable)
-atoms = st.builds(lambda name, arguments: Atom("", name, tuple(arguments)), iris, st.lists(terms, max_size=4))
+atoms = st.builds(
+    lambda name, arguments: Atom("", name, tuple(arguments)), iris, st.lists(terms, max_size=4)
+)
 
 
 @given(
@@ -239,7 +330,12 @@ atoms = st.builds(lambda name, arguments: Atom("", name, tuple(arguments)), iris
 )
 def test_any_rule_that_is_written_reads_back_the_same(name, body, head, enabled):
     rule = parse_rule(write_rule(name, body, head, full_name, enabled=enabled))
-    assert (rule.name, rule.body, rule.head, rule.enabled) == (name, tuple(body), tuple(head), enabled)
+    assert (rule.name, rule.body, rule.head, rule.enabled) == (
+        name,
+        tuple(body),
+        tuple(head),
+        enabled,
+    )
 
 
 @pytest.mark.parametrize("count", [1_000, pytest.param(20_000, marks=pytest.mark.slow)])
@@ -281,5 +377,7 @@ def test_a_rule_of_five_thousand_atoms_is_read_at_once():
 
 def test_what_java_throws_is_an_error_for_the_user(suave_copy):
     odd = rule_in_owl("odd", 'FunctionGrounding(?g) ^ typeFD(?g, "text") -> Role(?g)')
-    with pytest.raises(KnowledgeError, match=r"Pellet cannot use the ontologies: .*literal as an individual"):
+    with pytest.raises(
+        KnowledgeError, match=r"Pellet cannot use the ontologies: .*literal as an individual"
+    ):
         Reasoner(Ontology.load([suave_copy(odd)]), "pellet")

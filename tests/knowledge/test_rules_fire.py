@@ -1,4 +1,6 @@
-"""Each rule of the shipped ontologies concludes what it says, and nothing where its condition does not hold."""
+"""Each rule of the shipped ontologies concludes what it says, and nothing where its condition does
+not hold.
+"""
 
 from collections.abc import Mapping
 from decimal import Decimal
@@ -44,7 +46,9 @@ def test_visibility_below_what_the_design_expects_is_an_error(pellet, design, vi
 
 
 def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_error(pellet):
-    state = searching("fd_spiral_low", 2.0, motion="fd_all_thrusters", components={"c_thruster_3": "FALSE"})
+    state = searching(
+        "fd_spiral_low", 2.0, motion="fd_all_thrusters", components={"c_thruster_3": "FALSE"}
+    )
     assert inferred(pellet, state) == {
         "fd_realisability(fd_all_thrusters, false)",
         "fg_status(fg_all_thrusters, IN_ERROR_COMPONENT)",
@@ -56,12 +60,19 @@ def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_er
 
 
 def test_the_recovering_design_is_not_in_error_by_a_failed_thruster(pellet):
-    state = searching("fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_3": "FALSE"})
+    state = searching(
+        "fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_3": "FALSE"}
+    )
     assert inferred(pellet, state) == {"fd_realisability(fd_all_thrusters, false)"}
 
 
 def test_a_recovered_component_makes_every_objective_updatable(pellet):
-    state = searching("fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_1": "RECOVERED"})
+    state = searching(
+        "fd_spiral_low",
+        2.0,
+        motion="fd_recover_thrusters",
+        components={"c_thruster_1": "RECOVERED"},
+    )
     assert inferred(pellet, state) == {
         "o_updatable(o_generate_search_path, true)",
         "o_updatable(o_maintain_motion, true)",
@@ -70,7 +81,9 @@ def test_a_recovered_component_makes_every_objective_updatable(pellet):
 
 @pytest.mark.parametrize("attribute", ["energy", "safety"])
 @pytest.mark.parametrize(("measured", "in_error"), [(0.6, True), (0.5, False), (0.4, False)])
-def test_more_than_the_objective_requires_is_an_error_and_logged(suave_copy, attribute, measured, in_error):
+def test_more_than_the_objective_requires_is_an_error_and_logged(
+    suave_copy, attribute, measured, in_error
+):
     path = suave_copy(
         individual("nfr", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.5"))
         + individual("qa_low", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.9"))
@@ -78,11 +91,15 @@ def test_more_than_the_objective_requires_is_an_error_and_logged(suave_copy, att
         + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
     )
     state = KnowledgeState.of(
-        [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_low"}, measurements={attribute: measured}
+        [ObjectiveState(SEARCH)],
+        groundings={SEARCH: "fd_spiral_low"},
+        measurements={attribute: measured},
     )
     inference = with_files(path).analyze(state)
     assert inference.objective_status(SEARCH) == ("IN_ERROR_FR" if in_error else None)
-    assert inference.values("fd_spiral_low", "fd_error_log") == (("o_generate_search_path",) if in_error else ())
+    assert inference.values("fd_spiral_low", "fd_error_log") == (
+        ("o_generate_search_path",) if in_error else ()
+    )
 
 
 @pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
@@ -94,9 +111,12 @@ def test_an_error_of_a_grounding_becomes_its_objectives_error(suave_copy, kind):
 
 @pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
 def test_an_objectives_error_reaches_the_grounding_that_requires_it(suave_copy, kind):
-    path = suave_copy(individual("fg_spiral_low", "FunctionGrounding", ("requiresO", ":o_maintain_motion")))
+    path = suave_copy(
+        individual("fg_spiral_low", "FunctionGrounding", ("requiresO", ":o_maintain_motion"))
+    )
     state = KnowledgeState.of(
-        [ObjectiveState(SEARCH), ObjectiveState(MOTION, f"IN_ERROR_{kind}")], groundings={SEARCH: "fd_spiral_low"}
+        [ObjectiveState(SEARCH), ObjectiveState(MOTION, f"IN_ERROR_{kind}")],
+        groundings={SEARCH: "fd_spiral_low"},
     )
     inference = with_files(path).analyze(state)
     assert inference.grounding_status(SEARCH) == f"IN_ERROR_{kind}"
@@ -104,13 +124,22 @@ def test_an_objectives_error_reaches_the_grounding_that_requires_it(suave_copy, 
 
 
 def bound_thruster(status: str) -> str:
-    """A role of fd_spiral_low that a component in status takes, and whose specification has a unique class."""
+    """A role of fd_spiral_low that a component in status takes, and whose specification has a
+    unique class.
+    """
     return (
         individual("cc_camera", "ComponentClass", ("cc_unique", "true"))
         + individual("cs_camera", "ComponentSpecification", ("typeC", ":cc_camera"))
         + individual("r_camera", "Role", ("roleDef", ":cs_camera"))
-        + individual("c_camera", "Component", ("typeC", ":cc_camera"), *([("c_status", status)] if status else []))
-        + individual("b_camera", "Binding", ("binding_component", ":c_camera"), ("binding_role", ":r_camera"))
+        + individual(
+            "c_camera",
+            "Component",
+            ("typeC", ":cc_camera"),
+            *([("c_status", status)] if status else []),
+        )
+        + individual(
+            "b_camera", "Binding", ("binding_component", ":c_camera"), ("binding_role", ":r_camera")
+        )
         + individual("fg_spiral_low", "FunctionGrounding", ("hasBindings", ":b_camera"))
         + individual("fd_spiral_low", "FunctionDesign", ("roles", ":r_camera"))
     )
@@ -147,14 +176,18 @@ def test_an_unavailable_specification_makes_the_design_unrealisable(suave_copy):
 
 
 def test_a_status_in_the_ontology_holds_until_diagnostics_report_another(suave_copy):
-    reasoner = with_files(suave_copy(individual("c_thruster_1", "Component", ("c_status", "FALSE"))))
+    reasoner = with_files(
+        suave_copy(individual("c_thruster_1", "Component", ("c_status", "FALSE")))
+    )
     assert inferred(reasoner, searching()) == {"fd_realisability(fd_all_thrusters, false)"}
     assert inferred(reasoner, searching(components={"c_thruster_1": "OK"})) == set()
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
 def test_a_disabled_rule_does_not_fire(suave_copy, name):
-    path = suave_copy(replace={'#boolean">true</swrla:isRuleEnabled>': '#boolean">false</swrla:isRuleEnabled>'})
+    path = suave_copy(
+        replace={'#boolean">true</swrla:isRuleEnabled>': '#boolean">false</swrla:isRuleEnabled>'}
+    )
     base = Ontology.load([path])
     assert [rule.name for rule in base.rules if not rule.enabled] == ["QAWaterVisibility"]
     assert Reasoner(base, name).analyze(searching("fd_spiral_high", 1.0)).facts == frozenset()
@@ -162,7 +195,10 @@ def test_a_disabled_rule_does_not_fire(suave_copy, name):
 
 def _clash(suave_copy: MakeOntology) -> Path:
     return suave_copy(
-        rule("alarm", 'FunctionGrounding(?g) ^ typeFD(?g, :fd_spiral_high) -> fg_status(?g, "IN_ERROR_FR")')
+        rule(
+            "alarm",
+            'FunctionGrounding(?g) ^ typeFD(?g, :fd_spiral_high) -> fg_status(?g, "IN_ERROR_FR")',
+        )
     )
 
 
@@ -172,11 +208,20 @@ def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy, name):
     with pytest.raises(KnowledgeError) as error:
         reasoner.analyze(searching("fd_spiral_high", 3.0))
     message = str(error.value)
-    for part in ("fg_spiral_high", "fg_status", "alarm", "QAWaterVisibility", "hasValue(obs_water_visibility, 3)"):
+    for part in (
+        "fg_spiral_high",
+        "fg_status",
+        "alarm",
+        "QAWaterVisibility",
+        "hasValue(obs_water_visibility, 3)",
+    ):
         assert part in message
     assert "\n" not in message
     if name == "pellet":  # and the next state is reasoned on as if nothing had happened
-        assert reasoner.analyze(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "IN_ERROR_FR"
+        assert (
+            reasoner.analyze(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH)
+            == "IN_ERROR_FR"
+        )
 
 
 def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy):

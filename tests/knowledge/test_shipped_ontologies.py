@@ -1,4 +1,6 @@
-"""The shipped ontologies hold the exemplar's vocabulary and model under its names, as Protégé writes them."""
+"""The shipped ontologies hold the exemplar's vocabulary and model under its names, as Protégé
+writes them.
+"""
 
 from decimal import Decimal
 from pathlib import Path
@@ -31,9 +33,7 @@ DATA_PROPERTIES = (
     "c_status fg_status o_status fd_realisability o_updatable o_always_improve hasValue qa_comparison_operator "
     "qa_critical fd_efficacy b_status cc_unique cc_availability cspec_availability"
 )
-FUNCTIONAL = (
-    "solvesF typeF typeFD solvesO isQAtype c_status fg_status o_status fd_realisability hasValue qa_comparison_operator"
-)
+FUNCTIONAL = "solvesF typeF typeFD solvesO isQAtype c_status fg_status o_status fd_realisability hasValue qa_comparison_operator"
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,15 @@ def names(graph: Graph, kind: URIRef) -> set[str]:
 
 def test_the_vocabulary_is_complete(tomasys):
     assert names(tomasys, OWL.Class) == set(CLASSES.split())
-    others = {"roles", "roleDef", "typeC", "hasBindings", "binding_role", "binding_component", MROS + "requiredBy"}
+    others = {
+        "roles",
+        "roleDef",
+        "typeC",
+        "hasBindings",
+        "binding_role",
+        "binding_component",
+        MROS + "requiredBy",
+    }
     assert names(tomasys, OWL.ObjectProperty) == others | set(OBJECT_PROPERTIES)
     assert names(tomasys, OWL.DatatypeProperty) == set(DATA_PROPERTIES.split())
     assert names(tomasys, OWL.FunctionalProperty) == set(FUNCTIONAL.split())
@@ -59,7 +67,13 @@ def test_the_vocabulary_is_complete(tomasys):
 def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped):
     for path in shipped.glob("*.owl"):
         graph = Graph().parse(path, format="xml")
-        kinds = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.NamedIndividual, URIRef(SWRL + "Imp")]
+        kinds = [
+            OWL.Class,
+            OWL.ObjectProperty,
+            OWL.DatatypeProperty,
+            OWL.NamedIndividual,
+            URIRef(SWRL + "Imp"),
+        ]
         terms = {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
         assert terms
         for term in terms:
@@ -70,8 +84,16 @@ def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped):
 def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
     assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
     assert tuple(kb.model.components) == tuple(f"c_thruster_{n}" for n in range(1, 7))
-    assert set(kb.model.attributes) == {"water_visibility", "battery_level", "performance", "energy", "safety"}
-    visibility = {d: kb.expected(d)["water_visibility"] for d in kb.designs("f_generate_search_path")}
+    assert set(kb.model.attributes) == {
+        "water_visibility",
+        "battery_level",
+        "performance",
+        "energy",
+        "safety",
+    }
+    visibility = {
+        d: kb.expected(d)["water_visibility"] for d in kb.designs("f_generate_search_path")
+    }
     assert visibility == {
         "fd_spiral_high": Decimal("3.25"),
         "fd_spiral_low": Decimal("1.25"),

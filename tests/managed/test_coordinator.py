@@ -23,7 +23,9 @@ def scenario(name: str, time_limit_s: float) -> Scenario:
 
 
 class Mission:
-    """A coordinator with a detection and a path's end at given times; what it asks for, with the times."""
+    """A coordinator with a detection and a path's end at given times; what it asks for, with the
+    times.
+    """
 
     def __init__(
         self,
@@ -45,11 +47,16 @@ class Mission:
         self.tasks: list[Task] = []
         self.on_cancel: Callable[[], None] = lambda: None
         self.logged: list[tuple[float, str, str]] = []
-        phases_s = {"coordinator": POLL_PHASE_S if name == "2023" else 0.035, "limit": LIMIT_PHASE_S}
+        phases_s = {
+            "coordinator": POLL_PHASE_S if name == "2023" else 0.035,
+            "limit": LIMIT_PHASE_S,
+        }
         self.coordinator = MissionCoordinator(
             self.env,
             scenario(name, time_limit_s),
-            SimpleNamespace(value=lambda key: start_delay_s, phase=lambda timer, period_s: phases_s[timer]),
+            SimpleNamespace(
+                value=lambda key: start_delay_s, phase=lambda timer, period_s: phases_s[timer]
+            ),
             self.detector,
             self.follow,
             lambda source, event, detail: self.logged.append((self.env.now, event, detail)),
@@ -85,7 +92,9 @@ def test_search_is_requested_when_the_mission_starts(name):
 
 
 @pytest.mark.parametrize(("name", "poll_s"), [("2023", 74.35), ("1.5", 73.535)])
-def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_begins(name, poll_s):
+def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_begins(
+    name, poll_s
+):
     assert Mission(name, 73.45).run().calls[1:3] == [
         ("cancel", poll_s, "search_pipeline"),
         ("request", poll_s, "inspect_pipeline"),
@@ -120,7 +129,9 @@ def test_the_limit_is_checked_every_half_second(name, limit_s, end_s):
     assert Mission(name, time_limit_s=limit_s).run().env.now == pytest.approx(end_s)
 
 
-@pytest.mark.parametrize(("detected_s", "task"), [(None, "search_pipeline"), (150.0, "inspect_pipeline")])
+@pytest.mark.parametrize(
+    ("detected_s", "task"), [(None, "search_pipeline"), (150.0, "inspect_pipeline")]
+)
 @BOTH
 def test_at_the_limit_the_present_task_is_cancelled(name, detected_s, task):
     assert Mission(name, detected_s).run().calls[-1] == ("cancel", 300.2, task)
@@ -136,7 +147,10 @@ def test_distance_is_the_one_published_before_the_cancellation_at_the_limit():
 def test_the_mission_ends_at_the_poll_after_the_end_of_the_path(name, end_s):
     mission = Mission(name, 50.0, 201.1).run()
     assert mission.env.now == pytest.approx(end_s)
-    assert [task for what, _, task in mission.calls if what == "cancel"] == ["search_pipeline", "inspect_pipeline"]
+    assert [task for what, _, task in mission.calls if what == "cancel"] == [
+        "search_pipeline",
+        "inspect_pipeline",
+    ]
 
 
 def test_a_detection_that_no_poll_saw_before_the_limit_is_none():
@@ -145,7 +159,8 @@ def test_a_detection_that_no_poll_saw_before_the_limit_is_none():
 
 
 @pytest.mark.parametrize(
-    ("name", "mission_wide", "per_task"), [("2023", ("f_maintain_motion",), ()), ("1.5", (), ("f_maintain_motion",))]
+    ("name", "mission_wide", "per_task"),
+    [("2023", ("f_maintain_motion",), ()), ("1.5", (), ("f_maintain_motion",))],
 )
 def test_functions_that_the_mission_and_each_task_need(name, mission_wide, per_task):
     mission = Mission(name, 50.0)

@@ -1,4 +1,6 @@
-"""User-defined functions: named in the scenario or registered by a package, needed by tasks, switched by modes."""
+"""User-defined functions: named in the scenario or registered by a package, needed by tasks,
+switched by modes.
+"""
 
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -33,7 +35,10 @@ modes_file: modes.yaml
 mission: {functions: {search_pipeline: [f_lights]}}
 default_modes: {f_lights: fd_dim}
 """
-NAMED = NEEDED + "functions: {f_lights: {node: 'tests.managed.test_custom_functions:Lights', lamps: 2}}\n"
+NAMED = (
+    NEEDED
+    + "functions: {f_lights: {node: 'tests.managed.test_custom_functions:Lights', lamps: 2}}\n"
+)
 
 
 class Lights(CustomFunction):
@@ -80,7 +85,9 @@ def test_a_function_is_active_while_the_task_lasts_that_needs_it(fly):
 
 
 def test_a_function_that_is_needed_all_the_time_belongs_to_no_task(fly):
-    assert of_lights(fly(NAMED.replace("search_pipeline", "mission_wide"))) == []  # none sets modes of tasks only
+    assert (
+        of_lights(fly(NAMED.replace("search_pipeline", "mission_wide"))) == []
+    )  # none sets modes of tasks only
 
 
 def test_the_mission_itself_stays_the_same(fly):
@@ -88,8 +95,12 @@ def test_the_mission_itself_stays_the_same(fly):
 
 
 def test_a_package_registers_a_function_under_its_name(fly, monkeypatch):
-    point = EntryPoint("f_lights", "tests.managed.test_custom_functions:Lights", registry.FUNCTION_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == registry.FUNCTION_GROUP else [])
+    point = EntryPoint(
+        "f_lights", "tests.managed.test_custom_functions:Lights", registry.FUNCTION_GROUP
+    )
+    monkeypatch.setattr(
+        registry, "entry_points", lambda group: [point] if group == registry.FUNCTION_GROUP else []
+    )
     registry._registered.cache_clear()
     try:
         assert [event.event for event in of_lights(fly(NEEDED))] == ["lights_on", "lights_off"]
@@ -100,11 +111,31 @@ def test_a_package_registers_a_function_under_its_name(fly, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "problem", "remedy"),
     [
-        (NEEDED, "function f_lights has no node", "name its class: functions: {f_lights: {node: module:Class}}"),
-        (NEEDED.replace("[f_lights]", "[f_light]"), "there is no function 'f_light'", "did you mean"),
-        (NAMED.replace("Lights'", "Lamps'"), "no subclass of CustomFunction named 'Lamps'", "suave_des.CustomFunction"),
-        (NAMED.replace("tests.managed.test_custom_functions:Lights", "x"), "no package registers 'x'", "module:"),
-        (NAMED.replace("tests.managed", "nowhere.at_all"), "No module named 'nowhere'", "must be importable"),
+        (
+            NEEDED,
+            "function f_lights has no node",
+            "name its class: functions: {f_lights: {node: module:Class}}",
+        ),
+        (
+            NEEDED.replace("[f_lights]", "[f_light]"),
+            "there is no function 'f_light'",
+            "did you mean",
+        ),
+        (
+            NAMED.replace("Lights'", "Lamps'"),
+            "no subclass of CustomFunction named 'Lamps'",
+            "suave_des.CustomFunction",
+        ),
+        (
+            NAMED.replace("tests.managed.test_custom_functions:Lights", "x"),
+            "no package registers 'x'",
+            "module:",
+        ),
+        (
+            NAMED.replace("tests.managed", "nowhere.at_all"),
+            "No module named 'nowhere'",
+            "must be importable",
+        ),
         (NAMED.replace("node: 'tests", "node: '1tests"), "is not a valid name", "letters"),
         (NAMED.replace("node:", "nod:"), "is missing", "add it"),
         (NAMED.replace("{f_lights: {node", "{f_lihgts: {node"), "no function 'f_lihgts'", "f_lig"),
@@ -126,8 +157,14 @@ def test_what_is_missing_is_said(fly, text, problem, remedy):
     ("body", "words"),
     [
         ("def activate(self): pass", "activate is not a hook, .*did you mean def activated.self."),
-        ("def activated(self): pass\n    def configured(self, mode): pass", "configured is not a hook"),
-        ("def activated(self): yield self.env.timeout(1.0)", "write def activated.self.; only adapt may yield"),
+        (
+            "def activated(self): pass\n    def configured(self, mode): pass",
+            "configured is not a hook",
+        ),
+        (
+            "def activated(self): yield self.env.timeout(1.0)",
+            "write def activated.self.; only adapt may yield",
+        ),
         ("async def activated(self): pass", "write def activated"),
         ("def configure(self): pass", "write def configure.self, mode."),
         ("def __init__(self): pass", "write def __init__.self, context."),
@@ -141,9 +178,18 @@ def test_what_is_missing_is_said(fly, text, problem, remedy):
             "def activated(self): self.context.bus.subscribe(self.heard)\n    def heard(self, diagnostic): 1 / 0",
             "s: ZeroDivisionError: division by zero",
         ),
-        ("def __init__(self, context): context.settings['bulbs']", "function f_lights: KeyError: 'bulbs'"),
-        ("def __init__(self, context): pass", "function f_lights: .*does not begin with super...__init__.context."),
-        ("def activated(self): self.context.sender.send(float('nan'), 0.0, -18.0)", "the set-point .nan, 0.0, -18.0."),
+        (
+            "def __init__(self, context): context.settings['bulbs']",
+            "function f_lights: KeyError: 'bulbs'",
+        ),
+        (
+            "def __init__(self, context): pass",
+            "function f_lights: .*does not begin with super...__init__.context.",
+        ),
+        (
+            "def activated(self): self.context.sender.send(float('nan'), 0.0, -18.0)",
+            "the set-point .nan, 0.0, -18.0.",
+        ),
     ],
 )
 def test_a_function_with_a_wrong_hook_or_that_raises_is_named(fly, tmp_path, body, words):
@@ -160,5 +206,7 @@ def test_a_mode_of_a_function_without_node_is_neither_offered_nor_set(fly):
     assert mission.mode_manager.available_modes("f_lights") == ()
     assert mission.mode_manager.change_mode("f_lights", "fd_dim") is False
     result = mission.result()
-    assert any((event.event, event.detail) == ("refused", "f_lights -> fd_dim") for event in result.events)
+    assert any(
+        (event.event, event.detail) == ("refused", "f_lights -> fd_dim") for event in result.events
+    )
     assert any("name its class under functions:" in reason for reason in result.remarks)

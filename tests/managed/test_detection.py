@@ -1,4 +1,6 @@
-"""Pipeline detection: the first sight on the vehicle's way, whoever looks at the vehicle meanwhile."""
+"""Pipeline detection: the first sight on the vehicle's way, whoever looks at the vehicle
+meanwhile.
+"""
 
 import math
 
@@ -23,10 +25,14 @@ DURATION_S = 120.0
 class Sight:
     """A vehicle that is sent to places at given times, and a detector."""
 
-    def __init__(self, commands: list, visibility_m: float = 3.0, readings: tuple[float, ...] = ()) -> None:
+    def __init__(
+        self, commands: list, visibility_m: float = 3.0, readings: tuple[float, ...] = ()
+    ) -> None:
         self.env = simpy.Environment()
         autopilot = Autopilot()
-        self.vehicle = Vehicle(BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S)
+        self.vehicle = Vehicle(
+            BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S
+        )
         self.visibility_m = visibility_m
         self.logged: list[tuple[float, str]] = []
         self.detector = PipelineDetector(
@@ -37,7 +43,9 @@ class Sight:
             lambda source, event, detail: self.logged.append((self.env.now, event)),
         )
         for t_s, place in commands:
-            self.env.process(self._at(t_s, lambda place=place: self.vehicle.command(self.env.now, *place)))
+            self.env.process(
+                self._at(t_s, lambda place=place: self.vehicle.command(self.env.now, *place))
+            )
         for t_s in readings:
             self.env.process(self._at(t_s, lambda: self.vehicle.pose(self.env.now)))
 
@@ -98,7 +106,10 @@ def test_without_sight_until_the_end_there_is_no_detection():
 
 
 commands = st.lists(
-    st.tuples(st.floats(0.0, 60.0), st.tuples(st.floats(-20, -14), st.floats(-3, 4), st.floats(-19.5, -17))),
+    st.tuples(
+        st.floats(0.0, 60.0),
+        st.tuples(st.floats(-20, -14), st.floats(-3, 4), st.floats(-19.5, -17)),
+    ),
     min_size=1,
     max_size=8,
 )

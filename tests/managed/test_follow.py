@@ -12,19 +12,35 @@ import simpy
 from suave_des.managed.follow import FollowPipeline, InspectionPath
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle
-from tests.helpers.stand_ins import ACTIVE, BLUEROV2, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
+from tests.helpers.stand_ins import (
+    ACTIVE,
+    BLUEROV2,
+    INACTIVE,
+    MovingVehicle,
+    PlacedVehicle,
+    revision,
+    sender,
+)
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 LINE = [(-0.5 * n, 0.0) for n in range(45)]  # more than are queued at a time
 SPEED = 0.25
 
 
-def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
+def follow_of(
+    env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE
+) -> FollowPipeline:
     """A follow function whose path is a line; without one, the pipeline is not detected."""
     points = np.insert(np.array(path or LINE), 2, -18.75, axis=1)
     lengths_m = (0.0, *(math.dist(a, b) for a, b in pairwise(points.tolist())))
     detector = SimpleNamespace(first_point=None if path is None else 0)
-    return FollowPipeline(env, sender(env, vehicle), revision(name).follow, InspectionPath(points, lengths_m), detector)
+    return FollowPipeline(
+        env,
+        sender(env, vehicle),
+        revision(name).follow,
+        InspectionPath(points, lengths_m),
+        detector,
+    )
 
 
 def along_the_line() -> MovingVehicle:
@@ -40,7 +56,13 @@ def env() -> simpy.Environment:
 def test_path_goes_there_and_back_along_all_points():
     path = InspectionPath.there_and_back(np.array(LINE), 1.25)
     assert path.points_m[:, :2].tolist() == [list(point) for point in (*LINE, *reversed(LINE))]
-    assert set(path.points_m[:, 2]) == {-18.75} and path.lengths_m[41:46] == (0.5, 0.5, 0.5, 0.5, 0.0)
+    assert set(path.points_m[:, 2]) == {-18.75} and path.lengths_m[41:46] == (
+        0.5,
+        0.5,
+        0.5,
+        0.5,
+        0.0,
+    )
 
 
 @BOTH
@@ -65,7 +87,13 @@ def test_distance_is_the_sum_of_the_steps_between_reached_points(env, name):
 @pytest.mark.parametrize(("name", "box_m"), [("2023", 0.4), ("1.5", 0.5)])
 @pytest.mark.parametrize(
     ("axis", "offset_m", "reached"),
-    [(0, -0.01, True), (0, 0.01, False), (1, -0.01, True), (1, 0.01, False), (2, 3.0, True)],  # depth does not matter
+    [
+        (0, -0.01, True),
+        (0, 0.01, False),
+        (1, -0.01, True),
+        (1, 0.01, False),
+        (2, 3.0, True),
+    ],  # depth does not matter
 )
 def test_box_within_which_a_point_is_reached(env, name, box_m, offset_m, reached, axis):
     place = [0.0, 0.0, -18.75]
@@ -76,7 +104,8 @@ def test_box_within_which_a_point_is_reached(env, name, box_m, offset_m, reached
     assert (len(vehicle.commanded) == 2) is reached
 
 
-# The box of a point 2.125 m along is entered after 6.9 s in 2023, after 6.5 s in 1.5; polls follow at 7 and at 8 s.
+# The box of a point 2.125 m along is entered after 6.9 s in 2023, after 6.5 s in 1.5; polls follow
+# at 7 and at 8 s.
 @pytest.mark.parametrize(("name", "seen_s"), [("2023", 1.5 + 7.0), ("1.5", 1.5 + 8.0)])
 def test_polls_lie_on_a_grid_that_begins_with_the_activation(env, name, seen_s):
     vehicle = MovingVehicle(lambda t_s: (-SPEED * (t_s - 1.5), 0.0, -18.75))
@@ -102,10 +131,13 @@ def test_revision_2025_sends_a_point_again_at_each_poll_after_the_tenth(env):
     assert vehicle.times_s == [0.0, 22.0, 24.0, 26.0]
 
 
-# Deactivation and activation. The vehicle's box for -2.0 m (fifth point) is reached before 8 s in both revisions.
+# Deactivation and activation. The vehicle's box for -2.0 m (fifth point) is reached before 8 s in
+# both revisions.
 
 
-def switched_off(env: simpy.Environment, name: str, at_s: float = 8.5) -> tuple[FollowPipeline, MovingVehicle]:
+def switched_off(
+    env: simpy.Environment, name: str, at_s: float = 8.5
+) -> tuple[FollowPipeline, MovingVehicle]:
     vehicle = along_the_line()
     follow = follow_of(env, name, vehicle)
     follow.apply(ACTIVE)
@@ -205,7 +237,8 @@ def test_the_distance_can_be_asked_for_at_any_time(env, name):
 
 
 def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[float]]:
-    """When a real vehicle has followed the line, the distance, and the times at which the node means to act.
+    """When a real vehicle has followed the line, the distance, and the times at which the node
+    means to act.
 
     A thruster fails at one time, and works again at once.
     """
@@ -215,7 +248,9 @@ def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[flo
     follow._alarm.set = alarm = mock.Mock(wraps=follow._alarm.set)
     if changed_s is not None:
         for state in ("dead", "works"):
-            env.timeout(changed_s).callbacks.append(lambda _, state=state: vehicle.set_thruster(env.now, 1, state))
+            env.timeout(changed_s).callbacks.append(
+                lambda _, state=state: vehicle.set_thruster(env.now, 1, state)
+            )
     follow.apply(ACTIVE)
     env.run(until=follow.finished)
     return env.now, follow.distance_m, [call.args[0] for call in alarm.call_args_list]

@@ -1,4 +1,6 @@
-"""Maintain motion, which recovers the thrusters; and generate recharge path: the way to the recharge station."""
+"""Maintain motion, which recovers the thrusters; and generate recharge path: the way to the
+recharge station.
+"""
 
 from types import SimpleNamespace
 
@@ -39,7 +41,8 @@ def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s_and_publishe
     motion.env.run()
     assert motion.restored == [(10.0 + 0.25 * n, n + 1) for n in range(6)]
     assert motion.published == [
-        Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", "RECOVERED") for t_s, number in motion.restored
+        Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", "RECOVERED")
+        for t_s, number in motion.restored
     ]
 
 
@@ -60,7 +63,8 @@ def interrupted(name: str, at_s: float) -> Motion:
 
 
 @pytest.mark.parametrize(
-    ("name", "at_s", "restored"), [("2023", 3.0, 6), ("2023", 10.3, 6), ("1.5", 3.0, 0), ("1.5", 10.3, 2)]
+    ("name", "at_s", "restored"),
+    [("2023", 3.0, 6), ("2023", 10.3, 6), ("1.5", 3.0, 0), ("1.5", 10.3, 2)],
 )
 def test_recovery_goes_on_when_deactivated_in_2023_and_is_aborted_in_15(name, at_s, restored):
     motion = interrupted(name, at_s)

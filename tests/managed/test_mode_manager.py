@@ -1,4 +1,6 @@
-"""The mode manager: what it answers, and when modes take effect; and set-points on their way to the autopilot."""
+"""The mode manager: what it answers, and when modes take effect; and set-points on their way to the
+autopilot.
+"""
 
 import itertools
 import random
@@ -51,16 +53,24 @@ def test_any_known_mode_is_answered_with_success_at_once(managed, mode):
 
 @pytest.mark.parametrize(
     ("function", "mode"),
-    [(SEARCH, "fd_spiral_very_high"), ("f_dock", "fd_spiral_low"), ("f_maintain_motion", "fd_all_thrusters")],
+    [
+        (SEARCH, "fd_spiral_very_high"),
+        ("f_dock", "fd_spiral_low"),
+        ("f_maintain_motion", "fd_all_thrusters"),
+    ],
     ids=["unknown mode", "unknown function", "function without a node"],
 )
 def test_anything_else_is_refused(managed, function, mode):
     assert managed.modes.change_mode(function, mode) is False
 
 
-def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_for_what_was_refused(managed):
+def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_for_what_was_refused(
+    managed,
+):
     effects: list[tuple[float, str, str]] = []
-    managed.modes.listeners.append(lambda function, mode: effects.append((managed.env.now, function, mode.name)))
+    managed.modes.listeners.append(
+        lambda function, mode: effects.append((managed.env.now, function, mode.name))
+    )
     managed.modes.change_mode(SEARCH, "fd_spiral_very_high")
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.env.run()
@@ -91,7 +101,10 @@ def test_effects_keep_the_order_of_requests_of_each_function():
 
 def test_current_mode_is_the_one_requested_last_of_those_in_the_file(managed):
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
-    assert managed.modes.current_mode(SEARCH) == "fd_spiral_low" and managed.modes.current_mode(FOLLOW) is None
+    assert (
+        managed.modes.current_mode(SEARCH) == "fd_spiral_low"
+        and managed.modes.current_mode(FOLLOW) is None
+    )
     assert managed.modes.available_modes(SEARCH) == TABLE.modes(SEARCH)
     assert managed.modes.available_modes("f_dock") == ()
 
@@ -157,17 +170,24 @@ LOW, HIGH, OFF = Mode("low", True, {}), Mode("high", True, {}), Mode("off", Fals
         ([LOW], ["configure low", "activated"]),
         ([LOW, HIGH], ["configure low", "activated", "configure high"]),
         ([OFF], []),
-        ([LOW, OFF, HIGH], ["configure low", "activated", "deactivated", "configure high", "activated"]),
+        (
+            [LOW, OFF, HIGH],
+            ["configure low", "activated", "deactivated", "configure high", "activated"],
+        ),
     ],
 )
 def test_hooks_that_modes_call(modes, calls):
     assert calls_of(*modes) == calls
 
 
-def sent(count: int, loss_probability: float, frame_error_m: Place = (0.0, 0.0, 0.0)) -> list[Place]:
+def sent(
+    count: int, loss_probability: float, frame_error_m: Place = (0.0, 0.0, 0.0)
+) -> list[Place]:
     """What arrives of so many set-points."""
     vehicle = PlacedVehicle()
-    sender = SetPointSender(vehicle, simpy.Environment(), frame_error_m, loss_probability, random.Random(1))
+    sender = SetPointSender(
+        vehicle, simpy.Environment(), frame_error_m, loss_probability, random.Random(1)
+    )
     for n in range(count):
         sender.send(float(n), 0.0, -18.0)
     return vehicle.commanded

@@ -1,6 +1,7 @@
 """Reaction times of revision 1.5, against timelines worked out by hand.
 
-Visibility messages come at 0.2, 1.2, 2.2, ... s; the altitude parameter is 2 m before any mode is set.
+Visibility messages come at 0.2, 1.2, 2.2, ... s; the altitude parameter is 2 m before any mode is
+set.
 """
 
 from collections.abc import Callable
@@ -57,10 +58,14 @@ def ends(t_s: float, function: str) -> Entry:
 def meter_after(*entries: Entry) -> ReactionMeter:
     """The meter after all entries, in their order."""
     env = simpy.Environment()
-    visibility = [(each.t_s, each.visibility_m) for each in entries if each.visibility_m is not None]
+    visibility = [
+        (each.t_s, each.visibility_m) for each in entries if each.visibility_m is not None
+    ]
     levels = [(each.t_s, each.level) for each in entries if each.level is not None]
     battery = _measurements("battery_level", levels, 0.5) if levels else None
-    meter = ReactionMeter(env, ReactionMetric(), _measurements("water_visibility", visibility, 0.2), 2.0, battery)
+    meter = ReactionMeter(
+        env, ReactionMetric(), _measurements("water_visibility", visibility, 0.2), 2.0, battery
+    )
     for each in entries:
         if each.note is not None:
             if each.t_s > env.now:
@@ -78,14 +83,19 @@ def _measurements(key: str, rows: list[tuple[float, float]], phase_s: float) -> 
 
 def test_mean_is_over_all_kinds_of_reaction_if_there_are_some():
     assert meter_after().mean_s() is None
-    meter = meter_after(sees(0.2, 3.75), flies(1.2, 3.0), reports(35.0, "FALSE"), begins(38.0, MOTION))
+    meter = meter_after(
+        sees(0.2, 3.75), flies(1.2, 3.0), reports(35.0, "FALSE"), begins(38.0, MOTION)
+    )
     assert meter.mean_s() == pytest.approx((1.0 + 3.0) / 2)
 
 
 CLEAR = (sees(0.2, 3.75), flies(0.7, 3.0))
 """A visibility under which 3 m is set soon: after 0.5 s."""
 THRUSTERS = {
-    "reported until maintain_motion is active": ([reports(35.0, "FALSE"), begins(37.5, MOTION)], [2.5]),
+    "reported until maintain_motion is active": (
+        [reports(35.0, "FALSE"), begins(37.5, MOTION)],
+        [2.5],
+    ),
     "a second failure before the answer counts with the first": (
         [reports(35.0, "FALSE"), reports(36.0, "FALSE", 2), begins(37.5, MOTION)],
         [2.5],
@@ -97,7 +107,8 @@ THRUSTERS = {
         ],
         [2.5, 1.0],
     ),
-    # As in the fifth condition of the runs of 2025: the task changes before the thrusters are recovered.
+    # As in the fifth condition of the runs of 2025: the task changes before the thrusters are
+    # recovered.
     "a failure while maintain_motion is active asks for nothing more": (
         [
             *(reports(112.0, "FALSE"), begins(113.0, MOTION), reports(113.01, "FALSE", 3)),
@@ -117,28 +128,52 @@ ALTITUDE = {
     "the first message is a mismatch already": (CLEAR, [0.5]),
     "no mismatch if set at the time of the message": ([sees(0.2, 3.75), flies(0.2, 3.0)], []),
     "no mismatch if two metres fit": ([sees(0.2, 2.5), flies(0.7, 2.0)], []),
-    "until the fitting altitude is set": ([*CLEAR, sees(12.2, 3.2), flies(14.0, 1.0), flies(15.0, 2.0)], [0.5, 2.8]),
+    "until the fitting altitude is set": (
+        [*CLEAR, sees(12.2, 3.2), flies(14.0, 1.0), flies(15.0, 2.0)],
+        [0.5, 2.8],
+    ),
     "it does not clear when the visibility comes back": (
         [*CLEAR, sees(12.2, 3.2), sees(68.2, 3.3), sees(92.2, 3.2), flies(93.2, 2.0)],
         [0.5, 81.0],
     ),
-    "nor when it changes further": ([*CLEAR, sees(12.2, 3.2), sees(24.2, 2.2), flies(25.2, 1.0)], [0.5, 13.0]),
+    "nor when it changes further": (
+        [*CLEAR, sees(12.2, 3.2), sees(24.2, 2.2), flies(25.2, 1.0)],
+        [0.5, 13.0],
+    ),
     # As under the manager none: 1 m is set once, while 3 m would fit.
     "never answered": ([sees(0.2, 3.75), flies(0.5, 1.0), sees(40.2, 1.3), sees(60.2, 3.3)], []),
     "one that does not fit is noticed at the next message, at 11.2 s, though its value is not new": (
         [*CLEAR, flies(10.5, 1.0), flies(13.2, 3.0)],
         [0.5, 2.0],
     ),
-    "no mismatch if put right before the next message": ([*CLEAR, flies(10.5, 1.0), flies(11.0, 3.0)], [0.5]),
-    "the next message is not one at the very time": ([*CLEAR, flies(11.2, 1.0), flies(13.2, 3.0)], [0.5, 1.0]),
+    "no mismatch if put right before the next message": (
+        [*CLEAR, flies(10.5, 1.0), flies(11.0, 3.0)],
+        [0.5],
+    ),
+    "the next message is not one at the very time": (
+        [*CLEAR, flies(11.2, 1.0), flies(13.2, 3.0)],
+        [0.5, 1.0],
+    ),
     "nor one that asks for none": (
         [*CLEAR, flies(11.9, 1.0), sees(12.2, 1), sees(42.2, 3.6), flies(52.2, 3)],
         [0.5, 10],
     ),
-    "nor if the next message finds it fitting": ([*CLEAR, flies(11.5, 2.0), sees(12.2, 3.2), flies(13.0, 2.0)], [0.5]),
-    "below all thresholds none is asked for": ([sees(0.2, 1.0), flies(1.2, 1.0), flies(2.2, 2.0)], []),
+    "nor if the next message finds it fitting": (
+        [*CLEAR, flies(11.5, 2.0), sees(12.2, 3.2), flies(13.0, 2.0)],
+        [0.5],
+    ),
+    "below all thresholds none is asked for": (
+        [sees(0.2, 1.0), flies(1.2, 1.0), flies(2.2, 2.0)],
+        [],
+    ),
     "while following too": (
-        [*CLEAR, ends(10.0, SEARCH), begins(10.0, "f_follow_pipeline"), sees(12.2, 3.2), flies(50.2, 2.0)],
+        [
+            *CLEAR,
+            ends(10.0, SEARCH),
+            begins(10.0, "f_follow_pipeline"),
+            sees(12.2, 3.2),
+            flies(50.2, 2.0),
+        ],
         [0.5, 38.0],
     ),
 }
@@ -184,7 +219,8 @@ def test_reactions(entries, reactions):
 
 
 @pytest.mark.parametrize(
-    ("visibility_m", "altitude_m"), [(3.25, 3.0), (3.24, 2.0), (2.25, 2.0), (2.24, 1.0), (1.25, 1.0)]
+    ("visibility_m", "altitude_m"),
+    [(3.25, 3.0), (3.24, 2.0), (2.25, 2.0), (2.24, 1.0), (1.25, 1.0)],
 )
 def test_altitude_that_fits_a_visibility(visibility_m, altitude_m):
     meter = meter_after(flies(0.1, 9.0), sees(0.2, visibility_m), flies(0.7, altitude_m))

@@ -6,7 +6,15 @@ import pytest
 import simpy
 
 from suave_des.managed.search import GenerateSearchPath
-from tests.helpers.stand_ins import INACTIVE, START, VIEW_TANGENT, PlacedVehicle, revision, sender, spiral_at
+from tests.helpers.stand_ins import (
+    INACTIVE,
+    START,
+    VIEW_TANGENT,
+    PlacedVehicle,
+    revision,
+    sender,
+    spiral_at,
+)
 
 ORIGIN = (-17.0, 2.3)
 PHASE_S = 0.25
@@ -21,7 +29,12 @@ class Search:
         self.env = simpy.Environment()
         self.vehicle = vehicle
         self.node = GenerateSearchPath(
-            self.env, sender(self.env, vehicle), revision(name).spiral, ORIGIN, VIEW_TANGENT, PHASE_S
+            self.env,
+            sender(self.env, vehicle),
+            revision(name).spiral,
+            ORIGIN,
+            VIEW_TANGENT,
+            PHASE_S,
         )
 
     def ticks(self, count: int) -> None:
@@ -58,7 +71,9 @@ def test_first_set_point_is_that_of_step_1_around_the_revisions_centre(name, cen
 
 
 @BOTH
-def test_the_first_set_point_comes_some_time_after_the_first_activation_and_later_ones_at_once(name):
+def test_the_first_set_point_comes_some_time_after_the_first_activation_and_later_ones_at_once(
+    name,
+):
     search = Search(name, PlacedVehicle(obeys=True))
     search.node.start_latency_s = 4.5
     search.ticks(20)
@@ -98,13 +113,20 @@ def test_a_change_of_altitude_skips_one_angle_step_but_no_radius(before_m):
     for altitude_m in (*before_m, 2.0):
         search.node.apply(spiral_at(altitude_m))
     search.ticks(1)
-    assert search.spiral(ORIGIN)[-1] == point(3 + 2, 5)  # at 2 m a step widens the spiral twice as much
+    assert search.spiral(ORIGIN)[-1] == point(
+        3 + 2, 5
+    )  # at 2 m a step widens the spiral twice as much
 
 
 @BOTH
 @pytest.mark.parametrize(
     ("error_m", "goes_on"),
-    [((0.39, 0.39, 0.39), True), ((0.41, 0.0, 0.0), False), ((0.0, -0.41, 0.0), False), ((0.0, 0.0, 0.41), False)],
+    [
+        ((0.39, 0.39, 0.39), True),
+        ((0.41, 0.0, 0.0), False),
+        ((0.0, -0.41, 0.0), False),
+        ((0.0, 0.0, 0.41), False),
+    ],
     ids=["in the box", "x", "y", "z"],
 )
 def test_reached_means_within_0_4_m_in_x_y_and_z(name, error_m, goes_on):
@@ -130,7 +152,9 @@ def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name, step_
     search = searching(name, rise_m=0.5, obeys=True)
     search.vehicle.rise_m = 5.0  # whatever is commanded, z is not reached
     search.ticks(35)
-    assert [z for _, _, z in search.vehicle.commanded] == pytest.approx([-19.0 - step_m * times for times in range(4)])
+    assert [z for _, _, z in search.vehicle.commanded] == pytest.approx(
+        [-19.0 - step_m * times for times in range(4)]
+    )
 
 
 def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short_and_stays():
@@ -169,8 +193,12 @@ def test_inactive_it_sends_nothing(name):
     assert len(search.vehicle.commanded) == 3
 
 
-@pytest.mark.parametrize(("name", "origin", "reached"), [("2023", ORIGIN, 8), ("1.5", (-10.0, 1.0), 1)])
-def test_activated_again_revision_2023_goes_on_with_its_spiral_and_15_starts_afresh_where_it_is(name, origin, reached):
+@pytest.mark.parametrize(
+    ("name", "origin", "reached"), [("2023", ORIGIN, 8), ("1.5", (-10.0, 1.0), 1)]
+)
+def test_activated_again_revision_2023_goes_on_with_its_spiral_and_15_starts_afresh_where_it_is(
+    name, origin, reached
+):
     search = searching(name, obeys=True)
     search.ticks(7)
     search.node.apply(INACTIVE)

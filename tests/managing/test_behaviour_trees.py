@@ -103,7 +103,11 @@ def with_battery(level: float | None = None) -> AtWork:
 
 @pytest.mark.parametrize(
     ("level", "search", "recharge"),
-    [(None, "fd_spiral_high", None), (0.25, "fd_spiral_high", None), (0.2475, "fd_unground", "normal")],
+    [
+        (None, "fd_spiral_high", None),
+        (0.25, "fd_spiral_high", None),
+        (0.2475, "fd_unground", "normal"),
+    ],
 )
 def test_with_a_low_battery_it_goes_to_recharge(level, search, recharge):
     asked = dict(with_battery(level).adapt())

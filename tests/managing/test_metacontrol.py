@@ -23,11 +23,23 @@ def visibility(value: float) -> dict[str, Any]:
 
 
 def steps(before: float, after: float, time_s: float) -> dict[str, Any]:
-    return {"signals.water_visibility": {"kind": "step", "time_s": time_s, "before": before, "after": after}}
+    return {
+        "signals.water_visibility": {
+            "kind": "step",
+            "time_s": time_s,
+            "before": before,
+            "after": after,
+        }
+    }
 
 
 def mission(
-    values: Mapping[str, Any], *, name: str = "seams2023", run: int = 1, limit_s: float = 60.0, **given: Any
+    values: Mapping[str, Any],
+    *,
+    name: str = "seams2023",
+    run: int = 1,
+    limit_s: float = 60.0,
+    **given: Any,
 ) -> MissionResult:
     loaded = load_scenario(name, **given)
     return Simulator(with_values(loaded, {"mission.time_limit_s": limit_s, **values})).run(
@@ -37,7 +49,11 @@ def mission(
 
 def modes(result: MissionResult, function: str) -> list[tuple[float, str]]:
     """Modes asked for, with the times."""
-    asked = [(event.t_s, event.detail.split(" -> ")) for event in result.events if event.event == "mode_requested"]
+    asked = [
+        (event.t_s, event.detail.split(" -> "))
+        for event in result.events
+        if event.event == "mode_requested"
+    ]
     return [(t_s, mode) for t_s, (name, mode) in asked if name == function]
 
 
@@ -62,7 +78,9 @@ BOTH = pytest.mark.parametrize("name", ["seams2023", "release15"])
 )
 def test_the_search_is_as_high_as_the_measured_visibility_allows(name, value, design):
     found = mission(visibility(value), name=name, limit_s=10.0)
-    chosen = [mode for t_s, mode in modes(found, SEARCH) if t_s < 10.0]  # at the limit the task is cancelled
+    chosen = [
+        mode for t_s, mode in modes(found, SEARCH) if t_s < 10.0
+    ]  # at the limit the task is cancelled
     assert chosen[-1:] == ([design] if design else [])
     if design is None:
         assert "no function design is left" in told(found, "no_design_left")[0]
@@ -72,7 +90,11 @@ def test_the_search_is_as_high_as_the_measured_visibility_allows(name, value, de
 def test_a_lost_thruster_is_recovered_and_all_thrusters_are_used_again(name):
     found = mission({**visibility(1.5), **REASONED_AT_ONCE}, name=name)
     (_, first), (recover_s, recover), (back_s, back) = modes(found, MOTION)[:3]
-    assert (first, recover, back) == ("fd_all_thrusters", "fd_recover_thrusters", "fd_all_thrusters")
+    assert (first, recover, back) == (
+        "fd_all_thrusters",
+        "fd_recover_thrusters",
+        "fd_all_thrusters",
+    )
     period_s = {"seams2023": 2.0, "release15": 1.5}[name]
     assert 35.0 <= recover_s <= 36.0 + period_s
     assert recover_s + 10.0 <= back_s <= recover_s + 11.5 + period_s
@@ -90,7 +112,9 @@ def test_a_recovery_is_reasoned_about_once():
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.7])
 def test_a_plan_comes_as_much_later_as_the_inference_takes(latency_s):
-    """The change of visibility is measured at once; reasoning begins at a tick of 2 s, and ends later."""
+    """The change of visibility is measured at once; reasoning begins at a tick of 2 s, and ends
+    later.
+    """
     at_once = mission({**steps(3.5, 1.5, 20.0), "latencies.inference_s": 0.0})
     later = mission({**steps(3.5, 1.5, 20.0), "latencies.inference_s": latency_s})
     assert [mode for _, mode in modes(later, SEARCH)] == ["fd_spiral_high", "fd_spiral_low"]
@@ -100,11 +124,16 @@ def test_a_plan_comes_as_much_later_as_the_inference_takes(latency_s):
 @pytest.mark.parametrize("executes", [True, False])
 def test_a_plan_under_way_is_executed_though_its_objective_is_removed(executes):
     """In revision 2023 the search then goes on while the pipeline is followed."""
-    values = {**visibility(3.5), "revision.metacontrol.executes_plans_of_removed_objectives": executes}
+    values = {
+        **visibility(3.5),
+        "revision.metacontrol.executes_plans_of_removed_objectives": executes,
+    }
     goes_on = set()
     for run in range(1, 9):
         found = mission(values, run=run, limit_s=150.0)
-        cycle_ends_s = modes(found, MOTION)[0][0]  # 1 s after it began; the next one begins a second later
+        cycle_ends_s = modes(found, MOTION)[0][
+            0
+        ]  # 1 s after it began; the next one begins a second later
         removed_s = next(t_s for t_s, mode in modes(found, SEARCH) if mode == "fd_unground")
         again = [(t_s, mode) for t_s, mode in modes(found, SEARCH) if removed_s < t_s < 149.0]
         under_way_s = (removed_s - cycle_ends_s) % 2.0 - 1.0
@@ -115,9 +144,13 @@ def test_a_plan_under_way_is_executed_though_its_objective_is_removed(executes):
 
 
 def test_revision_15_waits_for_the_first_measurement():
-    late = {"signals.water_visibility": {"kind": "constant", "value": 1.5, "publishing_period_s": 30.0}}
+    late = {
+        "signals.water_visibility": {"kind": "constant", "value": 1.5, "publishing_period_s": 30.0}
+    }
     first_message_s = next(
-        event.t_s for event in mission(late, name="release15").events if event.event == "first_measurement"
+        event.t_s
+        for event in mission(late, name="release15").events
+        if event.event == "first_measurement"
     )
     assert first_message_s > 2.0
     assert modes(mission(late, name="release15"), SEARCH)[0][0] >= first_message_s
@@ -166,9 +199,14 @@ def modes_with_a_fourth_altitude(folder: Path) -> Path:
     system = "        f_generate_search_path_node: active.fd_spiral_high\n"
     node = "          spiral_altitude: 3.0\n"
     assert system in text and node in text
-    text = text.replace(system, system + "      fd_spiral_very_high:\n" + system.replace("_high", "_very_high"))
     text = text.replace(
-        node, node + "      fd_spiral_very_high:\n        ros__parameters:\n" + node.replace("3.0", "4.0")
+        system, system + "      fd_spiral_very_high:\n" + system.replace("_high", "_very_high")
+    )
+    text = text.replace(
+        node,
+        node
+        + "      fd_spiral_very_high:\n        ros__parameters:\n"
+        + node.replace("3.0", "4.0"),
     )
     copy = folder / "modes.yaml"
     copy.write_text(text)
@@ -176,9 +214,15 @@ def modes_with_a_fourth_altitude(folder: Path) -> Path:
 
 
 def test_a_fourth_search_altitude_needs_no_python(suave_copy, tmp_path):
-    given = {"ontologies": [suave_copy(NEW_DESIGN)], "modes_file": modes_with_a_fourth_altitude(tmp_path)}
+    given = {
+        "ontologies": [suave_copy(NEW_DESIGN)],
+        "modes_file": modes_with_a_fourth_altitude(tmp_path),
+    }
     found = mission(steps(4.5, 3.5, 12.0), **given)  # before anything is found from up there
-    assert [mode for _, mode in modes(found, SEARCH)][:2] == ["fd_spiral_very_high", "fd_spiral_high"]
+    assert [mode for _, mode in modes(found, SEARCH)][:2] == [
+        "fd_spiral_very_high",
+        "fd_spiral_high",
+    ]
     highest_m = max(point.z_m for point in mission(visibility(4.5), **given).trajectory)
     assert highest_m > max(point.z_m for point in mission(visibility(4.5)).trajectory) + 0.7
 
@@ -191,11 +235,15 @@ def test_a_design_without_a_mode_is_bad_input(suave_copy):
 def test_a_rule_that_contradicts_another_ends_the_mission_with_both_named(tmp_path):
     """They clash when the water has become too murky for the present design, not before."""
     rules = tmp_path / "clash.swrl"
-    rules.write_text('everything_is_in_error: FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_FR")\n')
+    rules.write_text(
+        'everything_is_in_error: FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_FR")\n'
+    )
     with pytest.raises(MissionError) as raised:
         mission(steps(3.5, 1.5, 20.0), rules=[rules])
     assert raised.value.manager == "metacontrol" and 20.0 <= raised.value.time_s <= 23.0
-    assert "everything_is_in_error" in str(raised.value) and "QAWaterVisibility" in str(raised.value)
+    assert "everything_is_in_error" in str(raised.value) and "QAWaterVisibility" in str(
+        raised.value
+    )
 
 
 @pytest.mark.parametrize("oldest", [False, True])
@@ -233,20 +281,25 @@ def detection_s(result: MissionResult) -> float:
 
 def test_a_decision_on_a_task_that_is_over_meanwhile_is_not_carried_out():
     detected_s = detection_s(mission({**SLOW, **visibility(2.4)}, name="release15", limit_s=250.0))
-    # The water clears 2 s before the pipeline comes into view: a higher search is decided on, and is over.
-    after = mission({**SLOW, **steps(2.4, 3.3, detected_s - 2.0)}, name="release15", limit_s=detected_s + 10.0)
+    # The water clears 2 s before the pipeline comes into view: a higher search is decided on, and
+    # is over.
+    after = mission(
+        {**SLOW, **steps(2.4, 3.3, detected_s - 2.0)}, name="release15", limit_s=detected_s + 10.0
+    )
     assert detection_s(after) == detected_s
     assert [mode for t_s, mode in modes(after, SEARCH) if t_s > detected_s - 2.0] == ["fd_unground"]
 
 
 def test_a_decision_on_the_task_before_is_not_carried_out_for_the_next():
     detected_s = detection_s(mission({**SLOW, **visibility(2.4)}, name="release15", limit_s=250.0))
-    # A thruster fails 3 s before: its recovery is decided on for the search's objective. That of the inspection is new,
-    # so it has to be reasoned about, which takes 5 s from then on.
+    # A thruster fails 3 s before: its recovery is decided on for the search's objective. That of
+    # the inspection is new, so it has to be reasoned about, which takes 5 s from then on.
     failure = [{"thruster": 1, "event": "failure", "time_s": detected_s - 3.0}]
     values = {**SLOW, **visibility(2.4), "thruster_events": failure}
     after = mission(values, name="release15", limit_s=detected_s + 20.0)
     found_s = detection_s(after)
-    (over_s, over), (next_s, _) = [(t_s, mode) for t_s, mode in modes(after, MOTION) if t_s >= found_s][:2]
+    (over_s, over), (next_s, _) = [
+        (t_s, mode) for t_s, mode in modes(after, MOTION) if t_s >= found_s
+    ][:2]
     assert over == "fd_unground"
     assert next_s >= over_s + 5.0

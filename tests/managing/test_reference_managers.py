@@ -1,4 +1,6 @@
-"""The managers none and random, and those to compare others with: fixed modes, thresholds, perfect knowledge."""
+"""The managers none and random, and those to compare others with: fixed modes, thresholds, perfect
+knowledge.
+"""
 
 from collections import Counter
 
@@ -17,7 +19,10 @@ BOTH = pytest.mark.parametrize("revision", ["2023", "1.5"])
 @BOTH
 @pytest.mark.parametrize(
     ("task", "asked"),
-    [("search_pipeline", (SEARCH, "fd_spiral_low")), ("inspect_pipeline", (FOLLOW, "fd_follow_pipeline"))],
+    [
+        ("search_pipeline", (SEARCH, "fd_spiral_low")),
+        ("inspect_pipeline", (FOLLOW, "fd_follow_pipeline")),
+    ],
 )
 def test_none_sets_the_default_mode_at_a_tasks_request(revision, task, asked):
     at_work = AtWork("none", revision)
@@ -30,7 +35,9 @@ def test_a_cancelled_tasks_functions_are_set_to_fd_unground(name, revision):
     at_work = AtWork(name, revision)
     at_work.request("search_pipeline")
     functions = at_work.task("search_pipeline").functions
-    assert at_work.cancel("search_pipeline") == [(function, "fd_unground") for function in functions]
+    assert at_work.cancel("search_pipeline") == [
+        (function, "fd_unground") for function in functions
+    ]
 
 
 @pytest.mark.parametrize(("revision", "period_s"), [("2023", 15.0), ("1.5", 30.0)])
@@ -47,13 +54,17 @@ def test_whether_random_picks_at_a_tasks_request(revision, picks):
 
 
 @BOTH
-@pytest.mark.parametrize(("task", "function"), [("search_pipeline", SEARCH), ("inspect_pipeline", FOLLOW)])
+@pytest.mark.parametrize(
+    ("task", "function"), [("search_pipeline", SEARCH), ("inspect_pipeline", FOLLOW)]
+)
 def test_random_picks_among_all_modes_with_equal_chance(revision, task, function):
     at_work = AtWork("random", revision)
     at_work.request(task)
     picks = Counter(pick for _ in range(6000) for pick in at_work.adapt())
     share = 6000 / len(MODES.modes(function))
-    assert picks == {(function, mode): pytest.approx(share, rel=0.1) for mode in MODES.modes(function)}
+    assert picks == {
+        (function, mode): pytest.approx(share, rel=0.1) for mode in MODES.modes(function)
+    }
 
 
 @BOTH
@@ -85,7 +96,9 @@ def test_randoms_search_ends_at_the_detection_in_2023(revision, asked):
     at_work = AtWork("random", revision)
     at_work.request("search_pipeline")
     assert at_work.detected() == asked
-    assert {function for function, _ in at_work.adapt()} == ({SEARCH} if revision == "1.5" else set())
+    assert {function for function, _ in at_work.adapt()} == (
+        {SEARCH} if revision == "1.5" else set()
+    )
     assert AtWork("random", revision).detected() == []  # while it has no search
 
 
@@ -98,7 +111,9 @@ def test_in_a_mission_of_2023_randoms_search_is_ungrounded_before_the_coordinato
     )
     detected_s = next(each.t_s for each in events if each.event == "pipeline_detected")
     done_s = next(each.t_s for each in events if each.event == "task_done")
-    requests = [each for each in events if each.event == "mode_requested" and each.t_s >= detected_s]
+    requests = [
+        each for each in events if each.event == "mode_requested" and each.t_s >= detected_s
+    ]
     assert (requests[0].t_s, requests[0].detail) == (detected_s, f"{SEARCH} -> fd_unground")
     assert detected_s < done_s <= detected_s + 1.0
 
@@ -130,20 +145,28 @@ def test_fixed_without_a_mode_is_refused():
 
 
 def test_they_need_no_trust_as_they_are_the_projects_own():
-    assert all(map(is_built_in, ("fixed:fd_spiral_low", "threshold", "oracle"))) and not is_built_in("mine:Manager")
+    assert all(
+        map(is_built_in, ("fixed:fd_spiral_low", "threshold", "oracle"))
+    ) and not is_built_in("mine:Manager")
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "release15", "planta_exp1"])
 def test_threshold_adapts_at_metacontrols_times(scenario):
     threshold_s, metacontrol_s = (
-        next(t_s for t_s, detail in requests(manager, scenario) if detail.startswith(f"{SEARCH} -> fd_spiral"))
+        next(
+            t_s
+            for t_s, detail in requests(manager, scenario)
+            if detail.startswith(f"{SEARCH} -> fd_spiral")
+        )
         for manager in ("threshold", "metacontrol")
     )
     shortest_s, longest_s = support(load_scenario(scenario).scenario.latencies.inference_s)
     assert shortest_s - 1e-9 <= metacontrol_s - threshold_s <= longest_s + 1e-9
 
 
-@pytest.mark.parametrize(("visibility_m", "mode"), [(3.25, "fd_spiral_high"), (3.2499, "fd_spiral_medium")])
+@pytest.mark.parametrize(
+    ("visibility_m", "mode"), [(3.25, "fd_spiral_high"), (3.2499, "fd_spiral_medium")]
+)
 def test_a_threshold_itself_is_enough(visibility_m, mode):
     at_work = AtWork("threshold")
     at_work.request("search_pipeline")
@@ -153,20 +176,32 @@ def test_a_threshold_itself_is_enough(visibility_m, mode):
 
 def test_oracle_changes_modes_at_the_moment_of_the_true_crossing():
     events = run_mission("seams2023", "oracle", 1, 1).events
-    high_s = [each.t_s for each in events if each.detail == "f_generate_search_path = fd_spiral_high"]
-    crossed_s = [each.t_s for each in events if each.event == "visibility_crossing" and "rises to 3.25" in each.detail]
+    high_s = [
+        each.t_s for each in events if each.detail == "f_generate_search_path = fd_spiral_high"
+    ]
+    crossed_s = [
+        each.t_s
+        for each in events
+        if each.event == "visibility_crossing" and "rises to 3.25" in each.detail
+    ]
     assert high_s[0] == 0.0 and crossed_s[0] - 2.0 < high_s[1] <= crossed_s[0]
 
 
 def test_oracle_sees_that_a_threshold_itself_is_reached():
     step = {"kind": "step", "time_s": 20.0, "before": 3.0, "after": 3.25}
-    events = run_mission("seams2023", "oracle", 1, 1, values={"signals.water_visibility": step}).events
-    (high_s,) = [each.t_s for each in events if each.detail == "f_generate_search_path = fd_spiral_high"]
+    events = run_mission(
+        "seams2023", "oracle", 1, 1, values={"signals.water_visibility": step}
+    ).events
+    (high_s,) = [
+        each.t_s for each in events if each.detail == "f_generate_search_path = fd_spiral_high"
+    ]
     assert high_s == pytest.approx(20.0)
 
 
 def test_oracle_takes_no_time_to_recover_a_thruster():
     events = run_mission("seams2023", "oracle", 1, 1).events
     failed_s = next(each.t_s for each in events if each.event == "component_status")
-    recovering_s = next(each.t_s for each in events if each.detail == "f_maintain_motion = fd_recover_thrusters")
+    recovering_s = next(
+        each.t_s for each in events if each.detail == "f_maintain_motion = fd_recover_thrusters"
+    )
     assert recovering_s == failed_s

@@ -45,7 +45,9 @@ def test_a_name_that_leads_to_no_manager_is_bad_input(name, words):
     ],
     ids=["exits", "syntax", "raises"],
 )
-def test_a_module_that_fails_on_import_is_bad_input_with_its_line(source, problem, place, tmp_path, monkeypatch):
+def test_a_module_that_fails_on_import_is_bad_input_with_its_line(
+    source, problem, place, tmp_path, monkeypatch
+):
     module = f"failing_{problem.replace(' ', '_')}"
     (tmp_path / f"{module}.py").write_text(source)
     monkeypatch.chdir(tmp_path)
@@ -86,7 +88,9 @@ class Mine({}):
 """
 
 
-def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: str = "Metacontrol") -> str:
+def derived(
+    method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: str = "Metacontrol"
+) -> str:
     """A manager derived from one that has hooks, with another method."""
     module = f"derived_{tmp_path.name}"
     (tmp_path / f"{module}.py").write_text(DERIVED.format(base, method))
@@ -111,13 +115,17 @@ def test_an_ordinary_method_is_no_misspelt_hook(methods, tmp_path, monkeypatch):
 
 def test_a_misspelt_class_is_answered_with_the_near_one(tmp_path, monkeypatch):
     name = derived("pass", tmp_path, monkeypatch).replace(":Mine", ":Mien")
-    with pytest.raises(InputError, match=r"no subclass of ManagingSubsystem named 'Mien' .did you mean Mine.."):
+    with pytest.raises(
+        InputError, match=r"no subclass of ManagingSubsystem named 'Mien' .did you mean Mine.."
+    ):
         manager_class(name)
 
 
 def remarks_of(methods: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """What is reported of a manager derived from none, with other methods."""
-    return run_mission("seams2023", derived(methods, tmp_path, monkeypatch, base="NoManager")).remarks
+    return run_mission(
+        "seams2023", derived(methods, tmp_path, monkeypatch, base="NoManager")
+    ).remarks
 
 
 def test_an_adapt_that_is_never_called_is_reported(tmp_path, monkeypatch):
@@ -128,7 +136,16 @@ def test_an_adapt_that_is_never_called_is_reported(tmp_path, monkeypatch):
 @pytest.mark.parametrize("before", ["period_s = 60.0", "pass"])
 def test_the_period_is_given_in_the_class_or_in_init(before, tmp_path, monkeypatch):
     adapt = "def adapt(self): raise ValueError(f'at {self.system.now_s:g} s')"
-    init = "def __init__(self, system): self.period_s = 60.0; super().__init__(system)" if before == "pass" else ""
-    name = derived(f"{before}\n    starts_s = 7.0\n    {adapt}\n    {init}", tmp_path, monkeypatch, base="NoManager")
+    init = (
+        "def __init__(self, system): self.period_s = 60.0; super().__init__(system)"
+        if before == "pass"
+        else ""
+    )
+    name = derived(
+        f"{before}\n    starts_s = 7.0\n    {adapt}\n    {init}",
+        tmp_path,
+        monkeypatch,
+        base="NoManager",
+    )
     with pytest.raises(MissionError, match="ValueError: at 7 s"):
         run_mission("seams2023", name)

@@ -1,4 +1,6 @@
-"""Behaviour trees: their parts, how they are drawn, their ticks in the timeline, and trees of py_trees."""
+"""Behaviour trees: their parts, how they are drawn, their ticks in the timeline, and trees of
+py_trees.
+"""
 
 import csv
 from itertools import pairwise
@@ -27,7 +29,9 @@ class Mine(PyTreesManager):
         search = py_trees.composites.Selector("search", memory=False)
         for mode, least_m in (("high", 3.25), ("medium", 2.25), ("low", -1.0)):
             branch = py_trees.composites.Sequence(mode, memory=False)
-            clear = self.condition(f"visibility {least_m:g} m", lambda least_m=least_m: self.visibility_m() >= least_m)
+            clear = self.condition(
+                f"visibility {least_m:g} m", lambda least_m=least_m: self.visibility_m() >= least_m
+            )
             branch.add_children([clear, self.set_mode(SEARCH, f"fd_spiral_{mode}")])
             search.add_child(branch)
         root = py_trees.composites.Selector("mission", memory=False)
@@ -52,7 +56,11 @@ def flown(manager: str, **values: object) -> MissionResult:
 def ticked(*outcomes: bool) -> tuple[list[str], list[Behaviour]]:
     seen: list[str] = []
     conditions = [
-        Behaviour("", str(place), act=lambda place=place, outcome=outcome: seen.append(str(place)) or outcome)
+        Behaviour(
+            "",
+            str(place),
+            act=lambda place=place, outcome=outcome: seen.append(str(place)) or outcome,
+        )
         for place, outcome in enumerate(outcomes)
     ]
     return seen, conditions
@@ -76,7 +84,10 @@ def test_parts_tick_their_children_as_far_as_they_must(kind, outcomes, visited, 
 
 
 def test_a_drawing_has_a_line_for_each_part():
-    clear, mode = Behaviour("", "clear", act=lambda: True), Behaviour("!", "f = fd_a", act=lambda: True)
+    clear, mode = (
+        Behaviour("", "clear", act=lambda: True),
+        Behaviour("!", "f = fd_a", act=lambda: True),
+    )
     tree = Behaviour("?", "root", (Behaviour("->", "first", (clear, mode)), Behaviour("", "else")))
     expected = ["? root", "├─ -> first", "│  ├─ clear", "│  └─ ! f = fd_a", "└─ else"]
     assert list(tree.drawing()) == expected
@@ -84,7 +95,9 @@ def test_a_drawing_has_a_line_for_each_part():
     assert list(tree.requests()) == ["f = fd_a (clear)"]
 
 
-@pytest.mark.parametrize(("manager", "scenario"), [("bt", "release15"), ("bt_extended", "extended")])
+@pytest.mark.parametrize(
+    ("manager", "scenario"), [("bt", "release15"), ("bt_extended", "extended")]
+)
 def test_the_command_draws_the_tree_of_a_manager(manager, scenario):
     shown = CliRunner().invoke(app, ["tree", manager, scenario]).output
     assert "visibility is at least 3.25 m, or unknown" in shown
@@ -99,18 +112,27 @@ def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing():
     plain, noted = flown("bt"), flown("bt", managers__bt__records_ticks=True)
     ticks = [event for event in noted.events if event.event == "tick"]
     assert [event for event in noted.events if event.event != "tick"] == list(plain.events)
-    assert "f_generate_search_path = fd_spiral_high (is needed, visibility is at least 3.25 m" in ticks[0].detail
+    assert (
+        "f_generate_search_path = fd_spiral_high (is needed, visibility is at least 3.25 m"
+        in ticks[0].detail
+    )
     assert all(earlier.detail != later.detail for earlier, later in pairwise(ticks))
 
 
 def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours():
     mine, ours = flown(f"{__name__}:Mine"), flown("bt")
     modes = [
-        [event.detail for event in result.events if event.event == "mode_set" and "motion" not in event.detail]
+        [
+            event.detail
+            for event in result.events
+            if event.event == "mode_set" and "motion" not in event.detail
+        ]
         for result in (mine, ours)
     ]
     assert modes[0] == modes[1]
-    assert any(event.event == "tick" and "fd_spiral_high success" in event.detail for event in mine.events)
+    assert any(
+        event.event == "tick" and "fd_spiral_high success" in event.detail for event in mine.events
+    )
 
 
 def test_a_manager_that_makes_no_tree_is_told_what_to_do():

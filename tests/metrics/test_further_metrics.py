@@ -1,4 +1,6 @@
-"""Further metrics: indecision, configurations, reasoning, area, thrusters; and partially satisfied requirements."""
+"""Further metrics: indecision, configurations, reasoning, area, thrusters; and partially satisfied
+requirements.
+"""
 
 import math
 
@@ -12,7 +14,12 @@ from suave_des.errors import InputError
 from suave_des.metrics.further import FurtherMetrics, covered_area_m2, measured_at_rows
 from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.models import FURTHER_METRICS, Requirement, ThrusterEvent, ThrusterFailureRevision
+from suave_des.scenario.models import (
+    FURTHER_METRICS,
+    Requirement,
+    ThrusterEvent,
+    ThrusterFailureRevision,
+)
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.simulator import Simulator
 from suave_des.vehicle.model import Autopilot, Pose
@@ -28,7 +35,9 @@ class Watched:
     def __init__(self) -> None:
         self.env = simpy.Environment()
         scenario = load_scenario("extended").scenario
-        scenario = scenario.model_copy(update={"metrics": FURTHER_METRICS, "requirements": {}, "battery": None})
+        scenario = scenario.model_copy(
+            update={"metrics": FURTHER_METRICS, "requirements": {}, "battery": None}
+        )
         vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0), 60.0)
         self.thrusters = Thrusters(self.env, vehicle, ThrusterFailureRevision(), silent)
         self.noted = FurtherMetrics(self.env, scenario, self.thrusters, {})
@@ -62,17 +71,27 @@ def test_a_change_taken_back_in_time_is_undone(changes, undone):
 
 def test_configurations_are_counted_once_each_and_not_when_passed_through():
     watched = Watched()
-    for t_s, function, mode in [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (3.0, "g", "y"), (5.0, "f", "a")]:
+    for t_s, function, mode in [
+        (1.0, "f", "a"),
+        (2.0, "g", "x"),
+        (3.0, "f", "b"),
+        (3.0, "g", "y"),
+        (5.0, "f", "a"),
+    ]:
         watched.at(t_s).mode_effect(function, Mode(mode, True, {}))
     watched.at(6.0).mode_effect("g", Mode("x", True, {}))  # f = a, g = x again
-    assert watched.at(7.0).value("configurations") == len([{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}])
+    assert watched.at(7.0).value("configurations") == len(
+        [{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}]
+    )
 
 
 def test_operational_thrusters_are_a_mean_over_time():
     watched = Watched()
     watched.thruster(10.0, "failure")
     watched.thruster(30.0, "recovery")
-    assert watched.at(40.0).value("operational_thrusters") == pytest.approx((10 * 6 + 20 * 5 + 10 * 6) / 40)
+    assert watched.at(40.0).value("operational_thrusters") == pytest.approx(
+        (10 * 6 + 20 * 5 + 10 * 6) / 40
+    )
 
 
 def track_of(*places: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +102,9 @@ def track_of(*places: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarra
 def test_a_camera_at_rest_has_seen_one_square():
     track, visibility_m = track_of((0.0, 0.0, -18.0))
     side_m = 2 * 2.0 * TANGENT
-    assert covered_area_m2(track, 3, visibility_m, -20.0, TANGENT) == pytest.approx(side_m**2, rel=0.1)
+    assert covered_area_m2(track, 3, visibility_m, -20.0, TANGENT) == pytest.approx(
+        side_m**2, rel=0.1
+    )
 
 
 @pytest.mark.parametrize("visibility_m", [1.9, math.nan])
@@ -96,23 +117,41 @@ def test_visibility_counts_as_it_was_measured_last_and_before_the_first_measurem
     rows = measured_at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
     assert [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)] == [3.0, 3.0, 2.0, 1.0]
     assert np.isnan(rows[:4]).all() and np.isnan(measured_at_rows((), (), 10)).all()
-    assert measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20
+    assert (
+        measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20
+    )
 
 
-@given(st.sampled_from(["at_least", "at_most", "close_to"]), st.floats(-9, 9), st.floats(0, 9), st.floats(-99, 99))
-def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(relation, value, tolerance, measured):
-    requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=tolerance)
+@given(
+    st.sampled_from(["at_least", "at_most", "close_to"]),
+    st.floats(-9, 9),
+    st.floats(0, 9),
+    st.floats(-99, 99),
+)
+def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(
+    relation, value, tolerance, measured
+):
+    requirement = Requirement(
+        metric="search_time_s", relation=relation, value=value, tolerance=tolerance
+    )
     assert 0.0 <= requirement.satisfaction(measured) <= 1.0
     assert requirement.satisfaction(value) == 1.0
 
 
 @pytest.mark.parametrize(
     ("relation", "measured", "degree"),
-    [("at_most", 130.0, 0.75), ("at_most", 160.0, 0.0), ("at_least", 90.0, 0.75), ("close_to", 140.0, 0.5)],
+    [
+        ("at_most", 130.0, 0.75),
+        ("at_most", 160.0, 0.0),
+        ("at_least", 90.0, 0.75),
+        ("close_to", 140.0, 0.5),
+    ],
 )
 def test_satisfaction_falls_in_a_line_over_the_tolerance(relation, measured, degree):
     value = {"at_most": 120.0, "at_least": 100.0, "close_to": 120.0}[relation]
-    requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=40.0)
+    requirement = Requirement(
+        metric="search_time_s", relation=relation, value=value, tolerance=40.0
+    )
     assert requirement.satisfaction(measured) == pytest.approx(degree)
 
 
@@ -131,7 +170,9 @@ def test_a_requirement_on_a_measured_value_is_a_mean_over_time(mission):
         "signals: {water_visibility: {kind: step, before: 3.0, after: 1.0, time_s: 100}}\n"
         "requirements: {see: {attribute: water_visibility, relation: at_least, value: 2.0, tolerance: 2.0}}\n"
     )
-    assert mission(text).further["requirement_see"] == pytest.approx((100 * 1.0 + 200 * 0.5) / 300, abs=0.01)
+    assert mission(text).further["requirement_see"] == pytest.approx(
+        (100 * 1.0 + 200 * 0.5) / 300, abs=0.01
+    )
 
 
 def test_time_before_the_first_measurement_does_not_count(mission):
@@ -163,7 +204,10 @@ def test_all_of_them_leave_the_mission_as_it_is(mission):
         ("metrics: [configurations, configurations]", "configurations is given twice"),
         ("metrics: [battery_level]", "battery_level needs a battery"),
         ("requirements: {a: {relation: at_least, value: 1}}", "is about no value, or about two"),
-        ("requirements: {a: {metric: adaptations, relation: above, value: 1}}", "'above' is not allowed"),
+        (
+            "requirements: {a: {metric: adaptations, relation: above, value: 1}}",
+            "'above' is not allowed",
+        ),
         (
             "requirements: {a: {attribute: water_current, relation: at_most, value: 1}}",
             "nothing measures water_current",

@@ -49,12 +49,20 @@ def subscriber() -> Subscriber:
     [
         (lambda t: t, 3.0, Timing(0.8, 0.3), 0.0, (0.3, 1.1, 1.9, 2.7)),  # on the monitor's grid
         (VISIBILITY, 3.0, Timing(0.2, 0.1), 1.0, (0.1, 1.1, 2.1)),  # changed values only
-        (step(10.05, 3.0, 1.0), 20.0, Timing(0.2, 0.0), 0.0, (0.0, 10.2)),  # at the first message after the step
+        (
+            step(10.05, 3.0, 1.0),
+            20.0,
+            Timing(0.2, 0.0),
+            0.0,
+            (0.0, 10.2),
+        ),  # at the first message after the step
         (constant(2.0), 100.0, Timing(0.2, 0.05), 0.0, (0.05,)),
     ],
 )
 def test_when_messages_have_a_new_value(signal, until_s, timing, time_step_s, times_s):
-    assert Measurements.of("v", signal, until_s, timing, time_step_s).times_s == pytest.approx(times_s)
+    assert Measurements.of("v", signal, until_s, timing, time_step_s).times_s == pytest.approx(
+        times_s
+    )
 
 
 def test_a_message_has_the_value_of_its_whole_second():
@@ -108,19 +116,28 @@ def test_crossings_are_those_found_by_going_through_all_values(values, threshold
     crossings = [(float(n), region) for n, (before, region) in pairs if region != before]
     assert measured.crossings(thresholds) == tuple(map(list, zip(*crossings, strict=True)))
     passed = int(min(t_s, len(values)))
-    region, until_s = regions[passed - 1] if passed else -1, next((s for s, _ in crossings if s > t_s), math.inf)
+    region, until_s = (
+        regions[passed - 1] if passed else -1,
+        next((s for s, _ in crossings if s > t_s), math.inf),
+    )
     assert measured.region_until(t_s, thresholds) == (region, until_s)
 
 
 def test_noise_makes_every_measurement_another_one():
     errors = itertools.count(1)
-    measured = Measurements.of("v", constant(2.0), 1.0, Timing(0.25, 0.0), 1.0, noise=lambda: next(errors))
+    measured = Measurements.of(
+        "v", constant(2.0), 1.0, Timing(0.25, 0.0), 1.0, noise=lambda: next(errors)
+    )
     assert measured.values == [3.0, 4.0, 5.0, 6.0, 7.0]
 
 
 def test_a_lost_message_is_not_the_next_one():
-    measured = Measurements.of("v", constant(2.0), 5.0, Timing(1.0, 0.2), is_lost=lambda t_s: 1.0 < t_s < 3.0)
-    assert [measured.next_message_s(t_s) for t_s in (0.2, 0.3, 3.2, 4.3)] == pytest.approx([0.2, 3.2, 3.2, math.inf])
+    measured = Measurements.of(
+        "v", constant(2.0), 5.0, Timing(1.0, 0.2), is_lost=lambda t_s: 1.0 < t_s < 3.0
+    )
+    assert [measured.next_message_s(t_s) for t_s in (0.2, 0.3, 3.2, 4.3)] == pytest.approx(
+        [0.2, 3.2, 3.2, math.inf]
+    )
 
 
 def test_signal_monitor_publishes_measurements_at_their_times(subscriber):
@@ -141,13 +158,20 @@ def event(thruster: int, happens: str, time_s: float) -> tuple[ThrusterEvent, fl
 
 
 def publish_events(
-    subscriber: Subscriber, *schedule: tuple[ThrusterEvent, float], after_previous: bool, phase_s: float = 0.25
+    subscriber: Subscriber,
+    *schedule: tuple[ThrusterEvent, float],
+    after_previous: bool,
+    phase_s: float = 0.25,
 ) -> list:
     """Run a schedule to its end; the events, with the times at which they happened."""
     happened: list[tuple[float, ThrusterEvent]] = []
     env, vehicle = subscriber.env, PlacedVehicle()
-    thrusters = SimpleNamespace(env=env, vehicle=vehicle, apply=lambda event: happened.append((env.now, event)))
-    env.process(thruster_monitor(thrusters, subscriber.bus, schedule, Timing(1.0, phase_s), after_previous))
+    thrusters = SimpleNamespace(
+        env=env, vehicle=vehicle, apply=lambda event: happened.append((env.now, event))
+    )
+    env.process(
+        thruster_monitor(thrusters, subscriber.bus, schedule, Timing(1.0, phase_s), after_previous)
+    )
     env.run()
     return happened
 
@@ -159,8 +183,13 @@ BOTH = pytest.mark.parametrize("after_previous", [True, False], ids=["2023", "1.
 def test_failure_and_recovery_happen_when_they_are_published(subscriber, after_previous):
     failure, recovery = event(3, "failure", 5.0), event(3, "recovery", 60.0)
     happened = publish_events(subscriber, failure, recovery, after_previous=after_previous)
-    assert happened == [(subscriber.received[0].time_s, failure[0]), (subscriber.received[1].time_s, recovery[0])]
-    assert subscriber.received[0] == Diagnostic(5.25, Kind.COMPONENT_STATUS, "c_thruster_3", "FALSE")
+    assert happened == [
+        (subscriber.received[0].time_s, failure[0]),
+        (subscriber.received[1].time_s, recovery[0]),
+    ]
+    assert subscriber.received[0] == Diagnostic(
+        5.25, Kind.COMPONENT_STATUS, "c_thruster_3", "FALSE"
+    )
     assert subscriber.received[1].value == "RECOVERED"
 
 
@@ -183,10 +212,15 @@ def test_failure_and_recovery_happen_when_they_are_published(subscriber, after_p
 def test_when_events_happen_one_after_the_other_in_the_order_of_the_list(
     subscriber, after_previous, times_s, published_s
 ):
-    events = [event(thruster, "failure", time_s) for thruster, time_s in zip((4, 2, 6), times_s, strict=False)]
+    events = [
+        event(thruster, "failure", time_s)
+        for thruster, time_s in zip((4, 2, 6), times_s, strict=False)
+    ]
     publish_events(subscriber, *events, after_previous=after_previous)
     keys = ("c_thruster_4", "c_thruster_2", "c_thruster_6")
-    assert subscriber.values() == [(t_s, key, "FALSE") for t_s, key in zip(published_s, keys, strict=False)]
+    assert subscriber.values() == [
+        (t_s, key, "FALSE") for t_s, key in zip(published_s, keys, strict=False)
+    ]
 
 
 # Battery
@@ -199,7 +233,9 @@ def battery(*recharged_s: float) -> BatteryMeasurements:
     return level
 
 
-def battery_levels(subscriber: Subscriber, until_s: float, *recharged_s: float) -> list[tuple[float, float]]:
+def battery_levels(
+    subscriber: Subscriber, until_s: float, *recharged_s: float
+) -> list[tuple[float, float]]:
     level = battery()
     subscriber.env.process(level.publish(subscriber.env, subscriber.bus))
     for t_s in recharged_s:
@@ -210,7 +246,10 @@ def battery_levels(subscriber: Subscriber, until_s: float, *recharged_s: float) 
 
 def test_battery_falls_by_a_two_hundredth_a_second(subscriber):
     levels = battery_levels(subscriber, 151.0)
-    assert levels[:2] == [(0.5, 0.9975), (1.5, 0.9925)] and levels[-1] == (150.5, pytest.approx(0.2475))
+    assert levels[:2] == [(0.5, 0.9975), (1.5, 0.9925)] and levels[-1] == (
+        150.5,
+        pytest.approx(0.2475),
+    )
 
 
 def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):
@@ -233,12 +272,19 @@ def test_recharging_changes_what_a_level_crosses_afterwards():
     regions_until = [level.region_until(t_s, (0.25,)) for t_s in (0.4, 149.9, 150.5)]
     assert regions_until == [(-1, 0.5), (2, 150.5), (0, math.inf)]
     level.recharge(130.5)
-    assert level.region_until(130.5, (0.25, 1.0))[0] == 3 and level.region_until(131.0, (0.25,))[1] == 280.5
+    assert (
+        level.region_until(130.5, (0.25, 1.0))[0] == 3
+        and level.region_until(131.0, (0.25,))[1] == 280.5
+    )
 
 
 @given(
-    st.lists(st.sampled_from((-1.0, 0.0, 0.2475, 0.25, 0.5, 0.9975, 1.0, 1.25)), unique=True).map(sorted),
-    st.lists(st.integers(0, 250).map(lambda message: message + 0.5), min_size=1, max_size=4).map(sorted),
+    st.lists(st.sampled_from((-1.0, 0.0, 0.2475, 0.25, 0.5, 0.9975, 1.0, 1.25)), unique=True).map(
+        sorted
+    ),
+    st.lists(st.integers(0, 250).map(lambda message: message + 0.5), min_size=1, max_size=4).map(
+        sorted
+    ),
     st.sampled_from((0.2, 1.2, 2.0, 40.0, 149.9, 152.0)),
 )
 def test_no_level_is_in_another_region_before_the_next_crossing(thresholds, recharged_s, later_s):
@@ -253,15 +299,21 @@ def test_no_level_is_in_another_region_before_the_next_crossing(thresholds, rech
 
 def test_subscribers_get_the_kinds_that_they_subscribe_to(subscriber):
     statuses: list[tuple[str, int]] = []  # with how many the earlier subscriber has got by then
-    subscriber.bus.subscribe(lambda it: statuses.append((it.key, len(subscriber.received))), [Kind.COMPONENT_STATUS])
+    subscriber.bus.subscribe(
+        lambda it: statuses.append((it.key, len(subscriber.received))), [Kind.COMPONENT_STATUS]
+    )
     subscriber.bus.publish(Diagnostic(0.0, Kind.QA_STATUS, "v", 1.0))
     subscriber.bus.publish(Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", "FALSE"))
     assert statuses == [("c_thruster_1", 2)]
 
 
-@pytest.mark.parametrize(("t_s", "first"), [(0.0, ["pose", "v", "pose", "v", "pose", "v"]), (2.5, []), (3.0, [])])
+@pytest.mark.parametrize(
+    ("t_s", "first"), [(0.0, ["pose", "v", "pose", "v", "pose", "v"]), (2.5, []), (3.0, [])]
+)
 def test_a_monitor_starts_when_somebody_subscribes(t_s, first):
-    """So its messages do not depend on whether somebody else has subscribed, such as the recorder."""
+    """So its messages do not depend on whether somebody else has subscribed, such as the
+    recorder.
+    """
     env, bus, received = simpy.Environment(), DiagnosticsBus(), []
     measured = Measurements.of("v", lambda t_s: t_s, 5.0, Timing(1.0, 0.2))
     start_monitors(env, bus, [measured], {(Kind.POSE, "pose"): lambda: 0.0}, env.timeout(3.3, 7))
@@ -271,4 +323,6 @@ def test_a_monitor_starts_when_somebody_subscribes(t_s, first):
     assert [each.key for each in received[::2]] == [*first, "pose", "v", "pipeline", "pose"]
     call_at(env, 4.1, lambda: bus.subscribe(received.append, tuple(Kind)))
     env.run(until=5.1)
-    assert [(each.time_s, each.key) for each in received[-6:]] == [(4.2, "v")] * 3 + [(5.0, "pose")] * 3
+    assert [(each.time_s, each.key) for each in received[-6:]] == [(4.2, "v")] * 3 + [
+        (5.0, "pose")
+    ] * 3

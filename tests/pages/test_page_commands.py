@@ -28,12 +28,23 @@ def test_decisions_of_metacontrol_are_explained_as_they_were_made(tmp_path):
         for each in cycle["decided"]
     ]
     grounded = [detail for _, _, event, detail in page["events"] if event == "adaptation"]
-    changes = {(function, before, chosen) for function, before, chosen in decided if before != chosen}
+    changes = {
+        (function, before, chosen) for function, before, chosen in decided if before != chosen
+    }
     for detail in grounded:
         function, _, change = detail.partition(": ")
         before, _, rest = change.partition(" -> ")
-        assert (function, None if before == "ungrounded" else before, rest.partition(":")[0]) in changes
-    rules = {fact["rule"] for each in page["cycles"]["inferences"] for fact in each["facts"] if fact["rule"]}
+        assert (
+            function,
+            None if before == "ungrounded" else before,
+            rest.partition(":")[0],
+        ) in changes
+    rules = {
+        fact["rule"]
+        for each in page["cycles"]["inferences"]
+        for fact in each["facts"]
+        if fact["rule"]
+    }
     assert rules <= page["cycles"]["rules"].keys()
 
 
@@ -76,7 +87,9 @@ def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_pat
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_replay_says_what_is_wrong(arguments, told, mission, campaign, tmp_path, monkeypatch, command):
+def test_replay_says_what_is_wrong(
+    arguments, told, mission, campaign, tmp_path, monkeypatch, command
+):
     monkeypatch.chdir(tmp_path)
     given = [each.format(mission=mission, campaign=campaign) for each in arguments]
     status, _, error = command("replay", *given)
@@ -86,7 +99,10 @@ def test_replay_says_what_is_wrong(arguments, told, mission, campaign, tmp_path,
 
 @pytest.mark.parametrize(
     ("content", "told"),
-    [("a,b\n1,2\n", "has no column"), ("manager,search_time_s,distance_inspected_m\n", "no missions")],
+    [
+        ("a,b\n1,2\n", "has no column"),
+        ("manager,search_time_s,distance_inspected_m\n", "no missions"),
+    ],
     ids=["foreign", "no missions"],
 )
 def test_report_says_what_is_wrong(content, told, tmp_path, command):
@@ -104,8 +120,12 @@ def test_text_stands_out_from_its_ground(theme, ground):
 
     def luminance(name):  # as WCAG 2.2 defines it
         parts = (part / 255.0 for part in bytes.fromhex(dict(found)[name]))
-        linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
-        return sum(share * part for share, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+        linear = [
+            part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+        ]
+        return sum(
+            share * part for share, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True)
+        )
 
     for text in ("ink", "soft", "faint", "accent", "good", "bad", "warm"):
         dark, bright = sorted((luminance(text), luminance(ground)))

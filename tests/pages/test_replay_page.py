@@ -17,7 +17,10 @@ FAILURE_S = 36.0  # when metacontrol has seen the thruster's failure of seams202
 def missions():
     loaded = load_scenario("seams2023")
     simulator = Simulator(loaded)
-    return {name: record_of(simulator.run(name, 1, SEED, record=True), loaded) for name in ("metacontrol", "none")}
+    return {
+        name: record_of(simulator.run(name, 1, SEED, record=True), loaded)
+        for name in ("metacontrol", "none")
+    }
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +45,9 @@ def opened_one(one, browser):
 
 
 def place(found, pane=0):
-    return found.value(f"Object.values(document.querySelectorAll('.pane')[{pane}].dataset).map(Number)")
+    return found.value(
+        f"Object.values(document.querySelectorAll('.pane')[{pane}].dataset).map(Number)"
+    )
 
 
 def mission_time(found):
@@ -66,7 +71,12 @@ def test_it_opens_without_complaint_or_request_and_fits_the_window(name, size, b
         assert found.complaints == []
         assert found.outside(file) == []
         assert found.value("document.documentElement.scrollWidth") <= size[0]
-        for canvas, fewest in (("canvas.scene", 300), ("canvas.map", 10), ("canvas.profile", 10), ("#timeline", 10)):
+        for canvas, fewest in (
+            ("canvas.scene", 300),
+            ("canvas.map", 10),
+            ("canvas.profile", 10),
+            ("#timeline", 10),
+        ):
             assert colours(found, canvas) > fewest, canvas
 
 
@@ -76,7 +86,10 @@ def test_it_opens_within_a_second(one, browser):
         metrics = found.page.context.new_cdp_session(found.page)
         metrics.send("Performance.enable", {"timeDomain": "threadTicks"})
         found.page.reload()
-        taken = {each["name"]: each["value"] for each in metrics.send("Performance.getMetrics")["metrics"]}
+        taken = {
+            each["name"]: each["value"]
+            for each in metrics.send("Performance.getMetrics")["metrics"]
+        }
         assert 0.0 < taken["TaskDuration"] < 1.0
 
 
@@ -103,11 +116,14 @@ def test_scrubbing_shows_the_vehicle_where_it_was_then(opened_one, missions):
     track = missions["metacontrol"].trajectory
     index = track["t_s"].tolist().index(50.0)
     scrub_to(opened_one, 50)
-    assert place(opened_one) == pytest.approx([track[name][index] for name in ("x_m", "y_m", "z_m")], abs=2e-3)
+    assert place(opened_one) == pytest.approx(
+        [track[name][index] for name in ("x_m", "y_m", "z_m")], abs=2e-3
+    )
 
 
 @pytest.mark.parametrize(
-    ("key", "expected_s"), [("ArrowRight", 101.0), ("Shift+ArrowLeft", 90.0), ("End", 300.0), ("Home", 0.0)]
+    ("key", "expected_s"),
+    [("ArrowRight", 101.0), ("Shift+ArrowLeft", 90.0), ("End", 300.0), ("Home", 0.0)],
 )
 def test_keys_move_through_time(key, expected_s, opened_one):
     scrub_to(opened_one, 100)
@@ -119,12 +135,16 @@ def test_the_next_key_stops_at_adaptations_alone(opened_one, missions):
     scrub_to(opened_one, 0)
     for adaptation in adaptations(missions["metacontrol"])[:3]:
         opened_one.page.keyboard.press("n")
-        opened_one.wait_until(f"Math.abs(Number(document.body.dataset.time) - {adaptation.t_s}) < 0.05")
+        opened_one.wait_until(
+            f"Math.abs(Number(document.body.dataset.time) - {adaptation.t_s}) < 0.05"
+        )
 
 
 def test_the_legend_names_the_marks_of_the_timeline(opened_one):
     legend = opened_one.page.text_content("#legend")
-    assert all(word in legend for word in ("adaptation", "thruster fails", "pipeline found", "visibility"))
+    assert all(
+        word in legend for word in ("adaptation", "thruster fails", "pipeline found", "visibility")
+    )
 
 
 def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(opened_one):
@@ -160,14 +180,18 @@ def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):
 def test_two_managers_reasoning_is_in_sight_on_a_projector(both, browser):
     with opened(browser, both, (1280, 800), hash_="#t=60") as found:
         bottom = "document.querySelector('.phase.plan').getBoundingClientRect().bottom"
-        assert found.value(f"{bottom} < document.querySelector('.deck').getBoundingClientRect().top + 1")
+        assert found.value(
+            f"{bottom} < document.querySelector('.deck').getBoundingClientRect().top + 1"
+        )
         found.page.keyboard.press("b")
         assert found.value("getComputedStyle(document.body).zoom") == "1.4"
 
 
 def test_it_says_when_no_design_is_left(tmp_path, browser):
     rules, file = tmp_path / "stay.swrl", tmp_path / "replay.html"
-    rules.write_text("stay: typeFD(?fg, fd_spiral_medium) -> fd_realisability(fd_spiral_low, false)")
+    rules.write_text(
+        "stay: typeFD(?fg, fd_spiral_medium) -> fd_realisability(fd_spiral_low, false)"
+    )
     loaded = load_scenario("seams2023", rules=[rules])
     result = Simulator(loaded).run("metacontrol", 1, SEED, record=True)
     file.write_text(replay_page([record_of(result, loaded)]), encoding="utf-8")

@@ -20,7 +20,9 @@ def report(campaign):
 
 @pytest.fixture(scope="module")
 def opened_report(report, browser):
-    """The report in a window, for those who only look or undo what they choose: drawing takes seconds."""
+    """The report in a window, for those who only look or undo what they choose: drawing takes
+    seconds.
+    """
     with opened(browser, report) as found:
         yield ready(found)
 
@@ -64,7 +66,9 @@ def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
 def test_a_manager_has_the_colour_that_it_has_in_figures(opened_report):
     for number, name in enumerate(("none", "bt"), start=1):
         chip = f"#managers button:nth-child({number}) i"
-        shown = opened_report.page.evaluate(f"getComputedStyle(document.querySelector('{chip}')).backgroundColor")
+        shown = opened_report.page.evaluate(
+            f"getComputedStyle(document.querySelector('{chip}')).backgroundColor"
+        )
         assert shown == "rgb({}, {}, {})".format(*bytes.fromhex(line(*looks([name]))["color"][1:]))
 
 
@@ -90,24 +94,32 @@ def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign)
     rows = pandas.read_csv(campaign / "runs.csv")
     row = rows[(rows.manager == "bt") & (rows.run == 2)].iloc[0]
     page = opened_report.page
-    page.evaluate("document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})")
+    page.evaluate(
+        "document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})"
+    )
     assert f"{row.search_time_s:g}" in page.text_content("#run-table tr[aria-selected=true]")
     assert page.input_value("#run-number") == "2"
     assert "--run 2 --managers bt" in page.text_content("#run-command")
-    drawn = opened_report.value("document.getElementById('run-time').data.find(each => each.name === 'adaptation').x")
+    drawn = opened_report.value(
+        "document.getElementById('run-time').data.find(each => each.name === 'adaptation').x"
+    )
     assert len(drawn) == row.adaptations > 0
 
 
 def test_names_are_text_never_markup(campaign, tmp_path, browser):
     rows = pandas.read_csv(campaign / "runs.csv")
-    rows.assign(manager=rows.manager.replace("bt", MARKUP)).to_csv(tmp_path / "runs.csv", index=False)
+    rows.assign(manager=rows.manager.replace("bt", MARKUP)).to_csv(
+        tmp_path / "runs.csv", index=False
+    )
     file = tmp_path / "report.html"
     file.write_text(report_page([tmp_path]), encoding="utf-8")
     with opened(browser, file) as found:
         ready(found)
         assert found.complaints == []
         assert MARKUP in found.page.text_content("#managers")
-        assert found.value("document.querySelectorAll('img, #managers b, #conclusion b').length") == 0
+        assert (
+            found.value("document.querySelectorAll('img, #managers b, #conclusion b').length") == 0
+        )
 
 
 def test_ten_thousand_missions_make_a_page_that_can_be_sent(campaign, tmp_path):
@@ -123,7 +135,9 @@ def test_results_that_leave_little_to_compare_make_a_page(case, campaign, tmp_pa
     if case == "one run":
         rows = rows[rows.run == 1]
     else:
-        rows = rows.assign(pipeline_found=False, search_time_s=300.0, detection_x_m=None, mean_reaction_time_s=None)
+        rows = rows.assign(
+            pipeline_found=False, search_time_s=300.0, detection_x_m=None, mean_reaction_time_s=None
+        )
     rows.to_csv(tmp_path / "runs.csv", index=False)
     file = tmp_path / "report.html"
     file.write_text(report_page([tmp_path]), encoding="utf-8")

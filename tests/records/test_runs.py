@@ -1,4 +1,6 @@
-"""Missions are read from every kind of file in which they come; a file that is wrong is named with its line."""
+"""Missions are read from every kind of file in which they come; a file that is wrong is named with
+its line.
+"""
 
 import math
 from pathlib import Path
@@ -24,7 +26,9 @@ def write(tmp_path: Path):
 
 
 def test_a_campaigns_file_is_read_with_its_places_and_scenario(write):
-    path = write("runs.csv", f"scenario,{OWN},detection_x_m\nsea,none,120,3.5,-17.5\nsea,none,300,0,\n")
+    path = write(
+        "runs.csv", f"scenario,{OWN},detection_x_m\nsea,none,120,3.5,-17.5\nsea,none,300,0,\n"
+    )
     runs = read_runs(path)
     assert runs.frame["detection_x_m"].tolist()[0] == -17.5
     assert math.isnan(runs.frame["detection_x_m"].tolist()[1])
@@ -43,11 +47,31 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
         (f"{OWN},manager\nnone,1,2,none\n", 1, "has column 'manager' twice"),
         (OWN.replace(",", ";") + "\nnone;1;2\n", 1, "has no column 'manager'"),
         (f"{OWN}\n", 1, "has no mission"),
-        (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s: expected a finite number, at most 1e+12, got 'soon'"),
-        (f"{OWN}\nnone,120,\n", 2, "inspected_m: expected a finite number, at least 0 and at most 1e+12, got ''"),
-        (f"{OWN}\nnone,120,3\nnone,1_2,3\n", 3, "search_time_s: expected a finite number, at most 1e+12, got '1_2'"),
-        (f"{OWN}\nnone,١٢,3\n", 2, "search_time_s: expected a finite number, at most 1e+12, got '١٢'"),
-        (f"{OWN}\nnone,2e12,3\n", 2, "search_time_s: expected a finite number, at most 1e+12, got '2e12'"),
+        (
+            f"{OWN}\nnone,120,3\nnone,soon,3\n",
+            3,
+            "search_time_s: expected a finite number, at most 1e+12, got 'soon'",
+        ),
+        (
+            f"{OWN}\nnone,120,\n",
+            2,
+            "inspected_m: expected a finite number, at least 0 and at most 1e+12, got ''",
+        ),
+        (
+            f"{OWN}\nnone,120,3\nnone,1_2,3\n",
+            3,
+            "search_time_s: expected a finite number, at most 1e+12, got '1_2'",
+        ),
+        (
+            f"{OWN}\nnone,١٢,3\n",
+            2,
+            "search_time_s: expected a finite number, at most 1e+12, got '١٢'",
+        ),
+        (
+            f"{OWN}\nnone,2e12,3\n",
+            2,
+            "search_time_s: expected a finite number, at most 1e+12, got '2e12'",
+        ),
         (f"{OWN}\nnone,-1,3\n", 2, "search_time_s: expected a finite number, at least 0, got '-1'"),
         (f"{OWN}\nnone,120\n", 2, "has 2 values, but the header has 3"),
         (f"{OWN}\n ,120,3\n", 2, "manager: expected a manager's name"),
@@ -105,10 +129,16 @@ OF_1_5 = 'suave {},01-Jul-2025-00-43-53,"(-17.0, 2.57)",250,{},{},{},{}'
     ],
 )
 def test_rows_of_averages_and_blank_rows_of_the_exemplars_files_are_left_out(write, rows, averages):
-    runs = read_runs(write("results.csv", "\n".join([HEADER_1_5, OF_1_5.format("bt", True, 87, 40.25, 0.5), *rows])))
+    runs = read_runs(
+        write(
+            "results.csv", "\n".join([HEADER_1_5, OF_1_5.format("bt", True, 87, 40.25, 0.5), *rows])
+        )
+    )
     assert len(runs.frame) == 1
     lines = ", ".join(map(str, averages))
-    assert runs.notes == (f"{next(iter(runs.files))}: lines {lines} left out: averages, not missions",)
+    assert runs.notes == (
+        f"{next(iter(runs.files))}: lines {lines} left out: averages, not missions",
+    )
 
 
 def test_files_of_the_exemplar_that_were_put_together_are_read(write):
@@ -121,14 +151,24 @@ def test_files_of_the_exemplar_that_were_put_together_are_read(write):
 
 
 def test_an_error_below_a_repeated_header_names_its_own_line(write):
-    path = write("results.csv", "\n".join([HEADER_1_5, HEADER_1_5, OF_1_5.format("bt", "perhaps", 44, 47.6, 0.05)]))
+    path = write(
+        "results.csv",
+        "\n".join([HEADER_1_5, HEADER_1_5, OF_1_5.format("bt", "perhaps", 44, 47.6, 0.05)]),
+    )
     with pytest.raises(InputError, match="line 3: pipeline found: expected True or False"):
         read_runs(path)
 
 
 def test_the_behaviour_tree_of_the_extended_mission_is_the_manager_of_that_name_here(write):
-    rows = [OF_1_5.replace("suave", "suave_extended").format(name, True, 44, 47.6, 0.05) for name in ("bt", "none")]
-    runs = read_runs(write("results.csv", "\n".join([HEADER_1_5, *rows, OF_1_5.format("bt", True, 44, 47.6, 0.05)])))
+    rows = [
+        OF_1_5.replace("suave", "suave_extended").format(name, True, 44, 47.6, 0.05)
+        for name in ("bt", "none")
+    ]
+    runs = read_runs(
+        write(
+            "results.csv", "\n".join([HEADER_1_5, *rows, OF_1_5.format("bt", True, 44, 47.6, 0.05)])
+        )
+    )
     assert runs.frame["manager"].tolist() == ["bt_extended", "none", "bt"]
 
 
@@ -140,23 +180,33 @@ def test_the_behaviour_tree_of_the_extended_mission_is_the_manager_of_that_name_
         (OWN, ["none,300,0"], [None]),
     ],
 )
-def test_whether_the_pipeline_was_found_is_read_or_follows_from_the_time_limit(write, header, rows, found):
+def test_whether_the_pipeline_was_found_is_read_or_follows_from_the_time_limit(
+    write, header, rows, found
+):
     frame = read_runs(write("runs.csv", "\n".join([header, *rows]))).frame
     assert [None if math.isnan(value) else value for value in frame["pipeline_found"]] == found
 
 
-@pytest.mark.parametrize(("scenario", "is_known"), [(None, [False, True, False]), ("sea", [True, True, False])])
+@pytest.mark.parametrize(
+    ("scenario", "is_known"), [(None, [False, True, False]), ("sea", [True, True, False])]
+)
 def test_a_reaction_time_of_zero_is_none_unless_a_campaign_wrote_it(write, scenario, is_known):
     rows = ["none,20,1,0.0", "none,20,1,1.5", "none,20,1,"]
     if scenario is not None:
         rows = [f"{scenario},{row}" for row in rows]
-    header = f"{OWN},mean_reaction_time_s" if scenario is None else f"scenario,{OWN},mean_reaction_time_s"
+    header = (
+        f"{OWN},mean_reaction_time_s"
+        if scenario is None
+        else f"scenario,{OWN},mean_reaction_time_s"
+    )
     times = read_runs(write("runs.csv", "\n".join([header, *rows]))).frame["mean_reaction_time_s"]
     assert times.notna().tolist() == is_known
 
 
 @pytest.mark.parametrize("number", ["1" * 400, "1e400", "-" + "9" * 30])
-def test_a_number_that_no_sweep_has_is_text_in_a_further_column_and_an_error_in_a_metric(write, number):
+def test_a_number_that_no_sweep_has_is_text_in_a_further_column_and_an_error_in_a_metric(
+    write, number
+):
     frame = read_runs(write("runs.csv", f"{OWN},{number},depth\nnone,120,3,1,{number}\n")).frame
     assert frame[number].tolist() == [1]
     assert frame["depth"].tolist() in ([number], [float(number)])

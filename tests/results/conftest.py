@@ -40,7 +40,11 @@ def missions() -> Missions:
     """Makes a frame of missions from search times, distances and places of detection by manager."""
 
     def frame(by_manager: Mapping[str, Sequence[tuple[float, float, float]]]) -> pandas.DataFrame:
-        rows = [(manager, *values) for manager, all_values in by_manager.items() for values in all_values]
+        rows = [
+            (manager, *values)
+            for manager, all_values in by_manager.items()
+            for values in all_values
+        ]
         columns = ["manager", "search_time_s", "distance_inspected_m", "detection_x_m"]
         return pandas.DataFrame(rows, columns=columns).assign(pipeline_found=float("nan"))
 

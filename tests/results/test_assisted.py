@@ -1,4 +1,6 @@
-"""Real missions assisted by simulated ones: the estimator, what it is given, and how often its intervals hold."""
+"""Real missions assisted by simulated ones: the estimator, what it is given, and how often its
+intervals hold.
+"""
 
 import math
 from itertools import product
@@ -20,14 +22,27 @@ REAL = Path(__file__).parents[2] / "scenarios" / "published" / "planta_exp1_runs
 
 
 def missions(
-    seed: int, conditions: np.ndarray, runs: int, shift_s: float = 0.0, noise_s: float = 2.0, managers: str = "ab"
+    seed: int,
+    conditions: np.ndarray,
+    runs: int,
+    shift_s: float = 0.0,
+    noise_s: float = 2.0,
+    managers: str = "ab",
 ) -> pandas.DataFrame:
-    """Missions of managers whose search takes 60 s more for each metre of start.y_m; the second's 10 s more."""
+    """Missions of managers whose search takes 60 s more for each metre of start.y_m; the second's
+    10 s more.
+    """
     rows = product(managers, conditions, range(1, runs + 1))
-    frame = pandas.DataFrame(rows, columns=["manager", "start.y_m", "run"]).assign(scenario="s", seed=seed)
+    frame = pandas.DataFrame(rows, columns=["manager", "start.y_m", "run"]).assign(
+        scenario="s", seed=seed
+    )
     noise = noise_s * np.random.default_rng(seed).normal(size=(len(frame), 2))
-    search_time_s = 60.0 * frame["start.y_m"] + 10.0 * (frame["manager"] == "b") + shift_s + noise[:, 0]
-    frame = frame.assign(search_time_s=search_time_s, distance_inspected_m=20.0 * frame["start.y_m"] + noise[:, 1])
+    search_time_s = (
+        60.0 * frame["start.y_m"] + 10.0 * (frame["manager"] == "b") + shift_s + noise[:, 0]
+    )
+    frame = frame.assign(
+        search_time_s=search_time_s, distance_inspected_m=20.0 * frame["start.y_m"] + noise[:, 1]
+    )
     return frame.assign(pipeline_found=True, mission_duration_s=300.0)
 
 
@@ -45,7 +60,11 @@ def real_missions(runs: int, shift_s: float = 0.0, points: np.ndarray = POINTS) 
 
 
 def compared(**changed: pandas.DataFrame) -> AssistedComparison:
-    given = {"real": real_missions(2, 25.0), "same": missions(2, POINTS, 5), "population": population()} | changed
+    given = {
+        "real": real_missions(2, 25.0),
+        "same": missions(2, POINTS, 5),
+        "population": population(),
+    } | changed
     real, *simulated = map(missions_in, given.values())
     return compare_assisted(grouped(real, simulated=simulated))
 
@@ -56,8 +75,11 @@ def compared(**changed: pandas.DataFrame) -> AssistedComparison:
 def test_the_mean_is_that_of_ppi_python():
     real = np.array([52.0, 118, 83, 61, 97, 130, 75, 88, 143, 69, 110, 92])
     same = np.array([55.0, 121, 80, 57, 101, 127, 79, 93, 136, 66, 113, 99])
-    many = np.array([50.0, 64, 71, 83, 88, 95, 104, 110, 116, 125, 133, 140, 59, 77, 92, 101, 120, 86, 98, 107])
-    # ppi_mean_pointestimate of ppi-python 0.2.3, for this and for a simulation that is hardly of use
+    many = np.array(
+        [50.0, 64, 71, 83, 88, 95, 104, 110, 116, 125, 133, 140, 59, 77, 92, 101, 120, 86, 98, 107]
+    )
+    # ppi_mean_pointestimate of ppi-python 0.2.3, for this and for a simulation that is hardly of
+    # use
     found, weight = assisted_mean(real, same, many)
     assert found.value == pytest.approx(94.54777428140198, abs=1e-9)
     assert weight == pytest.approx(0.6792332531485169, abs=1e-9)
@@ -110,7 +132,9 @@ def test_a_comparison_corrects_what_the_conditions_do():
     difference = by_name.loc[("search_time_s", "a", "b")]
     assert difference["assisted"] == pytest.approx(-10.0, abs=3.0)
     assert found.estimates["conclusion"].str.contains("^a finds the pipeline.* sooner than b").any()
-    assert [note.split(" are ")[0] for note in found.notes] == ["intervals and numbers of runs needed"]
+    assert [note.split(" are ")[0] for note in found.notes] == [
+        "intervals and numbers of runs needed"
+    ]
 
 
 def test_conditions_are_found_by_number_and_by_order():
@@ -140,12 +164,27 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit():
         ({"real": real_missions(2, points=POINTS[:2])}, "there are 2 conditions"),
         ({"population": population(draws=5)}, "there are 5 draws"),
         ({"population": missions(2, POINTS, 5)}, "it sweeps start.y_m"),
-        ({"population": population().assign(search_time_s=math.nan)}, "search_time_s has a value that is no number"),
-        ({"same": missions(2, POINTS, 5).assign(distance_inspected_m=math.inf)}, "distance_inspected_m has a value"),
+        (
+            {"population": population().assign(search_time_s=math.nan)},
+            "search_time_s has a value that is no number",
+        ),
+        (
+            {"same": missions(2, POINTS, 5).assign(distance_inspected_m=math.inf)},
+            "distance_inspected_m has a value",
+        ),
         ({"same": missions(2, POINTS, 5, managers="a")}, "there is no mission of b"),
-        ({"population": population().assign(mission_duration_s=400.0)}, "missions end after 400 s, others after 300 s"),
-        ({"real": real_missions(3).drop(columns="start.y_m")[:-1]}, "6 conditions do not share evenly"),
-        ({"real": real_missions(1).assign(condition=7).drop(columns="start.y_m")}, "there is no condition 7"),
+        (
+            {"population": population().assign(mission_duration_s=400.0)},
+            "missions end after 400 s, others after 300 s",
+        ),
+        (
+            {"real": real_missions(3).drop(columns="start.y_m")[:-1]},
+            "6 conditions do not share evenly",
+        ),
+        (
+            {"real": real_missions(1).assign(condition=7).drop(columns="start.y_m")},
+            "there is no condition 7",
+        ),
     ],
 )
 def test_what_does_not_belong_together(changed, text):
@@ -168,8 +207,12 @@ def test_runs_that_share_a_draw_are_one_draw():
     frame = population(draws=50)
     four = pandas.concat([frame.assign(run=4 * (frame["run"] - 1) + each) for each in (1, 2, 3, 4)])
     four.attrs["runs_sharing_draw"] = 4
-    once, often = (compared(population=each).estimates.query("other == ''") for each in (frame, four))
-    assert often["assisted_ci95_high"].to_numpy() == pytest.approx(once["assisted_ci95_high"].to_numpy())
+    once, often = (
+        compared(population=each).estimates.query("other == ''") for each in (frame, four)
+    )
+    assert often["assisted_ci95_high"].to_numpy() == pytest.approx(
+        once["assisted_ci95_high"].to_numpy()
+    )
 
 
 # From files
@@ -182,7 +225,9 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     drawn = {"start.y_m": {"distribution": "uniform", "minimum": 2.0, "maximum": 3.0}}
     shift = {"distribution": "uniform", "minimum": 0.0, "maximum": 200.0, "shared": "shift"}
     drawn |= {f"thruster_events.{place}.time_s": shift for place in (0, 1)}
-    run_campaign("planta_exp1", ["none", "bt"], 40, 1, out=folder / "population", perturbations=drawn)
+    run_campaign(
+        "planta_exp1", ["none", "bt"], 40, 1, out=folder / "population", perturbations=drawn
+    )
     return folder
 
 

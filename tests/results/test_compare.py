@@ -1,4 +1,6 @@
-"""Managers are compared from result files: estimates, paired and unpaired differences, and what follows."""
+"""Managers are compared from result files: estimates, paired and unpaired differences, and what
+follows.
+"""
 
 import re
 from pathlib import Path
@@ -46,7 +48,11 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def runs(**values: list[float]) -> pandas.DataFrame:
     """Missions of managers with given search times, run by run, with seed 1; 300 s: not found."""
-    rows = [(manager, run, time_s) for manager, times_s in values.items() for run, time_s in enumerate(times_s, 1)]
+    rows = [
+        (manager, run, time_s)
+        for manager, times_s in values.items()
+        for run, time_s in enumerate(times_s, 1)
+    ]
     frame = pandas.DataFrame(rows, columns=["manager", "run", "search_time_s"]).assign(seed=1)
     times_s = frame["search_time_s"]
     return frame.assign(pipeline_found=times_s < 300.0, distance_inspected_m=300.0 - times_s)
@@ -73,14 +79,18 @@ class TestPublishedRuns:
                     assert tested.p_less == pytest.approx(
                         stats.mannwhitneyu(x, y, alternative="less").pvalue, abs=1e-12
                     )
-                    assert tested.effect == pytest.approx(np.mean([(a > b) + 0.5 * (a == b) for a in x for b in y]))
+                    assert tested.effect == pytest.approx(
+                        np.mean([(a > b) + 0.5 * (a == b) for a in x for b in y])
+                    )
                     count += 1
         assert count == 6
 
     def test_shares_have_wilsons_interval_and_fishers_test(self, published):
         found = summary(published, "random", "pipeline_found")
         assert found.mean == 0.8
-        assert interval(found, "mean") == pytest.approx(tuple(stats.binomtest(16, 20).proportion_ci(0.95, "wilson")))
+        assert interval(found, "mean") == pytest.approx(
+            tuple(stats.binomtest(16, 20).proportion_ci(0.95, "wilson"))
+        )
         tested = difference(published, "none", "random", "pipeline_found")
         assert tested.p == pytest.approx(stats.fisher_exact([[19, 1], [16, 4]]).pvalue, abs=1e-12)
 
@@ -88,31 +98,50 @@ class TestPublishedRuns:
 class TestCampaign:
     def test_runs_with_common_random_numbers_are_paired(self, campaign):
         comparison = compare_folders([campaign])
-        times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+        times = pandas.read_csv(campaign / "runs.csv").pivot(
+            index="run", columns="manager", values="search_time_s"
+        )
         found = difference(comparison, "bt", "metacontrol")
         assert (found.paired, found.n) == (True, 25)
-        assert found.p == pytest.approx(stats.wilcoxon(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
+        assert found.p == pytest.approx(
+            stats.wilcoxon(times["bt"], times["metacontrol"]).pvalue, abs=1e-12
+        )
         assert found.difference == pytest.approx((times["bt"] - times["metacontrol"]).mean())
         low, high = stats.ttest_rel(times["bt"], times["metacontrol"]).confidence_interval()
         assert interval(found, "difference") == pytest.approx((low, high))
         apart = difference(compare_folders([campaign], unpaired=True), "bt", "metacontrol")
-        assert apart.p == pytest.approx(stats.mannwhitneyu(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
-        welch = stats.ttest_ind(times["bt"], times["metacontrol"], equal_var=False).confidence_interval()
+        assert apart.p == pytest.approx(
+            stats.mannwhitneyu(times["bt"], times["metacontrol"]).pvalue, abs=1e-12
+        )
+        welch = stats.ttest_ind(
+            times["bt"], times["metacontrol"], equal_var=False
+        ).confidence_interval()
         assert interval(apart, "difference") == pytest.approx((welch.low, welch.high))
 
     def test_the_runs_needed_give_that_interval(self, campaign):
-        times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
-        found = difference(compare_folders([campaign], half_widths=["search_time_s:2"]), "bt", "metacontrol")
+        times = pandas.read_csv(campaign / "runs.csv").pivot(
+            index="run", columns="manager", values="search_time_s"
+        )
+        found = difference(
+            compare_folders([campaign], half_widths=["search_time_s:2"]), "bt", "metacontrol"
+        )
         apart = (times["bt"] - times["metacontrol"]).std()
         for n, narrow in ((found.runs_needed_paired, True), (found.runs_needed_paired - 1, False)):
             assert (stats.t.ppf(0.975, n - 1) * apart / n**0.5 <= 2.0) == narrow
         ratio = (times["bt"].var() + times["metacontrol"].var()) / apart**2  # what pairs are worth
-        assert found.runs_needed_unpaired == pytest.approx(ratio * found.runs_needed_paired, rel=0.05)
+        assert found.runs_needed_unpaired == pytest.approx(
+            ratio * found.runs_needed_paired, rel=0.05
+        )
 
     def test_folders_side_by_side_are_told_apart_by_name(self, campaign, tmp_path):
         run_campaign("seams2023", ["bt"], 10, 1, out=tmp_path / "again")
         comparison = compare_folders([campaign, tmp_path / "again"])
-        assert {each.group for each in rows(comparison.summaries)} == {"none", "bt (out)", "bt (again)", "metacontrol"}
+        assert {each.group for each in rows(comparison.summaries)} == {
+            "none",
+            "bt (out)",
+            "bt (again)",
+            "metacontrol",
+        }
         same = difference(comparison, "bt (out)", "bt (again)")
         assert (same.paired, same.n) == (True, 10)
         assert "a value under only one of them (15) are left out" in same.why
@@ -120,21 +149,29 @@ class TestCampaign:
 
     def test_different_seeds_are_not_paired(self, campaign, tmp_path):
         run_campaign("seams2023", ["bt"], 10, 2, out=tmp_path / "again")
-        found = difference(compare_folders([campaign, tmp_path / "again"]), "bt (out)", "bt (again)")
+        found = difference(
+            compare_folders([campaign, tmp_path / "again"]), "bt (out)", "bt (again)"
+        )
         assert not found.paired
         assert "fewer than two runs of the same seed" in found.why
 
-    def test_the_restricted_mean_is_that_up_to_the_limit_where_none_is_censored_before(self, campaign):
+    def test_the_restricted_mean_is_that_up_to_the_limit_where_none_is_censored_before(
+        self, campaign
+    ):
         own = pandas.read_csv(campaign / "runs.csv").query("manager == 'metacontrol'")
         found = summary(compare_folders([campaign]), "metacontrol")
         assert found.horizon_s == 300.0
-        assert found.restricted_mean_s == pytest.approx(own["search_time_s"].clip(upper=300.0).mean())
+        assert found.restricted_mean_s == pytest.approx(
+            own["search_time_s"].clip(upper=300.0).mean()
+        )
 
 
 class TestSweep:
     def test_runs_are_independent_and_points_are_not(self, tmp_path):
         values = {"visibility.period_s": [60.0, 80.0, 100.0]}
-        frame = run_campaign("seams2023", ["none", "metacontrol"], 5, 1, out=tmp_path / "out", sweep=values).frame()
+        frame = run_campaign(
+            "seams2023", ["none", "metacontrol"], 5, 1, out=tmp_path / "out", sweep=values
+        ).frame()
         comparison = compare_folders([tmp_path / "out"])
         found = summary(comparison, "none")
         assert found.n == 5
@@ -144,7 +181,9 @@ class TestSweep:
 
     def test_points_can_be_compared_with_each_other(self, tmp_path):
         values = {"visibility.period_s": [60.0, 80.0]}
-        frame = run_campaign("seams2023", ["none"], 5, 1, out=tmp_path / "out", sweep=values).frame()
+        frame = run_campaign(
+            "seams2023", ["none"], 5, 1, out=tmp_path / "out", sweep=values
+        ).frame()
         comparison = compare_folders([tmp_path / "out"], by=["visibility.period_s"])
         found = difference(comparison, "none, period_s 60", "none, period_s 80")
         times = frame.pivot(index="run", columns="visibility.period_s", values="search_time_s")
@@ -157,21 +196,32 @@ class TestSweep:
         for against in (None, "none"):
             found = compare_folders([tmp_path / "out"], by=["visibility.period_s"], against=against)
             pairs = {tuple(sorted((each.group, each.other))) for each in rows(found.differences)}
-            assert pairs == {(f"bt, period_s {value}", f"none, period_s {value}") for value in (60, 80)}
+            assert pairs == {
+                (f"bt, period_s {value}", f"none, period_s {value}") for value in (60, 80)
+            }
         assert re.match("period_s 60[:;] ", found.conclusion)
         assert "period_s 80: " in found.conclusion and "bt, period_s" not in found.conclusion
 
 
-def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_named_as_such(tmp_path):
+def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_named_as_such(
+    tmp_path,
+):
     values = {"thruster_events.0.time_s": [400.0, 400.0000001]}  # after the time limit
     run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
     run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "plain")
     found = compare_folders([tmp_path / "out", tmp_path / "plain"], by=["thruster_events.0.time_s"])
-    assert found.conclusion.startswith("time_s 400.0; time_s 400.0000001: ") and "not swept: " in found.conclusion
+    assert (
+        found.conclusion.startswith("time_s 400.0; time_s 400.0000001: ")
+        and "not swept: " in found.conclusion
+    )
     ties = compare_frame(runs(a=[100.0, 110.0], b=[100.0, 110.0], c=[150.0, 151.0])).conclusion
-    assert ties.startswith("No difference in search time is shown between a, which has, with others, the best mean, ")
+    assert ties.startswith(
+        "No difference in search time is shown between a, which has, with others, the best mean, "
+    )
     assert "b (equal in all 2 pairs)" in ties
-    more = compare_frame(runs(a=[120.0, 110.0, 50.0], b=[110.0, 110.0])).conclusion  # a is worse in both pairs
+    more = compare_frame(
+        runs(a=[120.0, 110.0, 50.0], b=[110.0, 110.0])
+    ).conclusion  # a is worse in both pairs
     assert "between a, which has the best mean of all its runs, and b" in more
 
 
@@ -179,36 +229,55 @@ def test_an_interval_without_0_that_the_corrected_test_does_not_support_is_named
     b = [100.0 + 0.1 * number for number in range(8)]
     a = [value - 20.0 - 5.0 * (number % 3) for number, value in enumerate(b)]
     a[0] = b[0] + 3.0
-    found = compare_frame(runs(a=a, b=b, c=[150.0, 90.0] * 4, d=[80.0, 160.0] * 4, e=[150.0, 95.0] * 4))
+    found = compare_frame(
+        runs(a=a, b=b, c=[150.0, 90.0] * 4, d=[80.0, 160.0] * 4, e=[150.0, 95.0] * 4)
+    )
     pair = difference(found, "a", "b")
     assert pair.p < 0.05 <= pair.p_holm
     assert interval(pair, "difference")[1] < 0.0
     open_one = "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
-    assert f"b ({open_one})" in found.conclusion and f"by the test, though {open_one} (a - b: " in pair.conclusion
-    assert f"Holm's correction over {found.differences['test'].notna().sum()} tests" in found.conclusion
+    assert (
+        f"b ({open_one})" in found.conclusion
+        and f"by the test, though {open_one} (a - b: " in pair.conclusion
+    )
+    assert (
+        f"Holm's correction over {found.differences['test'].notna().sum()} tests"
+        in found.conclusion
+    )
 
 
 def test_pairs_that_vary_more_than_independent_runs_are_noted():
     times = [100.0 + 5.0 * number for number in range(10)]
     against = compare_frame(runs(a=times, b=times[::-1])).notes
     assert any("larger, not smaller (a - b in search_time_s, 2.0 times" in note for note in against)
-    assert not any("larger, not smaller" in note for note in compare_frame(runs(a=times, b=times)).notes)
+    assert not any(
+        "larger, not smaller" in note for note in compare_frame(runs(a=times, b=times)).notes
+    )
 
 
 def test_that_most_missions_did_not_find_the_pipeline_comes_first():
     lost = [300.0] * 15 + [120.0] * 5
     found = compare_frame(runs(a=[130.0] * 11 + [300.0] * 9, b=lost))
     assert found.conclusion.startswith("The pipeline was not found by b in 15 of 20 missions; ")
-    assert not compare_frame(runs(a=[100.0] * 20, b=[130.0] * 11 + [300.0] * 9)).conclusion.startswith("The pipe")
+    assert not compare_frame(
+        runs(a=[100.0] * 20, b=[130.0] * 11 + [300.0] * 9)
+    ).conclusion.startswith("The pipe")
 
 
 def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(campaign):
-    times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+    times = pandas.read_csv(campaign / "runs.csv").pivot(
+        index="run", columns="manager", values="search_time_s"
+    )
     comparison = compare_folders([campaign], managers=["bt", "none"])
     apart = times["bt"] - times["none"]
     (found,) = comparison.largest.rows
     assert (found[2], found[3]) == (str(apart.idxmin()), f"{apart.max():.2f}")
-    assert str(comparison).count(f"suave-des replay {campaign} --run {apart.abs().idxmax()} --managers bt,none") == 1
+    assert (
+        str(comparison).count(
+            f"suave-des replay {campaign} --run {apart.abs().idxmax()} --managers bt,none"
+        )
+        == 1
+    )
     frame = compare_frame(pandas.read_csv(campaign / "runs.csv"))
     assert frame.largest.rows and "replay" not in str(frame)
     for unpaired in (compare_folders([PUBLISHED]), compare_folders([campaign], unpaired=True)):
@@ -223,7 +292,9 @@ class TestFewValues:
         assert not (comparison.differences["p_holm"] < 0.05).any()
 
     def test_equal_values_do_not_say_how_many_runs_are_needed(self):
-        found = difference(compare_frame(runs(a=[100.0] * 4, b=[120.0] * 4)), "a", "b", "pipeline_found")
+        found = difference(
+            compare_frame(runs(a=[100.0] * 4, b=[120.0] * 4)), "a", "b", "pipeline_found"
+        )
         assert (found.runs_needed_paired, found.runs_needed_unpaired) == (None, None)
         low, high = interval(found, "difference")
         assert -1.0 <= low < 0.0 < high <= 1.0
@@ -235,12 +306,17 @@ class TestFewValues:
         found = difference(comparison, "a", "b")
         assert found.p == 1.0
         assert found.conclusion == "a and b have the same search time in all 25 pairs."
-        assert comparison.conclusion.startswith("The pipeline was not found by a in 25 of 25 missions, b in 25 of 25 m")
+        assert comparison.conclusion.startswith(
+            "The pipeline was not found by a in 25 of 25 missions, b in 25 of 25 m"
+        )
 
     def test_a_difference_that_is_the_same_in_each_pair_is_claimed(self):
         a = np.random.default_rng(1).normal(100.0, 5.0, 20)
         claim = "a finds the pipeline 5.00 s sooner than b (no interval; 20 pairs, Wilcoxon, p < 0.001)."
-        assert difference(compare_frame(runs(a=list(a), b=list(a + 5.0))), "a", "b").conclusion == claim
+        assert (
+            difference(compare_frame(runs(a=list(a), b=list(a + 5.0))), "a", "b").conclusion
+            == claim
+        )
         few = difference(compare_frame(runs(a=[100.0], b=[105.0])), "a", "b")
         assert few.conclusion.startswith("No difference in search time is shown between a and b (")
 
@@ -274,7 +350,9 @@ class TestConclusions:
     def test_the_best_mean_of_all_runs_is_not_called_better_where_its_pairs_are_worse(self):
         chance = np.random.default_rng(1)
         hard = chance.normal(200.0, 5.0, 20)  # b has only these runs, and is sooner in each
-        frame = runs(a=[*hard, *chance.normal(80.0, 5.0, 80)], b=list(hard - chance.normal(10.0, 1.0, 20)))
+        frame = runs(
+            a=[*hard, *chance.normal(80.0, 5.0, 80)], b=list(hard - chance.normal(10.0, 1.0, 20))
+        )
         assert compare_frame(frame).conclusion.startswith("b finds the pipeline")
 
 
@@ -299,7 +377,10 @@ class TestCaveats:
     ("choices", "words"),
     [
         (Choices(managers=["nonne"]), "no mission of 'nonne' .*did you mean 'none'"),
-        (Choices(metrics=["search_time"]), "there is no metric 'search_time' .*did you mean 'search_time_s'"),
+        (
+            Choices(metrics=["search_time"]),
+            "there is no metric 'search_time' .*did you mean 'search_time_s'",
+        ),
         (Choices(against="bt"), "nothing is called 'bt'"),
         (Choices(by=["visibility"]), "'visibility' is not what a sweep varies"),
         (Choices(half_widths=["search_time_s"]), "is no half-width above 0 .*search_time_s:2"),
@@ -314,14 +395,25 @@ def test_a_choice_that_makes_no_sense_is_refused(choices, words):
 def test_the_frame_of_a_campaign_is_compared_and_drawn():
     frame = api.run_campaign("seams2023", ["none", "bt"], runs=4, progress=False)
     comparison = frame[frame["run"] > 1].compare(metrics=["distance_inspected_m"])
-    assert [(each.group, each.other, each.n) for each in rows(comparison.differences)] == [("none", "bt", 3)]
+    assert [(each.group, each.other, each.n) for each in rows(comparison.differences)] == [
+        ("none", "bt", 3)
+    ]
     assert str(comparison).startswith(comparison.conclusion[:60])
     assert len(frame.figure().axes) == 2
 
 
 def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_whole():
-    long = ["a_module_with_a_long_name:AndAClassWithAnEvenLongerName", "another_module_of_a_thesis:AnotherLongManager"]
-    frame = runs(**{"none": [100.0, 120.0, 140.0], long[0]: [90.0, 95.0, 130.0], long[1]: [80.0, 85.0, 120.0]})
+    long = [
+        "a_module_with_a_long_name:AndAClassWithAnEvenLongerName",
+        "another_module_of_a_thesis:AnotherLongManager",
+    ]
+    frame = runs(
+        **{
+            "none": [100.0, 120.0, 140.0],
+            long[0]: [90.0, 95.0, 130.0],
+            long[1]: [80.0, 85.0, 120.0],
+        }
+    )
     for width in (80, 95):
         text = compare_frame(frame).text(width)
         assert max(map(len, text.splitlines())) <= width

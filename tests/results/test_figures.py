@@ -26,7 +26,13 @@ from suave_des.results.figures import (
     write_picture,
 )
 from suave_des.results.groups import grouped
-from suave_des.results.mission import adaptations, draw_map, draw_timeline, failure_spans, mode_spans
+from suave_des.results.mission import (
+    adaptations,
+    draw_map,
+    draw_timeline,
+    failure_spans,
+    mode_spans,
+)
 
 
 @pytest.fixture(scope="module")
@@ -83,18 +89,31 @@ def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path):
     assert missions.swept == tuple(values)
     figure = draw_sweep(missions)
     frame = result.frame()
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["none", "random", "95% interval of the mean"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "none",
+        "random",
+        "95% interval of the mean",
+    ]
     for manager, container in zip(("none", "random"), figure.axes[0].containers, strict=True):
-        own = frame[frame["manager"] == manager].groupby("visibility.period_s")["search_time_s"].mean()
+        own = (
+            frame[frame["manager"] == manager]
+            .groupby("visibility.period_s")["search_time_s"]
+            .mean()
+        )
         assert list(container[0].get_ydata()) == pytest.approx(list(own))
-    assert [tick.get_text() for tick in figure.axes[3].get_xticklabels()] == ["search, low", "search, medium"]
+    assert [tick.get_text() for tick in figure.axes[3].get_xticklabels()] == [
+        "search, low",
+        "search, medium",
+    ]
     draw_folder(tmp_path / "out", tmp_path / "sweep.svg")
     assert "visibility: period" in (tmp_path / "sweep.svg").read_text()
 
 
 def sweep_frame(points: int, runs: int) -> pandas.DataFrame:
     """Missions in which the run alone decides the search time, at many points of a sweep."""
-    frame = pandas.DataFrame(product(range(points), range(1, runs + 1)), columns=["start.x_m", "run"])
+    frame = pandas.DataFrame(
+        product(range(points), range(1, runs + 1)), columns=["start.x_m", "run"]
+    )
     frame = frame.astype({"start.x_m": float}).assign(manager="a", seed=1, distance_inspected_m=1.0)
     swept = {"search_time_s": 100.0 + 10.0 * frame["run"], "start.y_m": frame["start.x_m"] % 2}
     return frame.assign(pipeline_found=True, **swept)
@@ -110,7 +129,9 @@ def test_the_intervals_of_a_sweep_are_those_of_its_runs():
 
 def test_many_values_are_drawn_in_bins_of_equally_many_missions():
     figure = draw_sweep(missions_of(sweep_frame(24, 2)), ["start.x_m"])
-    assert list(figure.axes[0].containers[0][0].get_xdata()) == pytest.approx([1.0 + 3.0 * n for n in range(8)])
+    assert list(figure.axes[0].containers[0][0].get_xdata()) == pytest.approx(
+        [1.0 + 3.0 * n for n in range(8)]
+    )
 
 
 def test_no_parameter_is_left_out_silently():
@@ -131,11 +152,16 @@ def test_a_manager_looks_the_same_in_every_figure():
     assert (both[0], both[3]) == (0, 3)
     assert len({style.line(number)["color"] for number in both}) == 4
     frame = sweep_frame(3, 4)
-    both = missions_of(pandas.concat([frame.assign(manager=name) for name in ("metacontrol", "bt")]))
+    both = missions_of(
+        pandas.concat([frame.assign(manager=name) for name in ("metacontrol", "bt")])
+    )
     curves = draw_distributions(grouped(both)).axes[0].get_lines()
     means = draw_sweep(both, ["start.x_m"]).axes[0].containers
     expected = [style.line(2)["color"], style.line(3)["color"]]
-    assert list(dict.fromkeys(curve.get_color() for curve in curves if len(curve.get_xdata()) > 2)) == expected
+    assert (
+        list(dict.fromkeys(curve.get_color() for curve in curves if len(curve.get_xdata()) > 2))
+        == expected
+    )
     assert [container[0].get_color() for container in means] == expected
 
 
@@ -169,7 +195,9 @@ class TestBattery:
     @staticmethod
     def record(tmp_path_factory: pytest.TempPathFactory) -> MissionRecord:
         folder = tmp_path_factory.mktemp("battery")
-        (folder / "battery.yaml").write_text("base: extended\nleak: {time_s: 280}\nbattery: {discharge_time_s: 100}\n")
+        (folder / "battery.yaml").write_text(
+            "base: extended\nleak: {time_s: 280}\nbattery: {discharge_time_s: 100}\n"
+        )
         run_mission(folder / "battery.yaml", "bt_extended", 1, 1, folder / "out")
         return read_mission(folder / "out")
 
@@ -188,7 +216,10 @@ class TestBattery:
         assert any(cause.startswith("battery at 2") for cause in causes)
 
 
-LONG = "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerName" + "ForItsManager" * 5
+LONG = (
+    "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerName"
+    + "ForItsManager" * 5
+)
 
 
 @pytest.mark.parametrize("kind", ["distributions", "differences"])
@@ -228,7 +259,10 @@ def texts_of(figure: Figure) -> list[str]:
 def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits):
     texts = texts_of(draw_missions(missions_of(two_limits), "distributions"))
     assert "none (n = 4)" in texts
-    assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
+    assert any(
+        text.startswith("missions at all points of the sweep: mission: time limit")
+        for text in texts
+    )
 
 
 class TestDifferences:
@@ -236,12 +270,16 @@ class TestDifferences:
 
     def test_show_each_run_the_mean_and_the_runs_at_the_ends(self):
         frame = sweep_frame(1, 5).drop(columns=["start.x_m", "start.y_m"])
-        other = frame.assign(manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0])
+        other = frame.assign(
+            manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0]
+        )
         axes = draw_missions(missions_of(pandas.concat([frame, other])), "differences").axes[0]
         rain = next(line for line in axes.get_lines() if len(line.get_xdata()) == 5)
         assert sorted(rain.get_xdata()) == [1.0, 2.0, 3.0, 4.0, 40.0]
         assert [text.get_text() for text in axes.texts] == ["run 1", "run 5"]
-        assert all(text.get_bbox_patch() for text in axes.texts)  # so that the line at 0 does not cross them
+        assert all(
+            text.get_bbox_patch() for text in axes.texts
+        )  # so that the line at 0 does not cross them
         low, high = axes.containers[0][2][0].get_segments()[0][:, 0]
         assert (low, high) == pytest.approx(mean_of([1.0, 2.0, 3.0, 4.0, 40.0]).interval)
 
@@ -249,11 +287,16 @@ class TestDifferences:
         both = pandas.concat([two_limits, two_limits.assign(manager="other")])
         texts = texts_of(draw_missions(missions_of(both), "differences"))
         assert any(text.endswith("other (n = 2)") for text in texts)
-        assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
+        assert any(
+            text.startswith("means of each run over all points of the sweep: mission:")
+            for text in texts
+        )
 
     def test_need_runs_with_the_same_random_numbers(self):
         with pytest.raises(InputError, match="share their random numbers"):
-            draw_missions(read_missions([find("seams2023_runs.csv", "scenarios/published")]), "differences")
+            draw_missions(
+                read_missions([find("seams2023_runs.csv", "scenarios/published")]), "differences"
+            )
 
 
 def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs_as_a_sweep_does():

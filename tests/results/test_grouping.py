@@ -1,4 +1,6 @@
-"""What is averaged before managers are compared: values over the same points and runs, and runs that share a draw."""
+"""What is averaged before managers are compared: values over the same points and runs, and runs
+that share a draw.
+"""
 
 import json
 from itertools import product
@@ -21,9 +23,15 @@ PUBLISHED = Path(__file__).parents[2] / "scenarios" / "published"
 
 
 def two_points(**changed: float) -> pandas.DataFrame:
-    """Missions of managers a and b at two points of a sweep, with equal reaction times: 2 s, and 6 s at the second."""
-    frame = pandas.DataFrame(product("ab", range(1, 41), [0.0, 1.0]), columns=["manager", "run", "start.y_m"])
-    frame = frame.assign(scenario="s", seed=1, search_time_s=100.0 + frame["run"], distance_inspected_m=50.0)
+    """Missions of managers a and b at two points of a sweep, with equal reaction times: 2 s, and 6
+    s at the second.
+    """
+    frame = pandas.DataFrame(
+        product("ab", range(1, 41), [0.0, 1.0]), columns=["manager", "run", "start.y_m"]
+    )
+    frame = frame.assign(
+        scenario="s", seed=1, search_time_s=100.0 + frame["run"], distance_inspected_m=50.0
+    )
     frame = frame.assign(pipeline_found=True, mean_reaction_time_s=2.0 + 4.0 * frame["start.y_m"])
     return frame.assign(**changed)
 
@@ -41,7 +49,9 @@ def test_a_sweep_averages_a_metric_only_of_runs_that_have_it_at_all_points():
     assert found.n == 20
     assert found.difference == 0.0
     assert [(each.n, each.missing) for each in rows(comparison.summaries)] == [(40, 0), (20, 20)]
-    assert any("b 20 of 40" in note and "without a mean reaction time" in note for note in comparison.notes)
+    assert any(
+        "b 20 of 40" in note and "without a mean reaction time" in note for note in comparison.notes
+    )
     assert rows(compare_frame(frame, metrics=["search_time_s"]).differences)[0].n == 40
 
 
@@ -83,7 +93,9 @@ def of_draws(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("has_run_numbers", [True, False])
-def test_real_missions_are_not_averaged_like_the_campaign_beside_them(of_draws, tmp_path, has_run_numbers):
+def test_real_missions_are_not_averaged_like_the_campaign_beside_them(
+    of_draws, tmp_path, has_run_numbers
+):
     real = pandas.read_csv(PUBLISHED / "seams2023_runs.csv").query("manager == 'none'")
     real = real if has_run_numbers else real.drop(columns="run")
     real.to_csv(tmp_path / "real.csv", index=False)
@@ -99,7 +111,9 @@ def test_further_metrics_are_not_what_was_swept(tmp_path):
     sweep = {"grid": {"battery.discharge_time_s": [150.0, 200.0]}}
     run_campaign("extended", ["none", "metacontrol"], 3, 1, out=tmp_path / "out", sweep=sweep)
     runs = pandas.read_csv(tmp_path / "out" / "runs.csv")
-    assert runs.groupby(["manager", "run"])["battery_level"].nunique().max() == 2  # it differs between the points
+    assert (
+        runs.groupby(["manager", "run"])["battery_level"].nunique().max() == 2
+    )  # it differs between the points
     for comparison in (compare_folders([tmp_path / "out"]), compare_frame(runs)):
         (note,) = (note for note in comparison.notes if "averaged over" in note)
         assert "averaged over battery.discharge_time_s:" in note
@@ -165,18 +179,25 @@ def test_the_interval_is_that_of_the_means_of_groups_of_one_size():
 
 def test_groups_of_equal_means_do_not_give_an_interval_without_width():
     interval = mean_of([120.0, 121.0, 121.0, 120.0], [0, 0, 1, 1]).interval
-    assert interval == pytest.approx(stats.t.interval(0.95, 3, 120.5, stats.sem([120.0, 121.0, 121.0, 120.0])))
+    assert interval == pytest.approx(
+        stats.t.interval(0.95, 3, 120.5, stats.sem([120.0, 121.0, 121.0, 120.0]))
+    )
 
 
 def test_the_summary_has_the_interval_of_the_draws(folder):
-    runs, summary = pandas.read_csv(folder / "runs.csv"), pandas.read_csv(folder / "summary.csv").set_index("manager")
+    runs, summary = (
+        pandas.read_csv(folder / "runs.csv"),
+        pandas.read_csv(folder / "summary.csv").set_index("manager"),
+    )
     means = means_of_draws(runs, "search_time_s")["none"]
     low, high = stats.t.interval(0.95, len(means) - 1, means.mean(), stats.sem(means))
     assert summary.loc["none", "search_time_s_ci95_low"] == pytest.approx(low, abs=1e-5)
     assert summary.loc["none", "search_time_s_ci95_high"] == pytest.approx(high, abs=1e-5)
     times_s = runs.loc[runs["manager"] == "none", "search_time_s"].tolist()
     naive = mean_of(times_s)
-    assert summary.loc["none", "search_time_s_std"] == pytest.approx(std_of(times_s).value, abs=1e-5)
+    assert summary.loc["none", "search_time_s_std"] == pytest.approx(
+        std_of(times_s).value, abs=1e-5
+    )
     assert high - low > 1.5 * (naive.high - naive.low)
 
 
@@ -193,7 +214,9 @@ def test_a_comparison_takes_the_draws_for_independent(folder):
 
 
 def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder, tmp_path):
-    run_campaign("seams2023", ["none"], 24, 1, out=tmp_path / "other", **(VARIED | {"runs_per_draw": 3}))
+    run_campaign(
+        "seams2023", ["none"], 24, 1, out=tmp_path / "other", **(VARIED | {"runs_per_draw": 3})
+    )
     comparison = compare_folders([folder, tmp_path / "other"], managers=["none"])
     found = rows(comparison.differences)[0]
     means = []
@@ -208,9 +231,17 @@ def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder, tmp_path
 
 def test_intervals_of_shares_of_draws_are_cut_off_at_all_and_none():
     found = [True] * 39 + [False]
-    cells = [(manager, run + 1, found[run] or manager == "a") for manager in "ab" for run in range(40)]
+    cells = [
+        (manager, run + 1, found[run] or manager == "a") for manager in "ab" for run in range(40)
+    ]
     frame = pandas.DataFrame(cells, columns=["manager", "run", "pipeline_found"])
-    frame = frame.assign(seed=1, scenario="s", search_time_s=100.0, distance_inspected_m=1.0, mean_reaction_time_s=1.0)
+    frame = frame.assign(
+        seed=1,
+        scenario="s",
+        search_time_s=100.0,
+        distance_inspected_m=1.0,
+        mean_reaction_time_s=1.0,
+    )
     frame.attrs["runs_sharing_draw"] = 4
     for unpaired in (False, True):
         (a, b) = rows(compare_frame(frame, metrics=["pipeline_found"], unpaired=unpaired).summaries)

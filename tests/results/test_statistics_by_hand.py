@@ -1,4 +1,6 @@
-"""Statistics against figures from papers, SciPy, and formulas evaluated here; and how often intervals hold."""
+"""Statistics against figures from papers, SciPy, and formulas evaluated here; and how often
+intervals hold.
+"""
 
 import math
 
@@ -32,9 +34,9 @@ def frame(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> pan
         for run, time_s in enumerate(times_s, 1)
         if not math.isnan(time_s)
     ]
-    return pandas.DataFrame(rows, columns=["manager", "seed", "run", "search_time_s", "pipeline_found"]).assign(
-        distance_inspected_m=1.0, scenario="s"
-    )
+    return pandas.DataFrame(
+        rows, columns=["manager", "seed", "run", "search_time_s", "pipeline_found"]
+    ).assign(distance_inspected_m=1.0, scenario="s")
 
 
 def compared(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> Comparison:
@@ -49,11 +51,15 @@ def test_two_shares_differ_as_in_newcombes_example():
 
 
 def test_paired_shares_differ_by_the_formula_of_bonett_and_price():
-    # D. G. Bonett, R. M. Price, Journal of Educational and Behavioral Statistics 37 (2012): one is added to each count
-    # of pairs that differ.
+    # D. G. Bonett, R. M. Price, Journal of Educational and Behavioral Statistics 37 (2012): one is
+    # added to each count of pairs that differ.
     n, only_first, only_second = 40, 9, 2
-    first = np.array([True] * only_first + [False] * only_second + [True] * (n - only_first - only_second))
-    second = np.array([False] * only_first + [True] * only_second + [True] * (n - only_first - only_second))
+    first = np.array(
+        [True] * only_first + [False] * only_second + [True] * (n - only_first - only_second)
+    )
+    second = np.array(
+        [False] * only_first + [True] * only_second + [True] * (n - only_first - only_second)
+    )
     p, q = (only_first + 1) / (n + 2), (only_second + 1) / (n + 2)
     half = stats.norm.ppf(0.975) * math.sqrt((p + q - (p - q) ** 2) / (n + 2))
     found = statistics.paired_share_difference(first, second)
@@ -64,14 +70,22 @@ def test_paired_shares_differ_by_the_formula_of_bonett_and_price():
 @pytest.mark.parametrize(
     ("times_s", "found", "horizon_s", "mean_s", "half"),
     [
-        ([40, 90, 90, 120, 150, 200, 210, 260, 300, 300], "yynynyynnn", 280, 198.1428571428571, (210, 40, math.inf)),
+        (
+            [40, 90, 90, 120, 150, 200, 210, 260, 300, 300],
+            "yynynyynnn",
+            280,
+            198.1428571428571,
+            (210, 40, math.inf),
+        ),
         ([20.9, 78, 128.5, 150, 150, 125, 79], "ynnnnyy", 150, 115.1, (math.inf, 20.9, math.inf)),
         ([150, 150, 150], "nnn", 150, 150.0, (math.inf, math.inf, math.inf)),
         ([146], "y", 146, 146.0, (146, 146, 146)),
     ],
 )
 def test_censored_search_times_are_those_of_lifelines(times_s, found, horizon_s, mean_s, half):
-    was_found = np.array([each == "y" for each in found])  # expected: lifelines 0.30, KaplanMeierFitter
+    was_found = np.array(
+        [each == "y" for each in found]
+    )  # expected: lifelines 0.30, KaplanMeierFitter
     restricted, estimated = statistics.search_times(np.array(times_s, float), was_found, horizon_s)
     assert restricted.value == pytest.approx(mean_s, rel=1e-12)
     assert (estimated.value, estimated.low, estimated.high) == half
@@ -89,17 +103,27 @@ def test_the_mean_to_the_limit_has_the_interval_of_a_sample_though_missions_end_
     times_s = np.array([100.0, 140.0, 180.0, 300.0, 300.0])
     found, _ = statistics.search_times(times_s, times_s < 300.0, 300.0)
     assert found.value == pytest.approx(times_s.mean())
-    assert found.interval == pytest.approx(stats.t.interval(0.95, 4, times_s.mean(), stats.sem(times_s)))
-    earlier, _ = statistics.search_times(times_s, times_s < 300.0, 310.0)  # two are censored before: no sample
+    assert found.interval == pytest.approx(
+        stats.t.interval(0.95, 4, times_s.mean(), stats.sem(times_s))
+    )
+    earlier, _ = statistics.search_times(
+        times_s, times_s < 300.0, 310.0
+    )  # two are censored before: no sample
     assert earlier.interval is None
 
 
 def test_the_effect_of_pairs_is_the_rank_biserial_correlation_of_those_that_differ():
-    # Ranks of the differences 3, -1, 2, 4: 3, 1, 2, 4; those in favour have 9 of 10, so r = (9 - 1) / 10.
+    # Ranks of the differences 3, -1, 2, 4: 3, 1, 2, 4; those in favour have 9 of 10, so r = (9 - 1)
+    # / 10.
     first, second = np.array([13.0, 9.0, 12.0, 14.0, 7.0]), np.array([10.0, 10.0, 10.0, 10.0, 7.0])
     assert statistics.signed_rank_test(first, second)["effect"] == pytest.approx(0.8)
-    first, second = np.array([7, 1, 9, 3, 5, 4]), np.array([6, 0, 10, 1, 8, 4])  # 1 - 6/7 is not quite 1/7
-    assert statistics.signed_rank_test(first / 7, second / 7) == statistics.signed_rank_test(first, second)
+    first, second = (
+        np.array([7, 1, 9, 3, 5, 4]),
+        np.array([6, 0, 10, 1, 8, 4]),
+    )  # 1 - 6/7 is not quite 1/7
+    assert statistics.signed_rank_test(first / 7, second / 7) == statistics.signed_rank_test(
+        first, second
+    )
 
 
 def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_differences():
@@ -116,7 +140,10 @@ def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_diff
 @pytest.mark.parametrize(
     ("b", "n"),
     [
-        ([math.nan, math.nan, math.nan, 105.0, 120.0, 90.0, 99.0], 4),  # one run in common, four values each
+        (
+            [math.nan, math.nan, math.nan, 105.0, 120.0, 90.0, 99.0],
+            4,
+        ),  # one run in common, four values each
         ([math.nan, math.nan, 104.0, 105.0], 2),
     ],
 )
@@ -140,7 +167,8 @@ def test_the_conclusion_names_the_largest_p_of_those_that_it_is_about():
     b = [each + 10.0 + 0.1 * place for place, each in enumerate(a)]
     c = [each + (8.0 if place > 1 else -3.0) + 0.1 * place for place, each in enumerate(a)]
     comparison = compared((1, 1, 1), a=a, b=b, c=c)
-    # By signed ranks b differs with p = 2 / 2**12, times 3 in Holm's correction, c with p = 10 / 2**12.
+    # By signed ranks b differs with p = 2 / 2**12, times 3 in Holm's correction, c with p = 10 /
+    # 2**12.
     ps = [each.p_holm for each in rows(comparison.differences)]
     assert ps == pytest.approx([6 / 2**12, 10 / 2**12, 6 / 2**12])
     assert comparison.conclusion.endswith("largest p = 0.002 after Holm's correction over 3 tests.")
@@ -159,7 +187,8 @@ def test_ranks_of_independent_missions_favour_the_first_where_it_is_greater_in_m
 
 
 def test_groups_of_different_sizes_have_the_interval_of_a_mean_over_clusters():
-    # W. G. Cochran, Sampling Techniques, 1977, chapter 9A: the variance of a ratio of cluster totals to sizes.
+    # W. G. Cochran, Sampling Techniques, 1977, chapter 9A: the variance of a ratio of cluster
+    # totals to sizes.
     groups = [[10.0, 12.0, 11.0], [20.0], [14.0, 17.0], [9.0, 8.0, 10.0, 9.0]]
     values = [each for group in groups for each in group]
     labels = [place for place, group in enumerate(groups) for _ in group]
@@ -173,8 +202,12 @@ MEAN_S = 0.9 * (0.6 * 90.0 + 0.4 * 180.0) + 0.1 * 300.0
 
 
 def search_times(chance: np.random.Generator, n: int, delay_s: float = 0.0) -> NDArray[np.float64]:
-    """Draw times with the shape of a campaign's: found early or late, and one in ten lost at the limit."""
-    times_s = np.where(chance.random(n) < 0.6, chance.normal(90.0, 20.0, n), chance.normal(180.0, 25.0, n))
+    """Draw times with the shape of a campaign's: found early or late, and one in ten lost at the
+    limit.
+    """
+    times_s = np.where(
+        chance.random(n) < 0.6, chance.normal(90.0, 20.0, n), chance.normal(180.0, 25.0, n)
+    )
     return np.where(chance.random(n) < 0.1, 300.0, times_s) + delay_s
 
 
@@ -221,7 +254,9 @@ def test_intervals_of_shares_in_pairs_cover_the_truth_and_are_shares(both, only_
     chance = np.random.default_rng(4)
     covered = 0
     for n in (2, 5, 20, 100) * 50:
-        kinds = chance.choice(4, n, p=[both, only_first, only_second, 1.0 - both - only_first - only_second])
+        kinds = chance.choice(
+            4, n, p=[both, only_first, only_second, 1.0 - both - only_first - only_second]
+        )
         found = paired_share_difference(kinds <= 1, (kinds == 0) | (kinds == 2))
         low, high = found.interval or (np.nan, np.nan)
         assert -1.0 <= low < high <= 1.0
@@ -264,18 +299,24 @@ class TestDistributions:
             terms = []
             for value in np.unique(pooled):
                 equal, own = np.sum(pooled == value), np.sum(each == value)
-                below, own_below = np.sum(pooled < value) + equal / 2, np.sum(each < value) + own / 2
+                below, own_below = (
+                    np.sum(pooled < value) + equal / 2,
+                    np.sum(each < value) + own / 2,
+                )
                 weight = below * (n - below) - n * equal / 4
                 terms.append(equal / n * (n * own_below - len(each) * below) ** 2 / weight)
             total += (n - 1) / n * sum(terms) / len(each)
         shift, _ = anderson_darling(first, second, rng(), permutations=9)
-        other = stats.anderson_ksamp([first, second], variant="midrank", method=stats.PermutationMethod(n_resamples=9))
+        other = stats.anderson_ksamp(
+            [first, second], variant="midrank", method=stats.PermutationMethod(n_resamples=9)
+        )
         assert shift == pytest.approx(other.statistic)
         assert (total > 1.0) == (shift > 0.0)  # 1 is its mean if both come from one distribution
 
     def test_the_permutation_p_of_equal_distributions_is_uniform(self):
         p = [
-            anderson_darling(normal(0, 1, 8, s).round(1), normal(0, 1, 30, s + 999), rng(s), 99)[1] for s in range(200)
+            anderson_darling(normal(0, 1, 8, s).round(1), normal(0, 1, 30, s + 999), rng(s), 99)[1]
+            for s in range(200)
         ]
         assert stats.kstest(p, "uniform").pvalue > 0.001
 
@@ -284,15 +325,23 @@ class TestManagers:
     def test_the_conclusion_has_scipys_p_and_says_which_is_greater(self):
         first, second = normal(100, 20, 20, 1), normal(140, 20, 20, 2)
         found = mann_whitney(first, second, "asymptotic")
-        for p, each in ((found["p_less"], "less"), (found["p_greater"], "greater"), (found["p"], "two-sided")):
-            assert p == pytest.approx(stats.mannwhitneyu(first, second, alternative=each, method="asymptotic").pvalue)
+        for p, each in (
+            (found["p_less"], "less"),
+            (found["p_greater"], "greater"),
+            (found["p"], "two-sided"),
+        ):
+            assert p == pytest.approx(
+                stats.mannwhitneyu(first, second, alternative=each, method="asymptotic").pvalue
+            )
         assert sign_of(found["p_less"], found["p_greater"]) == -1
         assert sign_of(found["p_greater"], found["p_less"]) == 1
         assert sign_of(0.05, 0.05) == 0
 
     def test_subsamples_agree_with_a_clear_conclusion_and_not_with_its_opposite(self):
         samples = normal(100, 20, 400, 1), normal(200, 20, 400, 2)
-        assert [agreement(sign, samples, (20, 20), rng(), subsamples=200) for sign in (1, 0, -1)] == [0.0, 0.0, 1.0]
+        assert [
+            agreement(sign, samples, (20, 20), rng(), subsamples=200) for sign in (1, 0, -1)
+        ] == [0.0, 0.0, 1.0]
 
     def test_equal_managers_are_told_apart_by_chance_in_one_of_twenty_each_way(self):
         samples = normal(100, 20, 4_000, 1), normal(100, 20, 4_000, 2)

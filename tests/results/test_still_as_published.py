@@ -1,7 +1,8 @@
 """A small guard: the shipped calibration still gives missions like the published ones.
 
-Sixty missions a manager, and 24 for the runs of 2025, with fixed seeds, against bounds that are wide for these numbers;
-`suave-des validate` with 2,000 missions is the real check, and docs/background/fidelity.md shows what it found.
+Sixty missions a manager, and 24 for the runs of 2025, with fixed seeds, against bounds that are
+wide for these numbers; `suave-des validate` with 2,000 missions is the real check, and
+docs/background/fidelity.md shows what it found.
 """
 
 import csv
@@ -55,7 +56,9 @@ def test_metacontrols_two_clusters_are_still_there(simulated):
     times = simulated[simulated["manager"] == "metacontrol"]["search_time_s"]
     assert times.between(65, 95).mean() > 0.25
     assert times.between(118, 135).mean() > 0.12
-    late = simulated[(simulated["manager"] == "metacontrol") & simulated["search_time_s"].between(120, 130)]
+    late = simulated[
+        (simulated["manager"] == "metacontrol") & simulated["search_time_s"].between(120, 130)
+    ]
     assert late["detection_x_m"].between(-19.5, -18.5).mean() > 0.6
 
 
@@ -81,12 +84,18 @@ PAPER = {
 
 def frame(**search_times_s: list[float]) -> pandas.DataFrame:
     """Missions with given search times, and the distance that is left at 0.25 m/s until 300 s."""
-    rows = [(manager, time_s, (300 - time_s) / 4) for manager, times_s in search_times_s.items() for time_s in times_s]
+    rows = [
+        (manager, time_s, (300 - time_s) / 4)
+        for manager, times_s in search_times_s.items()
+        for time_s in times_s
+    ]
     return pandas.DataFrame(rows, columns=["manager", "search_time_s", "distance_inspected_m"])
 
 
 def test_published_runs_give_the_figures_that_the_paper_prints():
-    figures = compare_with_paper(frame()).figures.set_index(["manager", "metric", "statistic"])["paper"]
+    figures = compare_with_paper(frame()).figures.set_index(["manager", "metric", "statistic"])[
+        "paper"
+    ]
     assert list(figures.index) == [(*cell, each) for cell in PAPER for each in ("mean", "std")]
     for cell, values in PAPER.items():
         for each, value in zip(("mean", "std"), values, strict=True):
@@ -98,19 +107,30 @@ def test_difference_is_ours_less_the_published_figure():
     assert comparison.figures["here"][0] == 200.0  # the paper's interval is 168.0 to 207.7
     rows = comparison.table("search_time_s").rows
     assert [row[:2] for row in rows[:2]] == [("none", "mean"), ("none", "std")]
-    assert [row[-2:] for row in rows] == [("+12.15", ""), ("+57.60", "*"), ("-130.15", "*"), *[("", "")] * 3]
+    assert [row[-2:] for row in rows] == [
+        ("+12.15", ""),
+        ("+57.60", "*"),
+        ("-130.15", "*"),
+        *[("", "")] * 3,
+    ]
 
 
 def test_managers_without_missions_do_not_count():
     comparison = compare_with_paper(frame(none=[140.0, 232.0], random=[], metacontrol=[]))
     remarks = list(comparison.remarks())
-    assert "Here: 2 missions of none, 0 missions of random, 0 missions of metacontrol." in remarks[0]
-    assert remarks[1].startswith("3 of 4 figures lie in the 95% intervals of the paper's; those marked * do not.")
+    assert (
+        "Here: 2 missions of none, 0 missions of random, 0 missions of metacontrol." in remarks[0]
+    )
+    assert remarks[1].startswith(
+        "3 of 4 figures lie in the 95% intervals of the paper's; those marked * do not."
+    )
     assert comparison.markdown().count("\\* |") == 1
     alike = list(compare_with_paper(frame(none=[150.0, 210.0])).remarks())
     assert alike[1] == "4 of 4 figures lie in the 95% intervals of the paper's."
     far = list(compare_with_paper(frame(none=[50.0, 352.0])).remarks())
-    assert far[1] == "1 of 4 figures lie in the 95% intervals of the paper's; those marked * do not."
+    assert (
+        far[1] == "1 of 4 figures lie in the 95% intervals of the paper's; those marked * do not."
+    )
 
 
 LIMIT_S = 300.0
@@ -119,11 +139,14 @@ LIMIT_S = 300.0
 def published_speeds_m_per_s(manager: str) -> list[float]:
     with (shipped_folder("scenarios/published") / "seams2023_runs.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["manager"] == manager]
-    pairs = [(float(row["distance_inspected_m"]), LIMIT_S - float(row["search_time_s"])) for row in rows]
+    pairs = [
+        (float(row["distance_inspected_m"]), LIMIT_S - float(row["search_time_s"])) for row in rows
+    ]
     return [distance_m / time_s for distance_m, time_s in pairs if distance_m > 10.0]
 
 
-# None keeps a failed thruster; the search goes on during some of metacontrol's inspections, and slows them down.
+# None keeps a failed thruster; the search goes on during some of metacontrol's inspections, and
+# slows them down.
 @pytest.mark.parametrize(("manager", "tolerance"), [("none", 0.15), ("metacontrol", 0.08)])
 def test_metres_inspected_for_each_second_after_the_detection(manager, tolerance):
     simulator = Simulator(load_scenario("seams2023"))
@@ -134,6 +157,12 @@ def test_metres_inspected_for_each_second_after_the_detection(manager, tolerance
         if each.distance_inspected_m > 10.0
     ]
     published = published_speeds_m_per_s(manager)
-    assert statistics.quantiles(speeds)[2] == pytest.approx(statistics.quantiles(published)[2], rel=tolerance)
-    slow, published_slow = (sum(speed < 0.26 for speed in each) / len(each) for each in (speeds, published))
-    assert manager == "none" or slow == pytest.approx(published_slow, abs=0.21)  # half the interval of 7 of 20
+    assert statistics.quantiles(speeds)[2] == pytest.approx(
+        statistics.quantiles(published)[2], rel=tolerance
+    )
+    slow, published_slow = (
+        sum(speed < 0.26 for speed in each) / len(each) for each in (speeds, published)
+    )
+    assert manager == "none" or slow == pytest.approx(
+        published_slow, abs=0.21
+    )  # half the interval of 7 of 20

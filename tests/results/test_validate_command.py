@@ -54,10 +54,14 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
 def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validate, tmp_path):
     options = ("--managers", "none,random")
     validate("seams2023", "--runs", "3", "--workers", "1", "--out", "simulated", *options)
-    assert validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options).returncode == 0
+    assert (
+        validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options).returncode == 0
+    )
     assert not (tmp_path / "recorded" / "runs.csv").exists()
     for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv"):
-        assert (tmp_path / "recorded" / name).read_bytes() == (tmp_path / "simulated" / name).read_bytes()
+        assert (tmp_path / "recorded" / name).read_bytes() == (
+            tmp_path / "simulated" / name
+        ).read_bytes()
 
 
 def test_the_published_runs_against_themselves_meet_every_target(validate):
@@ -68,7 +72,12 @@ def test_the_published_runs_against_themselves_meet_every_target(validate):
 
 
 def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
-    text = DATA.read_text(encoding="utf-8").replace("none,", "x,").replace("random,", "none,").replace("x,", "random,")
+    text = (
+        DATA.read_text(encoding="utf-8")
+        .replace("none,", "x,")
+        .replace("random,", "none,")
+        .replace("x,", "random,")
+    )
     (tmp_path / "swapped.csv").write_text(text, encoding="utf-8")
     ended = validate("--runs-file", "swapped.csv")
     assert ended.returncode == 0
@@ -82,7 +91,12 @@ def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tm
     assert "24 of 24 targets are met" in ended.stdout
     assert "found at" not in ended.stdout
     with_shares = validate(
-        "--data", "real.csv", "--runs-file", "real.csv", "--targets", str(DATA.with_suffix(".targets.yaml"))
+        "--data",
+        "real.csv",
+        "--runs-file",
+        "real.csv",
+        "--targets",
+        str(DATA.with_suffix(".targets.yaml")),
     )
     assert "28 of 28 targets are met" in with_shares.stdout
 
@@ -90,15 +104,27 @@ def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tm
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--data", "missing.csv"], "missing.csv: no such file (give a path, or one of the shipped files: planta"),
+        (
+            ["--data", "missing.csv"],
+            "missing.csv: no such file (give a path, or one of the shipped files: planta",
+        ),
         (["--data", "unknown.csv"], "there is no manager 'magic'"),
-        (["--data", "words.csv"], "words.csv: line 2: search_time_s: expected a finite number, at most 1e+12"),
+        (
+            ["--data", "words.csv"],
+            "words.csv: line 2: search_time_s: expected a finite number, at most 1e+12",
+        ),
         (["--managers", "nobody"], "has no mission of manager 'nobody'"),
         (["--runs", "0"], "runs: 0 "),
         (["--targets", "missing.yaml"], "missing.yaml: no such file"),
         (["--runs-file", "other.csv"], "other.csv: has no mission of manager 'none'"),
-        (["--runs-file", "scenario.csv"], "scenario.csv: line 3: has missions of several scenarios"),
-        (["--runs-file", "scenario.csv", "--reasoner", "pellet"], "--reasoner cannot be used with --runs-file"),
+        (
+            ["--runs-file", "scenario.csv"],
+            "scenario.csv: line 3: has missions of several scenarios",
+        ),
+        (
+            ["--runs-file", "scenario.csv", "--reasoner", "pellet"],
+            "--reasoner cannot be used with --runs-file",
+        ),
         (["--runs-file", str(DATA), "--out", "full"], "full: the output folder is not empty"),
         (["--runs", "1", "--out", "full"], "full: the output folder is not empty"),
     ],
@@ -132,19 +158,26 @@ sweep: {zip: {start.y_m: [2.5, 2.9], thruster_events.0.time_s: [35, 90]}}
 def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(validate, tmp_path):
     (tmp_path / "two.yaml").write_text(CAMPAIGN, encoding="utf-8")
     (tmp_path / "real.csv").write_text(
-        f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,251,0,False,2\n", encoding="utf-8"
+        f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,251,0,False,2\n",
+        encoding="utf-8",
     )
-    ended = validate("two.yaml", "--data", "real.csv", "--runs", "2", "--workers", "1", "--out", "out", "--quiet")
+    ended = validate(
+        "two.yaml", "--data", "real.csv", "--runs", "2", "--workers", "1", "--out", "out", "--quiet"
+    )
     assert ended.returncode == 0
     assert "Condition 2: start.y_m=2.9, thruster_events.0.time_s=90" in ended.stdout
     conditions = rows_of(tmp_path / "out" / "validation_conditions.csv")
-    assert [(row["metric"], row["condition"], row["real_n"], row["simulated_n"]) for row in conditions] == [
+    assert [
+        (row["metric"], row["condition"], row["real_n"], row["simulated_n"]) for row in conditions
+    ] == [
         ("search_time_s", "1", "2", "2"),
         ("search_time_s", "2", "1", "1"),
         ("distance_inspected_m", "1", "2", "2"),
         ("distance_inspected_m", "2", "1", "1"),
     ]
-    again = validate("two.yaml", "--data", "real.csv", "--runs-file", "out/runs.csv", "--out", "again")
+    again = validate(
+        "two.yaml", "--data", "real.csv", "--runs-file", "out/runs.csv", "--out", "again"
+    )
     assert again.returncode == 0
     same = "validation_conditions.csv"
     assert (tmp_path / "again" / same).read_bytes() == (tmp_path / "out" / same).read_bytes()
@@ -157,6 +190,9 @@ def test_several_files_are_compared_as_one_data_set(validate, tmp_path):
         own = [line for line in lines if line.startswith(f"{manager},")]
         (tmp_path / f"{manager}.csv").write_text("\n".join([header, *own]), encoding="utf-8")
         names += ["--data", f"{manager}.csv"]
-    assert "24 of 24 targets are met" in validate(*names, "--runs-file", str(DATA), "--out", "out").stdout
+    assert (
+        "24 of 24 targets are met"
+        in validate(*names, "--runs-file", str(DATA), "--out", "out").stdout
+    )
     data = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]["data"]
     assert [each["file"] for each in data] == ["none.csv", "random.csv", "metacontrol.csv"]

@@ -1,4 +1,6 @@
-"""A simulation that is like the published runs meets the targets; one that is not fails those that it should."""
+"""A simulation that is like the published runs meets the targets; one that is not fails those that
+it should.
+"""
 
 import json
 
@@ -32,12 +34,16 @@ def like_published(published):
 
 @pytest.fixture(scope="module")
 def good(published, like_published, few_resamples):
-    return validate(published, like_published, MANAGERS, shares=validated(read_yaml(TARGETS), Targets).shares)
+    return validate(
+        published, like_published, MANAGERS, shares=validated(read_yaml(TARGETS), Targets).shares
+    )
 
 
 def missed(validation):
     targets = validation.targets.to_dict("records")
-    return {(each["kind"], each["subject"], each["what"]) for each in targets if each["met"] is not True}
+    return {
+        (each["kind"], each["subject"], each["what"]) for each in targets if each["met"] is not True
+    }
 
 
 def test_a_simulation_with_the_published_distributions_meets_every_target(good):
@@ -77,15 +83,21 @@ def test_a_cluster_that_is_averaged_away_fails_its_share(published, like_publish
     smeared = like_published.copy()
     late = smeared["search_time_s"].between(120, 130) & (smeared["manager"] == "metacontrol")
     smeared.loc[late, "search_time_s"] += 12
-    found = missed(validate(published, smeared, MANAGERS, shares=validated(read_yaml(TARGETS), Targets).shares))
+    found = missed(
+        validate(published, smeared, MANAGERS, shares=validated(read_yaml(TARGETS), Targets).shares)
+    )
     assert ("share", "metacontrol", "found at 120 to 130 s") in found
 
 
-def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(published, like_published, good):
+def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(
+    published, like_published, good
+):
     shares = validated(read_yaml(TARGETS), Targets).shares
     assert validate(published, like_published, MANAGERS, shares=shares).texts({}) == good.texts({})
     alone = validate(published, like_published, ("none",))
-    pandas.testing.assert_frame_equal(alone.cells, good.cells.query("manager == 'none'").reset_index(drop=True))
+    pandas.testing.assert_frame_equal(
+        alone.cells, good.cells.query("manager == 'none'").reset_index(drop=True)
+    )
     assert alone.pairs.empty
     other = validate(published, like_published, ("none",), seed=2)
     assert ends(other.cells.loc[0], "std_ratio") != ends(alone.cells.loc[0], "std_ratio")
@@ -105,7 +117,9 @@ def test_what_cannot_be_judged_from_few_missions_is_not_met_and_says_so(publishe
     assert not found.all_met
 
 
-@pytest.mark.parametrize(("place", "met"), [("low", True), ("high", True), ("below", False), ("above", False)])
+@pytest.mark.parametrize(
+    ("place", "met"), [("low", True), ("high", True), ("below", False), ("above", False)]
+)
 def test_a_target_holds_at_its_limits(published, place, met):
     own = published[published["manager"] == "none"].assign(pipeline_found=1.0)
     low, high = ends(validate(own, own, ("none",)).cells.loc[0], "published_mean")
@@ -131,7 +145,11 @@ def test_predicted_means_are_told_in_published_standard_deviations(missions):
     fitted = {"none": missions({"none": [(120, 12, 0), (130, 14, 0)], "random": [(0, 0, 0)]})}
     table = split_check(fitted, published).set_index("metric")
     search = table.loc["search_time_s"]
-    assert (search["left_out"], search["published_mean"], search["predicted_mean"]) == ("none", 110, 125)
+    assert (search["left_out"], search["published_mean"], search["predicted_mean"]) == (
+        "none",
+        110,
+        125,
+    )
     assert search["difference"] == 15
     assert search["difference_in_std"] == pytest.approx(15 / np.std([100, 120], ddof=1))
     assert not search["within"]

@@ -1,4 +1,6 @@
-"""Real missions of known conditions are compared with simulated ones of their own, and counted in regions."""
+"""Real missions of known conditions are compared with simulated ones of their own, and counted in
+regions.
+"""
 
 import math
 
@@ -10,7 +12,13 @@ from suave_des.errors import InputError
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.results.real import Share, Targets, conditions_of, count, numbered, read_real
-from suave_des.results.validation import balanced, compare_conditions, compare_shares, over_conditions, validate
+from suave_des.results.validation import (
+    balanced,
+    compare_conditions,
+    compare_shares,
+    over_conditions,
+    validate,
+)
 from suave_des.scenario.yamlfile import read_yaml, validated
 
 OWN = "manager,search_time_s,distance_inspected_m"
@@ -23,9 +31,15 @@ def frame(**columns: list) -> pandas.DataFrame:
 
 
 def missions(manager: str, by_condition: dict[int, list[float]]) -> pandas.DataFrame:
-    rows = [(manager, value, 1.0, number) for number, values in by_condition.items() for value in values]
-    made = pandas.DataFrame(rows, columns=["manager", "search_time_s", "distance_inspected_m", "condition"])
-    return made.assign(detection_x_m=float("nan"), pipeline_found=True, mean_reaction_time_s=float("nan"))
+    rows = [
+        (manager, value, 1.0, number) for number, values in by_condition.items() for value in values
+    ]
+    made = pandas.DataFrame(
+        rows, columns=["manager", "search_time_s", "distance_inspected_m", "condition"]
+    )
+    return made.assign(
+        detection_x_m=float("nan"), pipeline_found=True, mean_reaction_time_s=float("nan")
+    )
 
 
 def test_a_mission_is_of_the_condition_whose_rounded_values_its_columns_have():
@@ -57,13 +71,28 @@ def test_a_mission_of_no_condition_or_of_several_is_named(columns, problem, row)
 
 def test_in_order_each_manager_has_as_many_missions_of_each_condition():
     managers = pandas.Series(["none"] * 3 + ["bt"] * 6)
-    assert numbered(managers.to_frame("manager"), CONDITIONS)["condition"].tolist() == [1, 2, 3, 1, 1, 2, 2, 3, 3]
-    with pytest.raises(InputError, match="5 missions of manager bt, which 3 conditions do not share evenly"):
+    assert numbered(managers.to_frame("manager"), CONDITIONS)["condition"].tolist() == [
+        1,
+        2,
+        3,
+        1,
+        1,
+        2,
+        2,
+        3,
+        3,
+    ]
+    with pytest.raises(
+        InputError, match="5 missions of manager bt, which 3 conditions do not share evenly"
+    ):
         numbered(managers[:-1].to_frame("manager"), CONDITIONS)
 
 
 def test_files_of_several_managers_are_one_data_set(write):
-    paths = [write(f"{name}.csv", f"{OWN},block\n{name},20,1,1\n{name},30,1,3\n") for name in ("bt", "none")]
+    paths = [
+        write(f"{name}.csv", f"{OWN},block\n{name},20,1,1\n{name},30,1,3\n")
+        for name in ("bt", "none")
+    ]
     real = read_real(paths, CONDITIONS)
     assert list(real.managers) == ["bt", "none"]
     assert real.frame["condition"].tolist() == [1, 3, 1, 3]
@@ -81,9 +110,21 @@ def test_missions_without_a_condition_are_taken_in_order_and_that_is_said(write)
     ("first", "second", "told"),
     [
         (f"{OWN}\nbt,20,1\n", f"{OWN}\nbt,20,1\n", "b.csv: has the same content as .*a.csv"),
-        (f"{OWN},block\nbt,20,1,1\n", f"{OWN}\nnone,20,1\n", "b.csv: line 2: block: there is no condition nan"),
-        (f"{OWN}\nbt,20,1\n", f"{OWN}\nnone,20,1\n", "has 1 mission of manager bt, which 3 conditions do not share"),
-        (f"{OWN},block\nbt,20,1,1\n", f"{OWN},block\n\nnone,20,1,7\n", "b.csv: line 3: block: there is no condition 7"),
+        (
+            f"{OWN},block\nbt,20,1,1\n",
+            f"{OWN}\nnone,20,1\n",
+            "b.csv: line 2: block: there is no condition nan",
+        ),
+        (
+            f"{OWN}\nbt,20,1\n",
+            f"{OWN}\nnone,20,1\n",
+            "has 1 mission of manager bt, which 3 conditions do not share",
+        ),
+        (
+            f"{OWN},block\nbt,20,1,1\n",
+            f"{OWN},block\n\nnone,20,1,7\n",
+            "b.csv: line 3: block: there is no condition 7",
+        ),
     ],
 )
 def test_data_whose_conditions_cannot_be_told_are_refused(write, first, second, told):
@@ -98,22 +139,34 @@ def test_simulated_missions_are_taken_in_the_real_ones_proportions():
 
 
 def test_what_differs_between_conditions_is_not_taken_for_chance():
-    real, simulated = missions("bt", {1: [50, 52, 54], 2: [120, 121, 122]}), missions("bt", {1: [55], 2: [119]})
+    real, simulated = (
+        missions("bt", {1: [50, 52, 54], 2: [120, 121, 122]}),
+        missions("bt", {1: [55], 2: [119]}),
+    )
     compared = compare_conditions(real, simulated, ["bt"], ["search_time_s"])
     told = compared[["condition", "real_median", "difference_of_medians"]].to_numpy().tolist()
     assert told == [[1, 52, 3], [2, 121, -2]]
-    assert over_conditions(compared)[["manager", "difference"]].to_numpy().tolist() == [["bt", 2.5], ["all", 2.5]]
+    assert over_conditions(compared)[["manager", "difference"]].to_numpy().tolist() == [
+        ["bt", 2.5],
+        ["all", 2.5],
+    ]
 
 
 def test_spread_within_conditions_is_compared_where_both_sides_have_some():
-    real, simulated = missions("bt", {1: [50, 52], 2: [120]}), missions("bt", {1: [50, 54], 2: [119, 130]})
+    real, simulated = (
+        missions("bt", {1: [50, 52], 2: [120]}),
+        missions("bt", {1: [50, 54], 2: [119, 130]}),
+    )
     found = over_conditions(compare_conditions(real, simulated, ["bt"], ["search_time_s"]))
     assert found["std_ratio"].tolist() == pytest.approx([2.0, 2.0])
 
 
 @pytest.mark.parametrize(("limit", "met"), [(2.5, True), (2.4, False)])
 def test_a_file_of_targets_may_limit_differences_within_conditions(write, limit, met):
-    path = write("real.targets.yaml", f"conditions: {{search_time_s: {{median_difference: {limit}, std_ratio: 2}}}}\n")
+    path = write(
+        "real.targets.yaml",
+        f"conditions: {{search_time_s: {{median_difference: {limit}, std_ratio: 2}}}}\n",
+    )
     real = missions("bt", {1: [50, 52, 54], 2: [120, 121, 122]})
     simulated = missions("bt", {1: [55, 55, 55], 2: [119, 119, 119]})
     found = validate(real, simulated, ["bt"], limits=validated(read_yaml(path), Targets).conditions)
@@ -124,8 +177,12 @@ def test_a_file_of_targets_may_limit_differences_within_conditions(write, limit,
 
 
 def test_missions_that_never_found_the_pipeline_do_not_differ_by_the_number_written_for_them():
-    real = missions("bt", {1: [50.0, 60.0, 251.0] * 30}).assign(pipeline_found=[True, True, False] * 30)
-    simulated = missions("bt", {1: [50.0, 60.0, 250.0] * 30}).assign(pipeline_found=[True, True, False] * 30)
+    real = missions("bt", {1: [50.0, 60.0, 251.0] * 30}).assign(
+        pipeline_found=[True, True, False] * 30
+    )
+    simulated = missions("bt", {1: [50.0, 60.0, 250.0] * 30}).assign(
+        pipeline_found=[True, True, False] * 30
+    )
     found = validate(real, simulated, ["bt"])
     assert found.not_found_s == 250.0
     assert found.cells.loc[0, "ks_p"] == 1.0
@@ -140,11 +197,17 @@ def test_a_find_after_the_limit_still_counts_as_sooner_than_none():
 def test_the_share_that_found_the_pipeline_is_compared():
     real = missions("bt", {1: [50.0] * 4}).assign(pipeline_found=[True, True, True, False])
     (share,) = validate(real, real.assign(pipeline_found=True), ["bt"]).shares.to_dict("records")
-    assert (share["name"], share["published_share"], share["simulated_share"]) == ("pipeline found", 0.75, 1.0)
+    assert (share["name"], share["published_share"], share["simulated_share"]) == (
+        "pipeline found",
+        0.75,
+        1.0,
+    )
 
 
 def test_reaction_times_are_compared_of_the_missions_that_have_one():
-    real = missions("bt", {1: [50.0] * 4}).assign(mean_reaction_time_s=[1.0, 2.0, 3.0, float("nan")])
+    real = missions("bt", {1: [50.0] * 4}).assign(
+        mean_reaction_time_s=[1.0, 2.0, 3.0, float("nan")]
+    )
     found = validate(real, real, ["bt"])
     reaction = found.cells.set_index("metric").loc["mean_reaction_time_s"]
     assert reaction[["published_n", "published_mean"]].tolist() == [3, 2.0]
@@ -162,7 +225,13 @@ UNKNOWN = math.nan
 def few(missions):
     return missions(
         {
-            "metacontrol": [(120, 50, -19.0), (125, 50, -18.5), (130, 50, -17.0), (75, 60, -16.0), (126, 50, UNKNOWN)],
+            "metacontrol": [
+                (120, 50, -19.0),
+                (125, 50, -18.5),
+                (130, 50, -17.0),
+                (75, 60, -16.0),
+                (126, 50, UNKNOWN),
+            ],
             "none": [(125, 50, -19.0)],
         }
     )
@@ -177,7 +246,10 @@ LATE, THERE = {"search_time_s": [(120, 130)]}, {"detection_x_m": [(-19.5, -18.5)
         ({"where": LATE}, (4, 5)),  # both ends count
         ({"where": LATE | THERE}, (2, 5)),  # an unknown place is in no region, but a run
         ({"of": "detections", "among": LATE, "where": THERE}, (2, 3)),
-        ({"where": {"detection_x_m": [(-19.5, -18.9), (-16.1, -15.9)]}}, (2, 5)),  # one of several intervals
+        (
+            {"where": {"detection_x_m": [(-19.5, -18.9), (-16.1, -15.9)]}},
+            (2, 5),
+        ),  # one of several intervals
     ],
 )
 def test_missions_are_counted_in_regions(share, counted, few):
@@ -190,10 +262,17 @@ def test_places_that_come_from_sums_of_steps_are_at_the_interval_end(missions):
 
 
 def test_no_mission_has_no_share(missions):
-    share = Share(manager="none", name="any", among={"search_time_s": [(0, 1)]}, where={"search_time_s": [(0, 1)]})
+    share = Share(
+        manager="none",
+        name="any",
+        among={"search_time_s": [(0, 1)]},
+        where={"search_time_s": [(0, 1)]},
+    )
     few = missions({"none": [(5, 1, 1)]})
     assert count(share, few) == (0, 0)
-    (row,) = compare_shares([share], few.assign(pipeline_found=math.nan), few, ["none"]).to_dict("records")
+    (row,) = compare_shares([share], few.assign(pipeline_found=math.nan), few, ["none"]).to_dict(
+        "records"
+    )
     assert row["published_share"] is None
 
 
@@ -220,12 +299,32 @@ ENTRY = "shares:\n  - manager: none\n    name: early\n    where: {where}\n"
         ("shares:\n  - manager: none\n    name: early\n", "line 2, shares[0].where", "is missing"),
         (ENTRY.format(where="{}"), "line 4, shares[0].where", ""),
         (ENTRY.format(where="{search_time_s: []}"), "line 4, shares[0].where.search_time_s", ""),
-        (ENTRY.format(where="{search_time_s: [[9, 3]]}"), "line 4, shares[0].where.search_time_s[0]", "above the end"),
-        (ENTRY.format(where="{search_time_s: [[3]]}"), "line 4, shares[0].where.search_time_s[0]", ""),
-        (ENTRY.format(where="{search_time_s: [[3, soon]]}"), "line 4, shares[0].where.search_time_s[0]", ""),
+        (
+            ENTRY.format(where="{search_time_s: [[9, 3]]}"),
+            "line 4, shares[0].where.search_time_s[0]",
+            "above the end",
+        ),
+        (
+            ENTRY.format(where="{search_time_s: [[3]]}"),
+            "line 4, shares[0].where.search_time_s[0]",
+            "",
+        ),
+        (
+            ENTRY.format(where="{search_time_s: [[3, soon]]}"),
+            "line 4, shares[0].where.search_time_s[0]",
+            "",
+        ),
         (ENTRY.format(where="{speed: [[3, 4]]}"), "line 4, shares[0].where", ""),
-        (ENTRY.format(where="{search_time_s: [[3, 4]]}") + "    target: [0.2, 1.2]\n", "line 5", "between 0 and 1"),
-        (ENTRY.format(where="{search_time_s: [[3, 4]]}") + "    of: missions\n", "line 5", "not allowed"),
+        (
+            ENTRY.format(where="{search_time_s: [[3, 4]]}") + "    target: [0.2, 1.2]\n",
+            "line 5",
+            "between 0 and 1",
+        ),
+        (
+            ENTRY.format(where="{search_time_s: [[3, 4]]}") + "    of: missions\n",
+            "line 5",
+            "not allowed",
+        ),
     ],
 )
 def test_a_wrong_file_of_shares_is_named_with_its_line(write, content, place, problem):

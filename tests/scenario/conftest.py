@@ -10,7 +10,9 @@ Write = Callable[..., Path]
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
-    """Writes a file in a fresh current folder and returns its path, relative as a user would give it."""
+    """Writes a file in a fresh current folder and returns its path, relative as a user would give
+    it.
+    """
     monkeypatch.chdir(tmp_path)
 
     def write_file(name: str, content: str | bytes) -> Path:

@@ -1,4 +1,6 @@
-"""Ways in which a scenario can be wrong: one line with file, line, key path, what is wrong, what would be right."""
+"""Ways in which a scenario can be wrong: one line with file, line, key path, what is wrong, what
+would be right.
+"""
 
 import shutil
 
@@ -32,27 +34,71 @@ def refused(write, content: str, **options: object) -> InputError:
     [
         # keys
         (HEAD + "misson: {}\n", "line 2, misson", "unknown key 'misson' (did you mean 'mission'?"),
-        (VISIBILITY + "{perod_s: 3}\n", "line 3, signals.water_visibility.perod_s", "did you mean 'period_s'?"),
-        (WHOLE + "{kind: sinusoid, minimum: 1, maximum: 2}\n", "line 3, signals.water_visibility.period_s", "missing"),
+        (
+            VISIBILITY + "{perod_s: 3}\n",
+            "line 3, signals.water_visibility.perod_s",
+            "did you mean 'period_s'?",
+        ),
+        (
+            WHOLE + "{kind: sinusoid, minimum: 1, maximum: 2}\n",
+            "line 3, signals.water_visibility.period_s",
+            "missing",
+        ),
         (HEAD + "start: {x: 1}\nfoo: 1\nbar: 2\n", "line 2, start.x", "and 2 more"),
         ("signals: {}\n", "line 1, signals", "no signal named water_visibility"),
-        (WHOLE + "{kind: constant, value: 2}\n  my sea: {kind: constant, value: 1}\n", "line 4, ", "'my sea' is not a"),
+        (
+            WHOLE + "{kind: constant, value: 2}\n  my sea: {kind: constant, value: 1}\n",
+            "line 4, ",
+            "'my sea' is not a",
+        ),
         # numbers
         (HEAD + "start: {x_m: .inf}\n", "line 2, start.x_m", ".inf should be a finite number"),
-        (VISIBILITY + "{period_s: '80'}\n", "line 3, signals.water_visibility.period_s", "'80' should be a number"),
+        (
+            VISIBILITY + "{period_s: '80'}\n",
+            "line 3, signals.water_visibility.period_s",
+            "'80' should be a number",
+        ),
         (VISIBILITY + "{period_s: 0}\n", "line 3, ", "0 should be greater than or equal to 0.001"),
-        (HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n", "line 2, ", ".inf should be a finite number"),
+        (
+            HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n",
+            "line 2, ",
+            ".inf should be a finite number",
+        ),
         # relations
-        (VISIBILITY + "{minimum: 9}\n", "line 3, signals.water_visibility.minimum", "minimum 9 is above maximum 3.75"),
-        (HEAD + "battery: {}\nsignals: {battery_level: {kind: constant, value: 1}}\n", "line 2, battery", "remove one"),
-        (HEAD + "reaction_metric: {visibility_thresholds_m: [1, 2, 3]}\n", "line 2, ", "is not in falling order"),
+        (
+            VISIBILITY + "{minimum: 9}\n",
+            "line 3, signals.water_visibility.minimum",
+            "minimum 9 is above maximum 3.75",
+        ),
+        (
+            HEAD + "battery: {}\nsignals: {battery_level: {kind: constant, value: 1}}\n",
+            "line 2, battery",
+            "remove one",
+        ),
+        (
+            HEAD + "reaction_metric: {visibility_thresholds_m: [1, 2, 3]}\n",
+            "line 2, ",
+            "is not in falling order",
+        ),
         (HEAD + "managers: {bt: {search_modes: [fd_spiral_low]}}\n", "line 2, ", "search_modes 1"),
         # kinds of signals
-        (VISIBILITY + "{before: 2}\n", "line 3, signals.water_visibility.before", "(known: dropout_probability"),
-        (VISIBILITY + "{kind: sinus}\n", "line 3, signals.water_visibility.kind", "did you mean 'sinusoid'?"),
+        (
+            VISIBILITY + "{before: 2}\n",
+            "line 3, signals.water_visibility.before",
+            "(known: dropout_probability",
+        ),
+        (
+            VISIBILITY + "{kind: sinus}\n",
+            "line 3, signals.water_visibility.kind",
+            "did you mean 'sinusoid'?",
+        ),
         (WHOLE + "{period_s: 80}\n", "line 3, signals.water_visibility", "kind is missing"),
         # distributions
-        (HEAD + "start: {x_m: {distribution: gauss}}\n", "line 2, start.x_m.distribution", "is no distribution that"),
+        (
+            HEAD + "start: {x_m: {distribution: gauss}}\n",
+            "line 2, start.x_m.distribution",
+            "is no distribution that",
+        ),
         (
             HEAD + "start:\n  x_m:\n    distribution: uniform\n    minimum: 3\n    maximum: 1\n",
             "line 5, start.x_m.minimum",
@@ -60,26 +106,58 @@ def refused(write, content: str, **options: object) -> InputError:
         ),
         (NORMAL + "std: 1, minimum: 9}}\n", "line 2, start.x_m.minimum", "leaves next to nothing"),
         (NORMAL + "std: 1e6}}\n", "line 2, start.x_m.std", "must be at most 20000"),
-        (HEAD + "start: {heading_rad: 90}\n", "line 2, start.heading_rad", "at least -6.3 and at most 6.3"),
+        (
+            HEAD + "start: {heading_rad: 90}\n",
+            "line 2, start.heading_rad",
+            "at least -6.3 and at most 6.3",
+        ),
         (
             HEAD + "latencies: {inference_s: {distribution: normal, mean: 1, std: 1}}\n",
             "line 2, latencies.inference_s",
             "values below 0 can be drawn",
         ),
         # thruster events, both spellings
-        (EVENTS + "{thruster: 7, event: failure, time_s: 3}\n", "line 3, thruster_events[0].thruster", "equal to 6"),
+        (
+            EVENTS + "{thruster: 7, event: failure, time_s: 3}\n",
+            "line 3, thruster_events[0].thruster",
+            "equal to 6",
+        ),
         (EVENTS + "(1,failed,35)\n", "line 3, thruster_events[0].event", "did you mean 'failure'?"),
-        (EVENTS + "(1,failure,35)\n  - (9,failure,35)\n", "line 4, thruster_events[1].thruster", "9 should be"),
+        (
+            EVENTS + "(1,failure,35)\n  - (9,failure,35)\n",
+            "line 4, thruster_events[1].thruster",
+            "9 should be",
+        ),
         # other parts
         (HEAD + "mission:\n", "line 2, mission", "nothing should be a mapping"),
-        (HEAD + "pipeline: {vertices_m: [[1, 2], [3, 4, 5]]}\n", "line 2, pipeline.vertices_m[0][2]", "is missing"),
-        (HEAD + "managers: {'mine:Manager': {starts_s: .inf}}\n", "line 2, managers.mine:Manager", "finite number"),
-        (HEAD + "knowledge: {ontologies: suave.owl}\n", "line 2, knowledge.ontologies", "'suave.owl' should be a list"),
-        (HEAD + "knowledge:\n  reasoner: pelet\n", "line 3, knowledge.reasoner", "did you mean 'pellet'? allowed"),
+        (
+            HEAD + "pipeline: {vertices_m: [[1, 2], [3, 4, 5]]}\n",
+            "line 2, pipeline.vertices_m[0][2]",
+            "is missing",
+        ),
+        (
+            HEAD + "managers: {'mine:Manager': {starts_s: .inf}}\n",
+            "line 2, managers.mine:Manager",
+            "finite number",
+        ),
+        (
+            HEAD + "knowledge: {ontologies: suave.owl}\n",
+            "line 2, knowledge.ontologies",
+            "'suave.owl' should be a list",
+        ),
+        (
+            HEAD + "knowledge:\n  reasoner: pelet\n",
+            "line 3, knowledge.reasoner",
+            "did you mean 'pellet'? allowed",
+        ),
         # revisions and vehicles
         (HEAD + "revision: 2024\n", "line 2, revision", "no such file: '2024'"),
         ("revision: {follow: {acceptance_m: 1}}\n", "line 1, revision.name", "is missing"),
-        (HEAD + "revision: {follow: {acceptance: 1}}\n", "line 2, revision.follow.acceptance", "mean 'acceptance_m'?"),
+        (
+            HEAD + "revision: {follow: {acceptance: 1}}\n",
+            "line 2, revision.follow.acceptance",
+            "mean 'acceptance_m'?",
+        ),
         # other files
         ("base: nowhere.yaml\n", "line 1, base", "no such file: 'nowhere.yaml'"),
         ("base: mine.yaml\n", "line 1, base", "mine.yaml -> mine.yaml"),
@@ -88,16 +166,28 @@ def refused(write, content: str, **options: object) -> InputError:
             "line 2, knowledge.ontologies[0]",
             "did you mean 'suave.owl'?",
         ),
-        (VISIBILITY + "{kind: table, file: t.csv}\n", "line 3, signals.water_visibility.file", "no such file: 't.csv'"),
+        (
+            VISIBILITY + "{kind: table, file: t.csv}\n",
+            "line 3, signals.water_visibility.file",
+            "no such file: 't.csv'",
+        ),
         # modes
         (
             HEAD + "default_modes: {f_generate_search_path: fd_spiral_lo}\n",
             "line 2, default_modes.",
             "'fd_spiral_low'?",
         ),
-        (HEAD + "default_modes: {f_search: fd_spiral_low}\n", "line 2, default_modes.f_search", "function 'f_search'"),
+        (
+            HEAD + "default_modes: {f_search: fd_spiral_low}\n",
+            "line 2, default_modes.f_search",
+            "function 'f_search'",
+        ),
         # YAML
-        (HEAD + "description: !!python/object/apply:os.system [ls]\n", "line 2, description", "the tag"),
+        (
+            HEAD + "description: !!python/object/apply:os.system [ls]\n",
+            "line 2, description",
+            "the tag",
+        ),
     ],
 )
 def test_a_wrong_scenario_is_refused_with_file_place_and_words(write, content, place, words):
@@ -156,7 +246,10 @@ def test_a_wrong_revision_file_is_reported_there(write):
 
 def test_a_thruster_that_pushes_with_more_than_its_thrust_is_refused_with_its_line(write):
     thruster = "  - {position_m: [0, 0, 0], direction: [1, 0, 0]}\n"
-    write("own.yaml", "base: bluerov2\nthrusters:\n" + 5 * thruster + thruster.replace("[1, 0", "[1, 1"))
+    write(
+        "own.yaml",
+        "base: bluerov2\nthrusters:\n" + 5 * thruster + thruster.replace("[1, 0", "[1, 1"),
+    )
     error = refused(write, HEAD + "vehicle: own.yaml\n")
     assert (error.file, error.place) == ("own.yaml", "line 8, vehicle.thrusters[5].direction")
     assert "length 1.414" in error.problem
@@ -176,10 +269,15 @@ def test_bases_in_a_circle_are_refused_with_the_circle(write):
     ("lost", "problem"),
     [
         ("f_follow_pipeline:", "there is no function 'f_follow_pipeline'"),
-        ("      fd_unground:\n        f_follow_pipeline_node: inactive\n", "f_follow_pipeline has no mode fd_unground"),
+        (
+            "      fd_unground:\n        f_follow_pipeline_node: inactive\n",
+            "f_follow_pipeline has no mode fd_unground",
+        ),
     ],
 )
-def test_a_modes_file_without_what_the_mission_needs_is_refused(write, shipped_modes, lost, problem):
+def test_a_modes_file_without_what_the_mission_needs_is_refused(
+    write, shipped_modes, lost, problem
+):
     assert lost in shipped_modes
     write("m.yaml", shipped_modes.replace(lost, "" if lost.startswith(" ") else "f_other:"))
     error = refused(write, HEAD, modes_file="m.yaml")
@@ -189,7 +287,9 @@ def test_a_modes_file_without_what_the_mission_needs_is_refused(write, shipped_m
 
 def test_a_scenario_that_does_not_exist_is_refused_with_the_shipped_ones(write):
     write("unused", "")
-    with pytest.raises(InputError, match=r"^seams: no such file \(did you mean 'seams2023'\? .*, seams2023\)$"):
+    with pytest.raises(
+        InputError, match=r"^seams: no such file \(did you mean 'seams2023'\? .*, seams2023\)$"
+    ):
         load_scenario("seams")
 
 
@@ -216,7 +316,13 @@ def test_the_reasoners_of_scenarios_are_those_that_there_are():
 
 
 def _places(data: object, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
-    inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    inner = (
+        data.items()
+        if isinstance(data, dict)
+        else enumerate(data)
+        if isinstance(data, list)
+        else ()
+    )
     return [path, *(place for key, value in inner for place in _places(value, (*path, key)))]
 
 
@@ -257,7 +363,9 @@ def test_whatever_stands_anywhere_is_loaded_or_refused_in_one_line(tmp_path_fact
     )
     (folder / "seams2023.yaml").write_text(scenario, encoding="utf-8")
     path = folder / data.draw(
-        st.sampled_from(["seams2023.yaml", "suave_modes.yaml", "own_revision.yaml", "bluerov2.yaml"])
+        st.sampled_from(
+            ["seams2023.yaml", "suave_modes.yaml", "own_revision.yaml", "bluerov2.yaml"]
+        )
     )
     content = read_yaml(path).data
     place = data.draw(st.sampled_from(_places(content)[1:]))

@@ -22,11 +22,16 @@ NUMBERS = st.floats(-1e6, 1e6)
         {"distribution": st.just("normal"), "mean": NUMBERS, "std": st.floats(0, 1e3)},
         optional={"minimum": NUMBERS, "maximum": NUMBERS},
     )
-    | st.fixed_dictionaries({"distribution": st.just("uniform"), "minimum": NUMBERS, "maximum": NUMBERS})
     | st.fixed_dictionaries(
-        {"distribution": st.just("exponential"), "mean": st.floats(0, 1e3)}, optional={"minimum": NUMBERS}
+        {"distribution": st.just("uniform"), "minimum": NUMBERS, "maximum": NUMBERS}
     )
-    | st.fixed_dictionaries({"distribution": st.just("choice"), "values": st.lists(NUMBERS, min_size=1)}),
+    | st.fixed_dictionaries(
+        {"distribution": st.just("exponential"), "mean": st.floats(0, 1e3)},
+        optional={"minimum": NUMBERS},
+    )
+    | st.fixed_dictionaries(
+        {"distribution": st.just("choice"), "values": st.lists(NUMBERS, min_size=1)}
+    ),
     seed=st.integers(0, 2**32),
 )
 def test_draws_repeat_and_stay_within_the_bounds(raw, seed):
@@ -63,8 +68,14 @@ def drawn_in_run(run: int, values: dict) -> dict[str, float]:
 def test_keys_of_a_shared_draw_are_shifted_alike_and_others_are_not():
     def events(**more):
         uniform = {"distribution": "uniform", **more}
-        first, second = {**uniform, "minimum": 30, "maximum": 50}, {**uniform, "minimum": 55, "maximum": 75}
-        times = [{"thruster": n + 1, "event": "failure", "time_s": time} for n, time in enumerate((first, second))]
+        first, second = (
+            {**uniform, "minimum": 30, "maximum": 50},
+            {**uniform, "minimum": 55, "maximum": 75},
+        )
+        times = [
+            {"thruster": n + 1, "event": "failure", "time_s": time}
+            for n, time in enumerate((first, second))
+        ]
         return {"thruster_events": times}
 
     for run in range(1, 6):
@@ -83,4 +94,7 @@ def test_an_event_that_is_drawn_before_the_start_is_at_the_start():
         times.append(drawn_in_run(run, values)["thruster_events.0.time_s"])
     assert min(times) == 0 and max(times) > 0
     with pytest.raises(InputError, match="only values below 0 can be drawn"):
-        drawn_in_run(1, {"thruster_events.0.time_s": {"distribution": "uniform", "minimum": -9, "maximum": -1}})
+        drawn_in_run(
+            1,
+            {"thruster_events.0.time_s": {"distribution": "uniform", "minimum": -9, "maximum": -1}},
+        )

@@ -1,4 +1,6 @@
-"""The exemplar's files that are written import again to the same, and what they cannot express is named."""
+"""The exemplar's files that are written import again to the same, and what they cannot express is
+named.
+"""
 
 from pathlib import Path
 
@@ -9,7 +11,13 @@ from hypothesis import strategies as st
 
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import MISSION_FILE, REVISIONS, RUNNER_FILE, export_config, import_config
+from suave_des.scenario.exemplar import (
+    MISSION_FILE,
+    REVISIONS,
+    RUNNER_FILE,
+    export_config,
+    import_config,
+)
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.yamlfile import parse_yaml
 
@@ -21,7 +29,9 @@ def number(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 def blank(revision: str) -> LoadedScenario:
-    """What an import of empty files of a revision gives: all that the exemplar can express is at its defaults."""
+    """What an import of empty files of a revision gives: all that the exemplar can express is at
+    its defaults.
+    """
     empty = parse_yaml("mission_node: {ros__parameters: {time_limit: 300}}\n", Path("m.yaml"))
     return import_config([empty], Path("blank.yaml"), managers=MANAGERS, revision=revision).loaded
 
@@ -32,7 +42,9 @@ UNIFORM = st.tuples(number(-50, 50), number(0, 20)).map(lambda pair: (pair[0], p
 
 @st.composite
 def expressible(draw, revision: str) -> tuple[LoadedScenario, dict]:
-    """A scenario, and a campaign if the revision has a runner, of values that the exemplar has keys for."""
+    """A scenario, and a campaign if the revision has a runner, of values that the exemplar has keys
+    for.
+    """
     metrics, runner = (revision in list(REVISIONS)[number:] for number in (2, 3))
     low, high = sorted(draw(st.tuples(number(0.5, 5), number(0.5, 5))))
     signal = {"minimum": low, "maximum": high, "period_s": float(draw(st.integers(1, 500)))}
@@ -43,26 +55,41 @@ def expressible(draw, revision: str) -> tuple[LoadedScenario, dict]:
     event = st.tuples(st.integers(1, 6), st.sampled_from(["failure", "recovery"]), number(100, 500))
     events = draw(st.lists(event, max_size=3))
     values["thruster_events"] = [f"({n},{what},{time_s!r})" for n, what, time_s in events]
-    values["default_modes.f_generate_search_path"] = draw(st.sampled_from(["fd_spiral_low", "fd_spiral_high"]))
+    values["default_modes.f_generate_search_path"] = draw(
+        st.sampled_from(["fd_spiral_low", "fd_spiral_high"])
+    )
     if metrics:
         values["battery.discharge_time_s"] = draw(number(1, 1000))
         values["battery.publishing_period_s"] = draw(number(0.1, 10))
         values["reaction_metric.battery_limit"] = draw(number(0, 1))
-        values["reaction_metric.visibility_thresholds_m"] = sorted({draw(number(0, 9)), draw(number(0, 9))})[::-1]
+        values["reaction_metric.visibility_thresholds_m"] = sorted(
+            {draw(number(0, 9)), draw(number(0, 9))}
+        )[::-1]
         fitting = st.lists(number(0, 9), min_size=1, max_size=2)
         count = len(values["reaction_metric.visibility_thresholds_m"])
         values["reaction_metric.expected_altitudes_m"] = (draw(fitting) * 2)[:count]
     campaign = {}
     if runner:
-        values |= {"start.x_m": draw(number(-50, 50)), "start.y_m": draw(number(-50, 50)), "start.z_m": -10.0}
+        values |= {
+            "start.x_m": draw(number(-50, 50)),
+            "start.y_m": draw(number(-50, 50)),
+            "start.z_m": -10.0,
+        }
         managers = draw(st.lists(st.sampled_from(MANAGERS), min_size=1, unique=True))
         campaign = {"managers": managers, "runs": draw(st.integers(1, 100)), "seed": 100}
-        at = {"start.x_m": values["start.x_m"], "signals.water_visibility.shift_s": signal["shift_s"]}
+        at = {
+            "start.x_m": values["start.x_m"],
+            "signals.water_visibility.shift_s": signal["shift_s"],
+        }
         perturbed = {}
         for path in draw(st.sets(st.sampled_from(sorted(at)))):
             low, high = draw(UNIFORM)
             if (low, high) != (0, 0):
-                perturbed[path] = {"distribution": "uniform", "minimum": at[path] + low, "maximum": at[path] + high}
+                perturbed[path] = {
+                    "distribution": "uniform",
+                    "minimum": at[path] + low,
+                    "maximum": at[path] + high,
+                }
         if events and draw(st.booleans()):
             low, high = draw(UNIFORM)
             shift = {"distribution": "uniform", "shared": "thruster_events_shift"}
@@ -93,7 +120,9 @@ def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, data)
         campaign=Path("campaign.yaml") if campaign else None,
     )
     same = {"name", "description"}
-    assert again.loaded.scenario.model_dump(exclude=same) == loaded.scenario.model_dump(exclude=same)
+    assert again.loaded.scenario.model_dump(exclude=same) == loaded.scenario.model_dump(
+        exclude=same
+    )
     if campaign:
         content = yaml.safe_load(again.campaign)
         perturbed, drawn = campaign.pop("perturbations", {}), content.pop("perturbations", {})
@@ -109,12 +138,20 @@ def lost_lines(scenario: str | LoadedScenario, revision: str | None = None, **ca
     return "\n".join(export_config(loaded, given, revision)[1])
 
 
-@pytest.mark.parametrize(("scenario", "revision", "expected"), [("planta_exp1", "1.4", 0), ("seams2023", "1.5", 85)])
-def test_times_of_thruster_events_are_written_as_the_other_revision_counts_them(scenario, revision, expected):
+@pytest.mark.parametrize(
+    ("scenario", "revision", "expected"), [("planta_exp1", "1.4", 0), ("seams2023", "1.5", 85)]
+)
+def test_times_of_thruster_events_are_written_as_the_other_revision_counts_them(
+    scenario, revision, expected
+):
     events = ["(1,failure,35)", "(1,recovery,50)"]
-    loaded = with_values(load_scenario(scenario), {} if expected == 0 else {"thruster_events": events})
+    loaded = with_values(
+        load_scenario(scenario), {} if expected == 0 else {"thruster_events": events}
+    )
     texts, lost = export_config(loaded, {"managers": ["none"], "runs": 1, "seed": 1}, revision)
-    written = yaml.safe_load(texts[MISSION_FILE])["/thruster_monitor"]["ros__parameters"]["thruster_events"]
+    written = yaml.safe_load(texts[MISSION_FILE])["/thruster_monitor"]["ros__parameters"][
+        "thruster_events"
+    ]
     assert written[1].endswith(f",{expected})")
     assert "thruster_events" not in "\n".join(lost)
 
@@ -124,8 +161,16 @@ class TestWhatTheExemplarCannotExpress:
         assert lost_lines("release15").startswith("battery: nothing here")
         assert lost_lines("release15").count("\n") == 0
         assert "no experiment runner before 1.4" in lost_lines("seams2023")
-        assert "signals.water_visibility: constant here, sinusoid in the exemplar" in lost_lines("planta_exp1")
-        words = ("revision.spiral.centre", "knowledge.ontologies", "modes_file", "metrics", "requirements.find_early")
+        assert "signals.water_visibility: constant here, sinusoid in the exemplar" in lost_lines(
+            "planta_exp1"
+        )
+        words = (
+            "revision.spiral.centre",
+            "knowledge.ontologies",
+            "modes_file",
+            "metrics",
+            "requirements.find_early",
+        )
         assert all(f"{word}: " in lost_lines("extended") for word in words)
 
     def test_is_named_for_another_revision(self):
@@ -138,34 +183,58 @@ class TestWhatTheExemplarCannotExpress:
     @pytest.mark.parametrize(
         ("values", "words"),
         [
-            ({"mission.time_limit_s": 240.5}, "mission.time_limit_s: 240.5 here, 240.0 in the exemplar"),
-            ({"start.x_m": {"distribution": "uniform", "minimum": -3, "maximum": -2}}, "start.x_m: {"),
             (
-                {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": 3, "recoverable": False}]},
+                {"mission.time_limit_s": 240.5},
+                "mission.time_limit_s: 240.5 here, 240.0 in the exemplar",
+            ),
+            (
+                {"start.x_m": {"distribution": "uniform", "minimum": -3, "maximum": -2}},
+                "start.x_m: {",
+            ),
+            (
+                {
+                    "thruster_events": [
+                        {"thruster": 1, "event": "failure", "time_s": 3, "recoverable": False}
+                    ]
+                },
                 "thruster_e",
             ),
             ({"current.x_m_per_s": 0.1}, "current.x_m_per_s: 0.1 here, 0.0 in the exemplar"),
             ({"signals.water_visibility.noise": 0.1}, "signals.water_visibility.noise: 0.1 here"),
-            ({"battery.mission_ends_at_level": 0.0}, "battery.mission_ends_at_level: 0.0 here, nothing in"),
+            (
+                {"battery.mission_ends_at_level": 0.0},
+                "battery.mission_ends_at_level: 0.0 here, nothing in",
+            ),
         ],
     )
     def test_is_named_value_by_value(self, values, words):
-        (line,) = export_config(with_values(BLANK["1.5"], values), {"managers": ["bt"], "runs": 2, "seed": 1})[1]
+        (line,) = export_config(
+            with_values(BLANK["1.5"], values), {"managers": ["bt"], "runs": 2, "seed": 1}
+        )[1]
         assert line.startswith(words)
 
     @pytest.mark.parametrize(
         ("campaign", "words"),
         [
-            ({"managers": ["oracle", "bt"]}, "managers: ['oracle', 'bt'] here, ['bt'] in the exemplar"),
+            (
+                {"managers": ["oracle", "bt"]},
+                "managers: ['oracle', 'bt'] here, ['bt'] in the exemplar",
+            ),
             ({"sweep": {"start.x_m": [1, 2]}}, "sweep: {"),
             (
-                {"perturbations": {"current.x_m_per_s": {"distribution": "uniform", "minimum": 0, "maximum": 1}}},
+                {
+                    "perturbations": {
+                        "current.x_m_per_s": {"distribution": "uniform", "minimum": 0, "maximum": 1}
+                    }
+                },
                 "perturb",
             ),
         ],
     )
     def test_is_named_for_a_campaign(self, campaign, words):
-        lost = export_config(BLANK["1.5"], {"managers": ["bt"], "runs": 2, "seed": 1, **campaign})[1]
+        lost = export_config(BLANK["1.5"], {"managers": ["bt"], "runs": 2, "seed": 1, **campaign})[
+            1
+        ]
         assert lost[0].startswith(words)
 
     def test_is_refused_where_nothing_is_left(self):
@@ -182,7 +251,12 @@ class TestCommand:
         told = "written: there/mission_config.yaml, there/runner_config.yml\n"
         assert command("export-config", "c.yaml", "--out", "there") == (0, told, "")
         files = [f"there/{MISSION_FILE}", f"there/{RUNNER_FILE}"]
-        assert command("import-config", *files, "--out", "again.yaml", "--campaign", "again_c.yaml").status == 0
+        assert (
+            command(
+                "import-config", *files, "--out", "again.yaml", "--campaign", "again_c.yaml"
+            ).status
+            == 0
+        )
         assert load_scenario("again.yaml").scenario.mission.time_limit_s == 240
         settings = read_campaign_file("again_c.yaml").settings
         assert (settings.managers, settings.runs, settings.seed) == (("bt",), 3, 7)
@@ -190,7 +264,9 @@ class TestCommand:
     def test_values_have_the_types_of_the_nodes_parameters(self, write, command):
         write("mine.yaml", "base: release15\nmission: {time_limit_s: 240}\nstart: {x_m: -16}\n")
         assert command("export-config", "mine.yaml", "--out", "there").status == 0
-        mission, runner = (yaml.safe_load(Path("there", name).read_text()) for name in (MISSION_FILE, RUNNER_FILE))
+        mission, runner = (
+            yaml.safe_load(Path("there", name).read_text()) for name in (MISSION_FILE, RUNNER_FILE)
+        )
         limit = mission["/mission_node"]["ros__parameters"]["time_limit"]
         x_m = runner["/suave_runner_node"]["ros__parameters"]["initial_pos_x"]
         assert (type(limit), type(x_m)) == (int, float)  # ROS 2 refuses a parameter of another type

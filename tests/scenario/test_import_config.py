@@ -55,7 +55,9 @@ mission_metrics:
     expected_altitude: [2.5, 1.5, 0.5]
     battery_limit: 0.3
 """
-VISIBILITY = "water_visibility_observer_node: {ros__parameters: {water_visibility_sec_shift: 20.5}}\n"
+VISIBILITY = (
+    "water_visibility_observer_node: {ros__parameters: {water_visibility_sec_shift: 20.5}}\n"
+)
 EVENTS = "thruster_monitor: {ros__parameters: {thruster_events: ['(1,failure,35)']}}\n"
 RUNNER_15 = """\
 /suave_runner_node:
@@ -82,12 +84,16 @@ LINE_PATTERN = re.compile(r"^    (\w+):")
 
 @pytest.fixture
 def imported(write):
-    """Imports files with these contents, writes the scenario (and the campaign), and gives what was imported."""
+    """Imports files with these contents, writes the scenario (and the campaign), and gives what was
+    imported.
+    """
 
     def run(*contents, campaign=False, revision="1.5", **options):
         files = [write(f"given{number}.yaml", content) for number, content in enumerate(contents)]
         out, other = Path("scenario.yaml"), Path("campaign.yaml") if campaign else None
-        result = import_config(files, out, managers=MANAGERS, campaign=other, revision=revision, **options)
+        result = import_config(
+            files, out, managers=MANAGERS, campaign=other, revision=revision, **options
+        )
         out.write_text(result.scenario)
         if other is not None:
             other.write_text(result.campaign)
@@ -127,7 +133,11 @@ class TestUpstreamFiles:
         assert mine().revision.name == wanted
         for line, content in enumerate(file.read_text().splitlines(), start=1):
             if key := LINE_PATTERN.match(content):
-                places = (f"given0.yaml, line {line}:", f"given0.yaml: line {line},", f"(given0.yaml, line {line})")
+                places = (
+                    f"given0.yaml, line {line}:",
+                    f"given0.yaml: line {line},",
+                    f"(given0.yaml, line {line})",
+                )
                 assert any(place in text for place in places), key[1]
         assert not notes_about(result, "unknown")
 
@@ -137,7 +147,10 @@ class TestUpstreamFiles:
             (["v1.5.0_mission_config.yaml"], "1.5"),
             (["d5e97be_mission_config.yaml", "v1.5.0_runner_config.yml"], None),
             (["v1.4.0_mission_config.yaml"], "fit revisions 1.3, 1.4, 2025 of"),
-            (["v1.4.0_mission_config.yaml", "v1.4.0_runner_config.yml"], "fit revisions 1.4, 2025 of"),
+            (
+                ["v1.4.0_mission_config.yaml", "v1.4.0_runner_config.yml"],
+                "fit revisions 1.4, 2025 of",
+            ),
             (["v1.2.1_mission_config.yaml"], "fit revisions 1.2, 1.3, 1.4, 2025, 1.5 of"),
             (["v1.5.0_runner_config.yml"], "1.5"),
         ],
@@ -161,7 +174,12 @@ class TestValues:
         assert scenario.default_modes["f_generate_search_path"] == "fd_spiral_medium"
         visibility = scenario.signals["water_visibility"]
         assert visibility.publishing_period_s == 0.4
-        assert (visibility.period_s, visibility.minimum, visibility.maximum, visibility.shift_s) == (100, 1, 3, 20.5)
+        assert (
+            visibility.period_s,
+            visibility.minimum,
+            visibility.maximum,
+            visibility.shift_s,
+        ) == (100, 1, 3, 20.5)
         events = [(each.thruster, each.event, each.time_s) for each in scenario.thruster_events]
         assert events == [(1, "failure", 35), (3, "recovery", 50)]
 
@@ -189,11 +207,17 @@ class TestValues:
         assert (scenario.revision.name, scenario.mission.time_limit_s) == (revision, 200)
         assert scenario.thruster_events == ()  # the base's failure is not the user's
         visibility = scenario.signals["water_visibility"]
-        assert (visibility.publishing_period_s, visibility.period_s, visibility.shift_s) == (0.2, period_s, 0)
+        assert (visibility.publishing_period_s, visibility.period_s, visibility.shift_s) == (
+            0.2,
+            period_s,
+            0,
+        )
         assert (visibility.minimum, visibility.maximum) == (1.25, 3.75)
         assert scenario.default_modes["f_generate_search_path"] == "fd_spiral_low"
         assert scenario.managers.random.adaptation_period_s == 15
-        assert scenario.managers.metacontrol.reasoning_period_s == (2 if revision in ("2023", "1.2") else 1.5)
+        assert scenario.managers.metacontrol.reasoning_period_s == (
+            2 if revision in ("2023", "1.2") else 1.5
+        )
         assert (scenario.start.x_m, scenario.start.y_m) == (-17, 2)
         assert (scenario.battery is not None) == has_battery
         assert notes_about(result, "thruster_monitor: thruster_events")
@@ -206,7 +230,9 @@ class TestValues:
         assert scenario.model_dump(exclude=same) == base.model_dump(exclude=same)
 
     def test_may_be_given_to_every_node(self, imported):
-        imported("/**: {ros__parameters: {time_limit: 120, discharge_time: 90.0, use_sim_time: true}}\n")
+        imported(
+            "/**: {ros__parameters: {time_limit: 120, discharge_time: 90.0, use_sim_time: true}}\n"
+        )
         assert (mine().mission.time_limit_s, mine().battery.discharge_time_s) == (120, 90)
 
     def test_of_events_before_the_start_are_at_the_start(self, imported):
@@ -217,11 +243,15 @@ class TestValues:
     def test_each_say_where_they_come_from(self, imported):
         lines = imported(MISSION_2023, revision=None).scenario.splitlines()
         line = next(line for line in lines if "period_s: 100" in line)
-        assert line.endswith("# given0.yaml, line 10: water_visibility_observer_node.water_visibility_period")
+        assert line.endswith(
+            "# given0.yaml, line 10: water_visibility_observer_node.water_visibility_period"
+        )
 
     @pytest.mark.parametrize("revision", REVISIONS)
     @pytest.mark.parametrize("key", ["adapt_period", "adaptation_period"])
-    def test_adapt_period_is_read_from_15_on_and_adaptation_period_before(self, imported, revision, key):
+    def test_adapt_period_is_read_from_15_on_and_adaptation_period_before(
+        self, imported, revision, key
+    ):
         node = "random_reasoner_node" if revision == "2023" else "task_bridge"
         result = imported(f"{node}: {{ros__parameters: {{{key}: 30}}}}\n", revision=revision)
         is_read = (revision == "1.5") == (key == "adapt_period")
@@ -230,7 +260,10 @@ class TestValues:
 
     @pytest.mark.parametrize("first", [0, 1])
     def test_task_bridge_alone_sets_the_modes_where_there_is_one(self, imported, first):
-        files = [MISSION_15, "mission_node: {ros__parameters: {f_generate_search_path_mode: fd_spiral_low}}\n"]
+        files = [
+            MISSION_15,
+            "mission_node: {ros__parameters: {f_generate_search_path_mode: fd_spiral_low}}\n",
+        ]
         result = imported(files[first], files[1 - first])
         (note,) = notes_about(result, "mission_node.f_generate_search_path_mode")
         assert "revision 1.5 reads task_bridge.f_generate_search_path_mode" in note
@@ -240,7 +273,10 @@ class TestValues:
 class TestRevision:
     def test_that_cannot_be_is_refused(self, imported):
         assert "2024" in refused(imported, MISSION_15, revision="2024").problem
-        assert "has all of random_reasoner_node" in refused(imported, MISSION_2023, MISSION_15, revision=None).problem
+        assert (
+            "has all of random_reasoner_node"
+            in refused(imported, MISSION_2023, MISSION_15, revision=None).problem
+        )
 
 
 class TestWithoutCounterpart:
@@ -253,7 +289,11 @@ class TestWithoutCounterpart:
                 "line 2, misson_node",
                 "time_limit: the node is not known (did you mean 'mission_node'",
             ),
-            ("mission_node: {ros__parameters: {}, more: 1}\n", "line 1, mission_node", "more: ROS 2 reads"),
+            (
+                "mission_node: {ros__parameters: {}, more: 1}\n",
+                "line 1, mission_node",
+                "more: ROS 2 reads",
+            ),
             (RUNNER_15, "random_seed", "--campaign FILE"),
             (
                 RUNNER_15.replace("/opt/ros/mission.yaml", "other.yaml"),
@@ -272,7 +312,10 @@ class TestWithoutCounterpart:
         changed = shipped_modes.replace("spiral_altitude: 3.0", "spiral_altitude: 2.75")
         imported(MISSION_15, changed)
         modes = load_scenario("scenario.yaml").modes
-        assert modes.mode("f_generate_search_path", "fd_spiral_high").parameters["spiral_altitude"] == 2.75
+        assert (
+            modes.mode("f_generate_search_path", "fd_spiral_high").parameters["spiral_altitude"]
+            == 2.75
+        )
         assert "two System Modes files" in refused(imported, shipped_modes, changed).problem
 
 
@@ -300,17 +343,29 @@ class TestCampaign:
         assert mine().start.x_m == -17
 
     def test_can_be_run(self, imported, command):
-        runner = RUNNER_15.replace('"num_runs": 20', '"num_runs": 6').replace('"metacontrol"', '"bt"')
+        runner = RUNNER_15.replace('"num_runs": 20', '"num_runs": 6').replace(
+            '"metacontrol"', '"bt"'
+        )
         imported(runner, MISSION_15.replace("300.0", "60.0"), campaign=True)
         assert command("campaign", "campaign.yaml", "--workers", "1", "--out", "out").status == 0
         rows = rows_of(Path("out"))
         assert [row["manager"] for row in rows] == ["none"] * 6 + ["bt"] * 6
-        first, second = ([float(row[f"thruster_events.{event}.time_s"]) for row in rows] for event in (0, 1))
-        assert [later - sooner for sooner, later in zip(first, second, strict=True)] == pytest.approx([25] * 12)
-        drawn = [tuple(row[key] for key in ("start.x_m", "start.y_m", "thruster_events.1.time_s")) for row in rows]
+        first, second = (
+            [float(row[f"thruster_events.{event}.time_s"]) for row in rows] for event in (0, 1)
+        )
+        assert [
+            later - sooner for sooner, later in zip(first, second, strict=True)
+        ] == pytest.approx([25] * 12)
+        drawn = [
+            tuple(row[key] for key in ("start.x_m", "start.y_m", "thruster_events.1.time_s"))
+            for row in rows
+        ]
         assert drawn[:6] == drawn[6:]  # all managers meet the same
         assert len({*drawn[:5]}) == 1 and drawn[5] != drawn[4]  # five runs in a row share a draw
-        assert all(-18 <= float(x) <= -16 and 1.5 <= float(y) <= 2.5 and 55 <= float(t) <= 75 for x, y, t in drawn)
+        assert all(
+            -18 <= float(x) <= -16 and 1.5 <= float(y) <= 2.5 and 55 <= float(t) <= 75
+            for x, y, t in drawn
+        )
 
     @pytest.mark.parametrize("own", ["    water_visibility_sec_shift: 7\n", ""])
     def test_the_runner_s_shift_replaces_the_mission_s_with_or_without_a_value(self, imported, own):
@@ -328,7 +383,9 @@ class TestCampaign:
         assert [each.thruster for each in mine().thruster_events] == [2]
 
     def test_an_interval_without_events_of_the_runner_shifts_nothing(self, imported):
-        runner = RUNNER_15.replace('    thruster_events: ["(1,failure,35)", "(2,failure,60)"]\n', "")
+        runner = RUNNER_15.replace(
+            '    thruster_events: ["(1,failure,35)", "(2,failure,60)"]\n', ""
+        )
         result = imported(EVENTS, runner, campaign=True)
         assert [each.time_s for each in mine().thruster_events] == [35]
         assert notes_about(result, "shifts nothing")
@@ -337,10 +394,25 @@ class TestCampaign:
     @pytest.mark.parametrize(
         ("old", "new", "place", "words"),
         [
-            ("random_seed: 100", "random_seed: many", "line 6, ", "random_seed: 'many' should be a whole number"),
+            (
+                "random_seed: 100",
+                "random_seed: many",
+                "line 6, ",
+                "random_seed: 'many' should be a whole number",
+            ),
             ("[-40, 40]", "[40, -40]", "line 9, ", "the beginning 40 is above the end -40"),
-            (EXPERIMENT, '{"adaptation_manager": "bt"}', "line 17, ", "experiments[1].num_runs: is missing"),
-            ("(2,failure,60)", "(2,failure)", "line 10, thruster_events[1]", "not a thruster event"),
+            (
+                EXPERIMENT,
+                '{"adaptation_manager": "bt"}',
+                "line 17, ",
+                "experiments[1].num_runs: is missing",
+            ),
+            (
+                "(2,failure,60)",
+                "(2,failure)",
+                "line 10, thruster_events[1]",
+                "not a thruster event",
+            ),
         ],
     )
     def test_that_cannot_be_right_is_refused(self, imported, old, new, place, words):
@@ -352,7 +424,10 @@ class TestCampaign:
 
     def test_needs_a_runner_with_experiments(self, imported):
         assert "no node suave_runner_node" in refused(imported, MISSION_15, campaign=True).problem
-        assert "is missing" in refused(imported, RUNNER_15.split("    experiments")[0], campaign=True).problem
+        assert (
+            "is missing"
+            in refused(imported, RUNNER_15.split("    experiments")[0], campaign=True).problem
+        )
         only = RUNNER_15.replace('"none"', '"a"').replace('"metacontrol"', '"b"')
         assert "none of its managers" in refused(imported, only, campaign=True).problem
 
@@ -373,8 +448,13 @@ class TestExperiments:
     def test_one_extended_mission_changes_no_other(self, imported, of_the_first):
         plain = '{"num_runs": 20, "adaptation_manager": "bt", "mission_name": "suave"}'
         extended = plain.replace('"mission_name": "suave"', of_the_first)
-        for first, second, managers in ((extended, plain, ["bt_extended", "bt"]), (plain, plain, ["bt"])):
-            assert content_of(self.with_experiments(imported, first, second))["managers"] == managers
+        for first, second, managers in (
+            (extended, plain, ["bt_extended", "bt"]),
+            (plain, plain, ["bt"]),
+        ):
+            assert (
+                content_of(self.with_experiments(imported, first, second))["managers"] == managers
+            )
 
     @pytest.mark.parametrize(
         ("experiment", "words"),
@@ -382,21 +462,31 @@ class TestExperiments:
             ('{"num_runs": 20, "adaptation_manager": "rebet"}', "there is no manager 'rebet'"),
             ('{"num_runs": 20, "adaptation_manager": "none"}', "none is there already"),
             ('{"num_runs": 5, "adaptation_manager": "bt"}', "bt 5"),
-            ('{"num_runs": 20, "adaptation_manager": "bt", "missing": 1}', "not simulated: missing: 1"),
+            (
+                '{"num_runs": 20, "adaptation_manager": "bt", "missing": 1}',
+                "not simulated: missing: 1",
+            ),
             (
                 '{"num_runs": 20, "adaptation_manager": "bt", "experiment_launch": "l use_action_server:=true"}',
                 "not simulated: use_action_server: 'true'",
             ),
-            ('{"num_runs": 20, "adaptation_manager": "random", "mission_name": "suave_extended"}', "flies suave here"),
+            (
+                '{"num_runs": 20, "adaptation_manager": "random", "mission_name": "suave_extended"}',
+                "flies suave here",
+            ),
         ],
     )
     def test_what_is_not_simulated_is_told(self, imported, experiment, words):
-        result = self.with_experiments(imported, '{"num_runs": 20, "adaptation_manager": "none"}', experiment)
+        result = self.with_experiments(
+            imported, '{"num_runs": 20, "adaptation_manager": "none"}', experiment
+        )
         assert notes_about(result, words)
 
     def test_the_launch_says_which_manager_is_started(self, imported):
         launch = "ros2 launch suave_bringup mission.launch.py adaptation_manager:=random gui:=false"
-        experiment = json.dumps({"num_runs": 20, "adaptation_manager": "bt", "experiment_launch": launch})
+        experiment = json.dumps(
+            {"num_runs": 20, "adaptation_manager": "bt", "experiment_launch": launch}
+        )
         result = self.with_experiments(imported, experiment)
         assert content_of(result)["managers"] == ["random"]
         assert notes_about(result, "its launch starts random, and not bt")
@@ -404,11 +494,15 @@ class TestExperiments:
 
     def test_a_battery_constraint_of_all_ends_the_mission_below_its_level(self, imported):
         constraint = "l battery_constraint:=true battery_constraint_value:=0.4"
-        limited = '{"num_runs": 2, "adaptation_manager": "%s", "experiment_launch": "' + constraint + '"}'
+        limited = (
+            '{"num_runs": 2, "adaptation_manager": "%s", "experiment_launch": "' + constraint + '"}'
+        )
         imported_ = self.with_experiments(imported, limited % "none", limited % "bt")
         assert mine().battery.mission_ends_at_level == 0.4
         rows = run_campaign("campaign.yaml", ["none"]).frame()
-        assert rows["mission_duration_s"].tolist() == pytest.approx([120, 120], abs=1.5)  # 200 s from full to empty
+        assert rows["mission_duration_s"].tolist() == pytest.approx(
+            [120, 120], abs=1.5
+        )  # 200 s from full to empty
         assert not notes_about(imported_, "battery_constraint")
 
 
@@ -431,19 +525,31 @@ class TestRunnerSeed:
     """The draws of the exemplar's own runner, as conditions of a campaign."""
 
     def test_gives_the_conditions_of_the_runs_of_2025(self, imported):
-        # Six conditions of five runs each, as measured: kas-lab/suave_planta, exp1 (DOI 10.5281/zenodo.15874043).
+        # Six conditions of five runs each, as measured: kas-lab/suave_planta, exp1 (DOI
+        # 10.5281/zenodo.15874043).
         content = content_of(imported(STUDY_OF_2025, campaign=True, runner_seed=100))
         assert (content["runs"], content["managers"]) == (5, ["none", "bt"])
         assert "perturbations" not in content
         values = content["sweep"]["zip"]
-        assert [round(y_m, 3) for y_m in values["start.y_m"]] == [2.455, 2.8, 2.933, 2.204, 2.963, 2.818]
+        assert [round(y_m, 3) for y_m in values["start.y_m"]] == [
+            2.455,
+            2.8,
+            2.933,
+            2.204,
+            2.963,
+            2.818,
+        ]
         failures_s = [146.39, 91.19, 61.88, 69.40, 111.08, 24.82]
         for event in (0, 1):
-            assert [round(time_s, 2) for time_s in values[f"thruster_events.{event}.time_s"]] == failures_s
+            assert [
+                round(time_s, 2) for time_s in values[f"thruster_events.{event}.time_s"]
+            ] == failures_s
 
     def test_tells_what_differs(self, imported):
         result = imported(STUDY_OF_2025.replace("30", "12"), campaign=True, runner_seed=100)
-        assert notes_about(result, "the last of 3 conditions has 2 runs in the exemplar, and 5 here")
+        assert notes_about(
+            result, "the last of 3 conditions has 2 runs in the exemplar, and 5 here"
+        )
         assert "--campaign" in refused(imported, STUDY_OF_2025, runner_seed=100).remedy
 
 
@@ -458,23 +564,52 @@ class TestBadInput:
         ("text", "place", "words"),
         [
             ("mission_node: [\n", "line 2", "not valid YAML"),
-            ("mission_node: {time_limit: 300}\n", "line 1, mission_node", "has no mapping ros__parameters"),
+            (
+                "mission_node: {time_limit: 300}\n",
+                "line 1, mission_node",
+                "has no mapping ros__parameters",
+            ),
             ("gazebo: {ros__parameters: {time_limit: 1}}\n", "line 1, gazebo", "nothing of SUAVE"),
-            ("mission_node: {ros__parameters: {time_limit: abc}}\n", "line 1, mission.time_limit_s", "'abc'"),
+            (
+                "mission_node: {ros__parameters: {time_limit: abc}}\n",
+                "line 1, mission.time_limit_s",
+                "'abc'",
+            ),
             (mission_2023("(3, rec", "(9, rec"), "line 16, thruster_events[1].", "to 6"),
-            (mission_2023('["(1,failure,35)", "(3, recovery, 50.0)"]', "3"), "line 16, thruster_events", "a list"),
-            (mission_2023("_min: 1.0", "_min: 5.0"), "line 11, signals.water_visibility", "5 is above maximum 3"),
-            (mission_2023("spiral_med", "spirl_med"), "line 5, default_modes.f_gen", "did you mean 'fd_spiral_medium'"),
+            (
+                mission_2023('["(1,failure,35)", "(3, recovery, 50.0)"]', "3"),
+                "line 16, thruster_events",
+                "a list",
+            ),
+            (
+                mission_2023("_min: 1.0", "_min: 5.0"),
+                "line 11, signals.water_visibility",
+                "5 is above maximum 3",
+            ),
+            (
+                mission_2023("spiral_med", "spirl_med"),
+                "line 5, default_modes.f_gen",
+                "did you mean 'fd_spiral_medium'",
+            ),
         ],
     )
     def test_is_told_in_the_words_of_its_file(self, imported, text, place, words):
         error = refused(imported, text, revision="2023" if "reasoner" in text else "1.5")
-        assert (error.file, error.place.startswith(place), words in str(error)) == ("given0.yaml", True, True)
+        assert (error.file, error.place.startswith(place), words in str(error)) == (
+            "given0.yaml",
+            True,
+            True,
+        )
 
     def test_two_files_may_say_the_same_and_must_not_contradict(self, imported):
         same = "thruster_monitor: {ros__parameters: {thruster_events: ['(1, failure, 35)', '(3,recovery,50.0)']}}\n"
-        imported(MISSION_2023, same, "parent_mission_node: {ros__parameters: {time_limit: 240.0}}\n")
-        for other in ("parent_mission_node: {ros__parameters: {time_limit: 300}}\n", same.replace("35", "36")):
+        imported(
+            MISSION_2023, same, "parent_mission_node: {ros__parameters: {time_limit: 240.0}}\n"
+        )
+        for other in (
+            "parent_mission_node: {ros__parameters: {time_limit: 300}}\n",
+            same.replace("35", "36"),
+        ):
             error = refused(imported, MISSION_2023, other)
             assert error.file == "given1.yaml"
             assert "contradicts given0.yaml: line" in error.problem
@@ -485,13 +620,24 @@ class TestCommand:
         write("mission.yaml", MISSION_15)
         write("runner.yaml", RUNNER_15)
         write("sub/keep.txt", "")
-        arguments = ["mission.yaml", "runner.yaml", "--out", "mine.yaml", "--campaign", "sub/campaign.yaml"]
+        arguments = [
+            "mission.yaml",
+            "runner.yaml",
+            "--out",
+            "mine.yaml",
+            "--campaign",
+            "sub/campaign.yaml",
+        ]
         status, out, _ = command("import-config", *arguments)
         told = out.splitlines()
         assert status == 0
-        assert told[-2].startswith("mine.yaml is written, based on release15: only revision 1.5 has ")
+        assert told[-2].startswith(
+            "mine.yaml is written, based on release15: only revision 1.5 has "
+        )
         assert told[-1] == "sub/campaign.yaml is written"
-        assert any("not needed here" in line and "mission_metrics.result_path" in line for line in told)
+        assert any(
+            "not needed here" in line and "mission_metrics.result_path" in line for line in told
+        )
         assert load_scenario("mine.yaml").scenario.managers.random.adaptation_period_s == 25
         assert yaml.safe_load(Path("sub/campaign.yaml").read_text())["scenario"] == "../mine.yaml"
 
@@ -500,20 +646,34 @@ class TestCommand:
         [
             (["missing.yaml", "--out", "mine.yaml"], "no such file"),
             (["mission.yaml", "--out", "there.yaml"], "exists already"),
-            (["mission.yaml", "--out", "mission.yaml", "--overwrite"], "one of the other files, too"),
+            (
+                ["mission.yaml", "--out", "mission.yaml", "--overwrite"],
+                "one of the other files, too",
+            ),
             (["mission.yaml", "--out", "nowhere/mine.yaml"], "no folder nowhere"),
             (["mission.yaml", "--out", "."], "is a folder"),
-            (["runner.yaml", "--out", "mine.yaml", "--campaign", "mine.yaml"], "one of the other files, too"),
+            (
+                ["runner.yaml", "--out", "mine.yaml", "--campaign", "mine.yaml"],
+                "one of the other files, too",
+            ),
             (["runner.yaml", "--out", "mine.yaml", "--campaign", "there.yaml"], "exists already"),
             (["mission.yaml"], "--out"),
             (["--out", "mine.yaml"], "FILE"),
         ],
     )
     def test_bad_input_is_one_line_and_nothing_is_written(self, write, command, arguments, problem):
-        for name, content in (("mission.yaml", MISSION_15), ("runner.yaml", RUNNER_15), ("there.yaml", "kept")):
+        for name, content in (
+            ("mission.yaml", MISSION_15),
+            ("runner.yaml", RUNNER_15),
+            ("there.yaml", "kept"),
+        ):
             write(name, content)
         status, out, error = command("import-config", *arguments)
         assert (status, out, len(error.splitlines())) == (2, "", 1)
         assert problem in error
-        assert sorted(path.name for path in Path().iterdir()) == ["mission.yaml", "runner.yaml", "there.yaml"]
+        assert sorted(path.name for path in Path().iterdir()) == [
+            "mission.yaml",
+            "runner.yaml",
+            "there.yaml",
+        ]
         assert Path("there.yaml").read_text() == "kept"

@@ -1,4 +1,6 @@
-"""Loading scenarios: shipped ones, those built on others, the files they name, and what has no effect."""
+"""Loading scenarios: shipped ones, those built on others, the files they name, and what has no
+effect.
+"""
 
 import hashlib
 from pathlib import Path
@@ -35,7 +37,9 @@ def test_release15_is_the_same_vehicle_in_other_software():
     assert ours.managers.metacontrol.reasoning_period_s == 1.5
     of_2025 = load_scenario("planta_exp1").scenario.calibration
     of_2023_alone = ("altitude_error_m", "origin_y_m", "reasoning_slowdown")
-    shared = other.calibration.model_copy(update={name: getattr(of_2025, name) for name in of_2023_alone})
+    shared = other.calibration.model_copy(
+        update={name: getattr(of_2025, name) for name in of_2023_alone}
+    )
     assert (ours.calibration, ours.start, ours.pipeline) == (shared, other.start, other.pipeline)
 
 
@@ -43,7 +47,13 @@ def test_the_vehicle_is_the_same_in_every_revision():
     of_the_vehicle = {name for name in Calibration.model_fields if "_per_s" in name}
     assert len(of_the_vehicle) == 6
     assert (
-        len({load_scenario(each).scenario.calibration.model_dump_json(include=of_the_vehicle) for each in SHIPPED}) == 1
+        len(
+            {
+                load_scenario(each).scenario.calibration.model_dump_json(include=of_the_vehicle)
+                for each in SHIPPED
+            }
+        )
+        == 1
     )
 
 
@@ -52,7 +62,11 @@ def test_the_vehicle_is_the_same_in_every_revision():
     [
         *((HEAD + f"revision: {quoted}\n", "1.5", None) for quoted in ("1.5", "'1.5'", '"1.5"')),
         (HEAD + "revision: {base: 1.5, follow: {acceptance_m: 0.3}}\n", "1.5", 0.3),
-        ("base: release15\nrevision: {follow: {acceptance_m: 0.3}}\n", "1.5", 0.3),  # of the base scenario
+        (
+            "base: release15\nrevision: {follow: {acceptance_m: 0.3}}\n",
+            "1.5",
+            0.3,
+        ),  # of the base scenario
         (HEAD + "revision: own.yaml\n", "own", 0.3),
     ],
 )
@@ -60,8 +74,12 @@ def test_a_revision_is_a_shipped_one_or_differs_from_it_or_is_a_file_beside_the_
     write, content, name, acceptance_m
 ):
     write("own.yaml", "base: 1.5\nname: own\nfollow: {acceptance_m: 0.3}\n")
-    ours, shipped = (load_scenario(each).scenario.revision for each in (write("mine.yaml", content), "release15"))
-    follow = shipped.follow.model_copy(update={"acceptance_m": acceptance_m or shipped.follow.acceptance_m})
+    ours, shipped = (
+        load_scenario(each).scenario.revision for each in (write("mine.yaml", content), "release15")
+    )
+    follow = shipped.follow.model_copy(
+        update={"acceptance_m": acceptance_m or shipped.follow.acceptance_m}
+    )
     assert ours == shipped.model_copy(update={"name": name, "follow": follow})
 
 
@@ -69,14 +87,23 @@ def test_a_revision_with_its_own_base_takes_nothing_from_the_base_scenarios(writ
     offset = "{distribution: normal, mean: 0, std: 1%s}"
     revision = 'revision: {base: "2023", set_points: {node_frame_offset_x_m: %s}}\n'
     write("base.yaml", HEAD + revision % (offset % ", minimum: 0"))
-    ours = load_scenario(write("mine.yaml", "base: base.yaml\n" + revision % (offset % ""))).scenario
-    assert ours.revision.set_points.node_frame_offset_x_m == Normal(distribution="normal", mean=0, std=1)
+    ours = load_scenario(
+        write("mine.yaml", "base: base.yaml\n" + revision % (offset % ""))
+    ).scenario
+    assert ours.revision.set_points.node_frame_offset_x_m == Normal(
+        distribution="normal", mean=0, std=1
+    )
 
 
 def test_a_derived_scenario_says_only_what_differs(write):
-    path = write("slow_sea.yaml", HEAD + "signals:\n  water_visibility: {period_s: 120}\nthruster_events: []\n")
+    path = write(
+        "slow_sea.yaml",
+        HEAD + "signals:\n  water_visibility: {period_s: 120}\nthruster_events: []\n",
+    )
     ours, other = load_scenario(path).scenario, load_scenario("seams2023").scenario
-    assert ours.signals["water_visibility"] == other.signals["water_visibility"].model_copy(update={"period_s": 120})
+    assert ours.signals["water_visibility"] == other.signals["water_visibility"].model_copy(
+        update={"period_s": 120}
+    )
     assert ours.thruster_events == ()
     assert ours.mission == other.mission
 
@@ -88,7 +115,10 @@ def test_a_derived_scenario_is_called_after_its_file_unless_it_says_otherwise(wr
 
 
 def test_null_removes_a_signal_a_value_and_the_battery(write):
-    write("base.yaml", "base: paper_table_values\nbattery: {}\nsignals: {chlorophyll: {kind: constant, value: 1}}\n")
+    write(
+        "base.yaml",
+        "base: paper_table_values\nbattery: {}\nsignals: {chlorophyll: {kind: constant, value: 1}}\n",
+    )
     path = write(
         "mine.yaml",
         "base: base.yaml\nbattery: null\nsignals: {chlorophyll: null}\n"
@@ -119,12 +149,17 @@ def test_both_spellings_of_thruster_events_mean_the_same(write):
 )
 def test_an_event_survives_the_exemplars_spelling(thruster, event, time_s, space):
     text = f"{space}({thruster},{space}{event}{space},{space}{time_s!r}){space}"
-    assert ThrusterEvent.model_validate(text) == ThrusterEvent(thruster=thruster, event=event, time_s=time_s)
+    assert ThrusterEvent.model_validate(text) == ThrusterEvent(
+        thruster=thruster, event=event, time_s=time_s
+    )
 
 
 def test_a_table_signal_brings_its_values_along(write):
     write("folder/data/sea.csv", "t_s,value\n0,3\n60,1\n")
-    path = write("folder/mine.yaml", HEAD + "signals: {water_visibility: {kind: table, file: data/sea.csv}}\n")
+    path = write(
+        "folder/mine.yaml",
+        HEAD + "signals: {water_visibility: {kind: table, file: data/sea.csv}}\n",
+    )
     loaded = load_scenario(path)
     assert isinstance(loaded.scenario.signals["water_visibility"], TableSignal)
     assert loaded.tables == {"water_visibility": ((0.0, 60.0), (3.0, 1.0))}
@@ -135,7 +170,9 @@ def test_files_are_looked_for_beside_the_file_that_names_them(write, shipped_mod
     write("common/base.yaml", HEAD + "modes_file: m.yaml\n")
     loaded = load_scenario(write("mine.yaml", "base: common/base.yaml\n"))
     assert loaded.modes_path == Path("common/m.yaml")
-    assert loaded.modes.mode("f_generate_search_path", "fd_spiral_high").parameters == {"spiral_altitude": 3.5}
+    assert loaded.modes.mode("f_generate_search_path", "fd_spiral_high").parameters == {
+        "spiral_altitude": 3.5
+    }
 
 
 def test_a_shipped_scenario_means_the_same_in_every_folder(write, shipped_modes):
@@ -154,7 +191,9 @@ def test_the_command_line_replaces_ontologies_modes_and_reasoner(write, shipped_
     write("own.owl", "<rdf/>")
     write("second.owl", "<rdf/>")
     write("m.yaml", shipped_modes)
-    loaded = load_scenario("seams2023", ontologies=["own.owl", "second.owl"], modes_file="m.yaml", reasoner="owlready2")
+    loaded = load_scenario(
+        "seams2023", ontologies=["own.owl", "second.owl"], modes_file="m.yaml", reasoner="owlready2"
+    )
     assert loaded.ontologies == (Path("own.owl"), Path("second.owl"))
     assert loaded.modes_path == Path("m.yaml")
     assert loaded.scenario.knowledge.ontologies == ("own.owl", "second.owl")
@@ -183,7 +222,11 @@ EARLY = "thruster_events.0: failures have no effect before 26 s"
 
 
 def failures(*times_s: object) -> dict[str, object]:
-    return {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": time_s} for time_s in times_s]}
+    return {
+        "thruster_events": [
+            {"thruster": 1, "event": "failure", "time_s": time_s} for time_s in times_s
+        ]
+    }
 
 
 @pytest.mark.parametrize(
@@ -195,12 +238,25 @@ def failures(*times_s: object) -> dict[str, object]:
         (failures(10.0, 15.0), [EARLY]),  # in 2023 the second is 15 s later
         (failures({"distribution": "uniform", "minimum": 5, "maximum": 20}), [EARLY]),
         (failures({"distribution": "uniform", "minimum": 5, "maximum": 60}), []),
-        (failures(100.0, 250.0), ["thruster_events.1: 350 s is after the end"]),  # in 2023 it counts from the first
+        (
+            failures(100.0, 250.0),
+            ["thruster_events.1: 350 s is after the end"],
+        ),  # in 2023 it counts from the first
         (failures(100.0, 250.0) | {"revision.monitors.thruster_event_times": "after_start"}, []),
-        (failures(100.0) | {"mission.time_limit_s": 100.0}, ["thruster_events.0: 100 s is after the end"]),
+        (
+            failures(100.0) | {"mission.time_limit_s": 100.0},
+            ["thruster_events.0: 100 s is after the end"],
+        ),
         ({"leak": {"time_s": 301.0}}, ["leak: 301 s is after the end"]),
         (
-            {"signals.water_visibility": {"kind": "step", "time_s": 500.0, "before": 1.0, "after": 2.0}},
+            {
+                "signals.water_visibility": {
+                    "kind": "step",
+                    "time_s": 500.0,
+                    "before": 1.0,
+                    "after": 2.0,
+                }
+            },
             ["signals.water_visibility: 500 s is after the end"],
         ),
     ],
@@ -218,7 +274,9 @@ def test_all_of_the_shipped_scenarios_has_an_effect(name):
 
 
 def test_a_campaign_tells_for_how_many_swept_values(caplog):
-    run_campaign("seams2023", ["none"], runs=1, sweep={"thruster_events.0.time_s": [10.0, 20.0, 31.0]})
+    run_campaign(
+        "seams2023", ["none"], runs=1, sweep={"thruster_events.0.time_s": [10.0, 20.0, 31.0]}
+    )
     (message,) = [each for each in caplog.messages if "no effect" in each]
     assert message.startswith(f"note: {EARLY}") and message.endswith(", at 2 of 3 swept values")
 

@@ -38,16 +38,24 @@ def changed(old: str, new: str) -> str:
 
 def test_the_shipped_file_has_the_altitudes_and_active_modes_of_the_exemplar():
     table = read_modes(find("suave_modes.yaml", "scenarios"))
-    search = {mode: table.mode("f_generate_search_path", mode) for mode in table.modes("f_generate_search_path")}
+    search = {
+        mode: table.mode("f_generate_search_path", mode)
+        for mode in table.modes("f_generate_search_path")
+    }
     altitudes = {mode: found.parameters.get("spiral_altitude") for mode, found in search.items()}
     names = ("__DEFAULT__", "fd_unground", "fd_spiral_low", "fd_spiral_medium", "fd_spiral_high")
     assert altitudes == dict(zip(names, (1.0, None, 1.0, 2.0, 3.0), strict=True))
     active = {
-        f"{name} {mode}" for name in table.functions for mode in table.modes(name) if table.mode(name, mode).active
+        f"{name} {mode}"
+        for name in table.functions
+        for mode in table.modes(name)
+        if table.mode(name, mode).active
     }
     others = {"f_follow_pipeline fd_follow_pipeline", "f_maintain_motion fd_recover_thrusters"}
     others |= {"f_maintain_motion __DEFAULT__", "generate_recharge_path normal"}
-    assert active == others | {f"f_generate_search_path {name}" for name in names if name != "fd_unground"}
+    assert active == others | {
+        f"f_generate_search_path {name}" for name in names if name != "fd_unground"
+    }
 
 
 def test_modes_take_their_parameters_from_the_node_over_its_default(write):
@@ -61,7 +69,10 @@ def test_modes_take_their_parameters_from_the_node_over_its_default(write):
         "label": "high",
         "camera": True,
     }
-    assert table.mode("f_generate_search_path", "fd_plain").parameters == {"spiral_altitude": 1.5, "label": "deep"}
+    assert table.mode("f_generate_search_path", "fd_plain").parameters == {
+        "spiral_altitude": 1.5,
+        "label": "deep",
+    }
     assert table.mode("f_generate_search_path", "fd_unground") == Mode("fd_unground", False, {})
 
 
@@ -88,10 +99,13 @@ def test_a_function_of_several_parts_is_active_when_one_is(write):
 def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
     table = read_modes(write("m.yaml", SEARCH))
     with pytest.raises(
-        InputError, match=r"^m\.yaml: .* has no mode 'fd_spiral_hihg' \(did you mean 'fd_spiral_high'\?"
+        InputError,
+        match=r"^m\.yaml: .* has no mode 'fd_spiral_hihg' \(did you mean 'fd_spiral_high'\?",
     ):
         table.mode("f_generate_search_path", "fd_spiral_hihg")
-    with pytest.raises(InputError, match=r"^m\.yaml: there is no function 'f_search' \(.*f_generate_search_path\)"):
+    with pytest.raises(
+        InputError, match=r"^m\.yaml: there is no function 'f_search' \(.*f_generate_search_path\)"
+    ):
         table.modes("f_search")
 
 
@@ -101,19 +115,55 @@ LOW = "low: {ros__parameters: {spiral_altitude: 1}}"
 @pytest.mark.parametrize(
     ("content", "place", "words"),
     [
-        (changed("parts: f_generate_search_path_node", "parts: f_search_node"), "line 4, ", "part 'f_search_node'"),
-        (changed("    parts: f_generate_search_path_node\n", ""), "line 2, ", "ros__parameters.parts: is missing"),
+        (
+            changed("parts: f_generate_search_path_node", "parts: f_search_node"),
+            "line 4, ",
+            "part 'f_search_node'",
+        ),
+        (
+            changed("    parts: f_generate_search_path_node\n", ""),
+            "line 2, ",
+            "ros__parameters.parts: is missing",
+        ),
         (changed("active.low", "active.lwo"), "line 7, ", "has no mode 'lwo' (did you mean 'low'?"),
         (changed("active.low", "true"), "line 7, ", "true is not a state of a node"),
-        (changed("{f_generate_search_path_node: active}", "{f_other: active}"), "line 9, ", "'f_other' is not a part"),
-        (changed("{f_generate_search_path_node: active}", "active"), "line 9, ", "fd_plain: 'active' should be a map"),
-        (changed("spiral_altitude: 3.0", "spiral_altitude: high"), "line 16, ", "'high' should be a number"),
-        (changed("spiral_altitude: 3.0", "spiral_altitude: -3"), "line 16, ", "-3 should be greater than 0"),
-        (changed("spiral_altitude: 3.0", "spiral_altitud: 3.0"), "line ", "nothing reads 'spiral_altitud' (did you"),
+        (
+            changed("{f_generate_search_path_node: active}", "{f_other: active}"),
+            "line 9, ",
+            "'f_other' is not a part",
+        ),
+        (
+            changed("{f_generate_search_path_node: active}", "active"),
+            "line 9, ",
+            "fd_plain: 'active' should be a map",
+        ),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitude: high"),
+            "line 16, ",
+            "'high' should be a number",
+        ),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitude: -3"),
+            "line 16, ",
+            "-3 should be greater than 0",
+        ),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitud: 3.0"),
+            "line ",
+            "nothing reads 'spiral_altitud' (did you",
+        ),
         (changed("camera: true", "camera: .nan"), "line 16, ", ".nan is not a value"),
         (changed(LOW, "low: {spiral_altitude: 1}"), "line 15, ", "(known: ros__parameters"),
-        (changed("type: node", "type: nod"), "line 12, ", "'nod' is not allowed (did you mean 'node'?"),
-        (changed("    type: node\n", "    type: node\n    mods: {}\n"), "line 13, ", "did you mean 'modes'?"),
+        (
+            changed("type: node", "type: nod"),
+            "line 12, ",
+            "'nod' is not allowed (did you mean 'node'?",
+        ),
+        (
+            changed("    type: node\n", "    type: node\n    mods: {}\n"),
+            "line 13, ",
+            "did you mean 'modes'?",
+        ),
         ("f:\n  type: system\n", "line 2, f.type", "(known: ros__parameters"),
         (SEARCH + "f_generate_search_path: {}\n", "line 17, ", "appears twice"),
         ("a: {ros__parameters: {type: node}}\n", "line 1", "defines no function"),

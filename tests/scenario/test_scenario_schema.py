@@ -1,4 +1,6 @@
-"""The JSON Schema accepts what the loader accepts, and the reference page says what the models say."""
+"""The JSON Schema accepts what the loader accepts, and the reference page says what the models
+say.
+"""
 
 import importlib.util
 from pathlib import Path
@@ -44,7 +46,8 @@ def test_the_schema_accepts_the_shipped_scenarios(validator, name):
         HEAD + "signals: {water_visibility: {period_s: 120}}\n",
         HEAD + "signals: {water_visibility: {noise: {distribution: normal, mean: 0, std: 0.1}}}\n",
         "base: paper_table_values\nknowledge: {values: {qa_performance_recover_thrusters: null}}\n",
-        HEAD + "thruster_events: ['(1,failure,35)', '(3, recovery, 50.0)', {thruster: 1, event: failure, time_s: 2}]\n",
+        HEAD
+        + "thruster_events: ['(1,failure,35)', '(3, recovery, 50.0)', {thruster: 1, event: failure, time_s: 2}]\n",
         HEAD + "managers: {'my.module:Manager': {gain: 3}}\n",
         HEAD + "battery: null\n",
     ],
@@ -76,10 +79,14 @@ def test_every_key_has_a_meaning():
 
 
 def test_the_reference_page_is_the_one_that_the_models_give():
-    spec = importlib.util.spec_from_file_location("make_scenario_reference", DOCS / "make_scenario_reference.py")
+    spec = importlib.util.spec_from_file_location(
+        "make_scenario_reference", DOCS / "make_scenario_reference.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     maker = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(maker)
     for name, page in (("scenario.md", maker.page()), ("exemplar-files.md", maker.exemplar_page())):
-        assert (DOCS / "reference" / name).read_text(encoding="utf-8") == page, "run docs/make_scenario_reference.py"
+        assert (DOCS / "reference" / name).read_text(encoding="utf-8") == page, (
+            "run docs/make_scenario_reference.py"
+        )

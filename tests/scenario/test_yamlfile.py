@@ -23,15 +23,28 @@ def refused(path: Path | str) -> str:
 
 
 SCALARS = {
-    **{"1.5": 1.5, "1e3": 1000.0, "-.5": -0.5, "2023": 2023, "010": 10, "true": True, "~": None, "": None},
+    **{
+        "1.5": 1.5,
+        "1e3": 1000.0,
+        "-.5": -0.5,
+        "2023": 2023,
+        "010": 10,
+        "true": True,
+        "~": None,
+        "": None,
+    },
     **{"1:30": "1:30", "2023-02-04": "2023-02-04", "yes": "yes", "'80'": "80"},
 }
 
 
 def test_scalars_follow_the_core_schema(write):
-    document = read_yaml(write("a.yaml", "".join(f"k{number}: {text}\n" for number, text in enumerate(SCALARS))))
+    document = read_yaml(
+        write("a.yaml", "".join(f"k{number}: {text}\n" for number, text in enumerate(SCALARS)))
+    )
     assert list(document.data.values()) == list(SCALARS.values())
-    assert [type(value) for value in document.data.values()] == [type(value) for value in SCALARS.values()]
+    assert [type(value) for value in document.data.values()] == [
+        type(value) for value in SCALARS.values()
+    ]
 
 
 def test_each_key_and_item_has_its_line(write):
@@ -84,7 +97,9 @@ def test_what_is_no_plain_mapping_is_refused_with_its_line(write, content, place
     ],
 )
 def test_a_tag_that_would_build_an_object_is_refused_and_builds_nothing(write, value):
-    assert refused(write("a.yaml", f"x: 1\na: {value}\n")).startswith("a.yaml: line 2, a: the tag '!")
+    assert refused(write("a.yaml", f"x: 1\na: {value}\n")).startswith(
+        "a.yaml: line 2, a: the tag '!"
+    )
     assert not Path("made").exists()
 
 
@@ -95,7 +110,8 @@ def test_a_bomb_of_aliases_is_refused_before_it_is_written_out(write):
 
 
 @pytest.mark.parametrize(
-    "content", ["a: " + "[" * 20_000, "a: " + "{a: " * 20_000, "a: &x [1, *x]\n", "a: &x {b: {c: *x}}\n"]
+    "content",
+    ["a: " + "[" * 20_000, "a: " + "{a: " * 20_000, "a: &x [1, *x]\n", "a: &x {b: {c: *x}}\n"],
 )
 def test_what_is_nested_without_end_is_refused(write, content):
     assert "is nested too deep" in refused(write("a.yaml", content))
@@ -108,8 +124,15 @@ def test_a_large_file_is_refused(write):
 
 
 PLAIN = st.recursive(
-    st.none() | st.booleans() | st.integers(-(10**15), 10**15) | st.floats(-1e9, 1e9) | st.text(string.printable),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text("abcxyz_", min_size=1), inner, max_size=4),
+    st.none()
+    | st.booleans()
+    | st.integers(-(10**15), 10**15)
+    | st.floats(-1e9, 1e9)
+    | st.text(string.printable),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text("abcxyz_", min_size=1), inner, max_size=4)
+    ),
     max_leaves=15,
 )
 
@@ -124,7 +147,10 @@ def test_plain_data_survives_being_written_as_json_and_read(tmp_path_factory, da
     assert read_yaml(path).data == data
 
 
-@given(content=st.binary(max_size=200) | st.text("ab: -[]{},&*!|>'\"#\n\t0.", max_size=60).map(str.encode))
+@given(
+    content=st.binary(max_size=200)
+    | st.text("ab: -[]{},&*!|>'\"#\n\t0.", max_size=60).map(str.encode)
+)
 def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("yaml") / "a.yaml"
     path.write_bytes(content)
@@ -137,7 +163,9 @@ def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory, content):
 
 
 def test_a_table_gives_times_and_values(write):
-    (times_s, values), digest = read_table(write("t.csv", "t_s,value\n0,3.5\n 60 , 1e0\n\n120,-2\n"))
+    (times_s, values), digest = read_table(
+        write("t.csv", "t_s,value\n0,3.5\n 60 , 1e0\n\n120,-2\n")
+    )
     assert times_s == (0.0, 60.0, 120.0)
     assert values == (3.5, 1.0, -2.0)
     assert len(digest) == 64

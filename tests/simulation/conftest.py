@@ -19,7 +19,11 @@ def _shipped(name: str) -> Simulator:
 def _changed(data: dict, changes: dict) -> dict:
     merged = dict(data)
     for key, value in changes.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict) and "distribution" not in value
+        both = (
+            isinstance(value, dict)
+            and isinstance(merged.get(key), dict)
+            and "distribution" not in value
+        )
         merged[key] = _changed(merged[key], value) if both else value
     return merged
 

@@ -15,11 +15,16 @@ MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
 
 
 class Restless(RandomManager):
-    """Picks modes of both functions at all times: often both send set-points; and is wrong about its latency."""
+    """Picks modes of both functions at all times: often both send set-points; and is wrong about
+    its latency.
+    """
 
     def __init__(self, system):
         super().__init__(system)
-        self._functions, self.least_latency_s = ("f_generate_search_path", "f_follow_pipeline"), 20.0
+        self._functions, self.least_latency_s = (
+            ("f_generate_search_path", "f_follow_pipeline"),
+            20.0,
+        )
 
     task_requested = task_cancelled = diagnostic = lambda self, _: None
 
@@ -36,23 +41,40 @@ def normal(std: float) -> dict[str, object]:
 
 
 def faults(*events: tuple[int, str, object]) -> dict[str, object]:
-    return {"thruster_events": [dict(zip(("thruster", "event", "time_s"), each, strict=True)) for each in events]}
+    return {
+        "thruster_events": [
+            dict(zip(("thruster", "event", "time_s"), each, strict=True)) for each in events
+        ]
+    }
 
 
 NOISE = {"signals.water_visibility.noise": normal(0.1)}
-DRAWN_LATENCIES = {"latencies.inference_s": uniform(0.1, 3.0), "latencies.mode_change_s": uniform(0.1, 2.0)}
+DRAWN_LATENCIES = {
+    "latencies.inference_s": uniform(0.1, 3.0),
+    "latencies.mode_change_s": uniform(0.1, 2.0),
+}
 LOST_SET_POINTS = {"revision.set_points.loss_probability": 0.3}
 BATTERY = {"battery": {}, "mission.time_limit_s": 400.0}
 FAILURES = [(1, "failure", 20.0), (3, "failure", 5.0)]
-FAULTS = faults(*FAILURES, (1, "recovery", 15.0), (5, "failure", uniform(40.0, 90.0)), (2, "failure", 60.0))
+FAULTS = faults(
+    *FAILURES, (1, "recovery", 15.0), (5, "failure", uniform(40.0, 90.0)), (2, "failure", 60.0)
+)
 CURRENT = {"current.x_m_per_s": normal(0.08), "current.y_m_per_s": 0.1, "current.z_m_per_s": -0.02}
 FRAMES = {
     "revision.set_points.node_frame_offset_x_m": normal(0.3),
     "revision.set_points.node_frame_offset_z_m": normal(0.2),
 }
 FOLLOW_POLL, SPIRAL = "revision.follow.poll_period_s", "revision.spiral"
-IN_STEP = {"managers.random.adaptation_period_s": 1.0, FOLLOW_POLL: 1.0, "latencies.mode_change_s": 1.7}  # at a poll
-LONG = {"mission.time_limit_s": 600.0, FOLLOW_POLL: 0.5, "revision.set_points.loss_probability": 0.0}
+IN_STEP = {
+    "managers.random.adaptation_period_s": 1.0,
+    FOLLOW_POLL: 1.0,
+    "latencies.mode_change_s": 1.7,
+}  # at a poll
+LONG = {
+    "mission.time_limit_s": 600.0,
+    FOLLOW_POLL: 0.5,
+    "revision.set_points.loss_probability": 0.0,
+}
 MOVED = {f"{SPIRAL}.centre": "activation", f"{SPIRAL}.restarts_on_activation": False}
 CONDITIONS = {
     "as shipped": {},
@@ -63,7 +85,15 @@ CONDITIONS = {
     "faults": FAULTS,
     "current": CURRENT,
     "frame errors": FRAMES,
-    "all of it": {**NOISE, **DRAWN_LATENCIES, **LOST_SET_POINTS, **BATTERY, **FAULTS, **CURRENT, **FRAMES},
+    "all of it": {
+        **NOISE,
+        **DRAWN_LATENCIES,
+        **LOST_SET_POINTS,
+        **BATTERY,
+        **FAULTS,
+        **CURRENT,
+        **FRAMES,
+    },
 }
 
 
@@ -86,7 +116,9 @@ def assert_same(simulator: Simulator, manager: str | type[RandomManager], run: i
         assert effects(simulator, manager, run, record=False) == (plain.metrics, modes)
 
 
-@pytest.mark.parametrize(("name", "condition", "manager"), each_pair(sorted(LOADED), CONDITIONS, MANAGERS))
+@pytest.mark.parametrize(
+    ("name", "condition", "manager"), each_pair(sorted(LOADED), CONDITIONS, MANAGERS)
+)
 def test_looking_ahead_changes_nothing(name, condition, manager):
     """Each cell has a run of its own, so that there are as many different missions."""
     run = 1 + 10 * list(CONDITIONS).index(condition) + MANAGERS.index(manager)
@@ -126,9 +158,13 @@ def test_set_points_may_be_sent_more_often_than_there_are_way_points_left():
     assert_same(Simulator(with_values(LOADED["planta_exp1"], LONG)), "none", 1)
 
 
-@pytest.mark.parametrize("values", [CONDITIONS["all of it"], IN_STEP, MOVED], ids=["all of it", "in step", "moved"])
+@pytest.mark.parametrize(
+    "values", [CONDITIONS["all of it"], IN_STEP, MOVED], ids=["all of it", "in step", "moved"]
+)
 @pytest.mark.parametrize("name", sorted(LOADED))
-def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(name, values):
+def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(
+    name, values
+):
     restless = Simulator(with_values(LOADED[name], values))
     for run in range(1, 21):
         assert_same(restless, Restless, run)

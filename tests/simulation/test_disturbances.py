@@ -1,4 +1,6 @@
-"""Leaks, currents, sensors, thrusters lost for good; and constants of the exemplar that users may vary."""
+"""Leaks, currents, sensors, thrusters lost for good; and constants of the exemplar that users may
+vary.
+"""
 
 import math
 from itertools import pairwise
@@ -18,7 +20,9 @@ LEAK = "base: extended.yaml\nleak: {time_s: 170}\nmetrics: [surfacing_time_s]\n"
 def fly(tmp_path):
     def run(text: str, manager: str = "none", *, record: bool = True) -> MissionResult:
         (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
-        return Simulator(load_scenario(tmp_path / "mine.yaml")).run(manager, run=3, seed=1, record=record)
+        return Simulator(load_scenario(tmp_path / "mine.yaml")).run(
+            manager, run=3, seed=1, record=record
+        )
 
     return run
 
@@ -34,11 +38,15 @@ def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, mana
     assert details(result, "task_requested")[-1] == "surface"
     assert details(result, "mission_ended") == ["the vehicle has surfaced"]
     assert result.trajectory[-1].z_m == pytest.approx(0.0, abs=0.11)
-    assert 170.0 + result.further["surfacing_time_s"] == pytest.approx(result.metrics.mission_duration_s, abs=0.2)
+    assert 170.0 + result.further["surfacing_time_s"] == pytest.approx(
+        result.metrics.mission_duration_s, abs=0.2
+    )
 
 
 def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves(fly):
-    """With all thrusters lost, the vehicle drifts on: over a whole period the mean current, within it up and down."""
+    """With all thrusters lost, the vehicle drifts on: over a whole period the mean current, within
+    it up and down.
+    """
     lost = ", ".join(f'"({thruster},failure,0)"' for thruster in range(1, 7))
     wave = "{mean_m_per_s: 0.05, amplitude_m_per_s: 0.2, period_s: 100, direction_rad: 0.0}"
     result = fly(
@@ -48,20 +56,29 @@ def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves
     )
     x_m = {round(point.t_s): point.x_m for point in result.trajectory}
     assert x_m[210] - x_m[110] == pytest.approx(0.05 * 100, abs=0.5)
-    half = 0.05 * 50 + 0.2 * 100 / math.pi  # the integral over the half in which the sine is positive
+    half = (
+        0.05 * 50 + 0.2 * 100 / math.pi
+    )  # the integral over the half in which the sine is positive
     assert x_m[150] - x_m[100] == pytest.approx(half, rel=0.15)
 
 
-@pytest.mark.parametrize(("manager", "mode"), [("metacontrol", "fd_recover_thrusters"), ("bt", "fd_recover_thrusters")])
+@pytest.mark.parametrize(
+    ("manager", "mode"), [("metacontrol", "fd_recover_thrusters"), ("bt", "fd_recover_thrusters")]
+)
 def test_a_thruster_that_cannot_be_recovered_stays_lost_and_is_not_reported(fly, manager, mode):
     event = "{thruster: 1, event: failure, time_s: 35, recoverable: false}"
-    result = fly(f"base: release15.yaml\nthruster_events: [{event}]\nmetrics: [operational_thrusters]\n", manager)
+    result = fly(
+        f"base: release15.yaml\nthruster_events: [{event}]\nmetrics: [operational_thrusters]\n",
+        manager,
+    )
     reports = details(result, "component_status")
     assert f"f_maintain_motion = {mode}" in details(result, "mode_set")
     assert "c_thruster_2 RECOVERED" in reports
     assert "c_thruster_1 RECOVERED" not in reports
     duration_s = result.metrics.mission_duration_s
-    assert result.further["operational_thrusters"] == pytest.approx(6 - (duration_s - 35.5) / duration_s, abs=0.01)
+    assert result.further["operational_thrusters"] == pytest.approx(
+        6 - (duration_s - 35.5) / duration_s, abs=0.01
+    )
 
 
 def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly):
@@ -69,7 +86,9 @@ def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly):
         "[{thruster: 1, event: failure, time_s: 35, recoverable: false}, {thruster: 1, event: recovery, time_s: 60},"
         " {thruster: 1, event: failure, time_s: 100}]"
     )
-    reports = details(fly(f"base: release15.yaml\nthruster_events: {events}\n", "bt"), "component_status")
+    reports = details(
+        fly(f"base: release15.yaml\nthruster_events: {events}\n", "bt"), "component_status"
+    )
     assert reports.count("c_thruster_1 FALSE") == 2
     assert reports.count("c_thruster_1 RECOVERED") == 2  # by the scenario, and by maintain_motion
 
@@ -96,7 +115,9 @@ def test_a_failed_thruster_whose_report_is_lost_is_not_recovered(fly):
 
 
 def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly):
-    """Whether a mission is recorded, with each message published, or not: the same messages are lost."""
+    """Whether a mission is recorded, with each message published, or not: the same messages are
+    lost.
+    """
     text = (
         "base: extended.yaml\nname: mine\nsignals: {water_visibility: {dropout_probability: 0.3}}\n"
         "battery: {dropout_probability: 0.3}\n"
@@ -113,10 +134,16 @@ def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly):
         ("current: {wave: {period_s: 0}}", "0 should be"),
         ("current: {wave: {amplitude_m_per_s: 50}}", "50 is out of range"),
         ("signals: {water_visibility: {dropout_probability: 2}}", "2 should be"),
-        ("signals: {water_visibility: {outages_s: [[20, 10]]}}", "the outage [20, 10] ends before it begins"),
+        (
+            "signals: {water_visibility: {outages_s: [[20, 10]]}}",
+            "the outage [20, 10] ends before it begins",
+        ),
         ("signals: {water_visibility: {outages_s: [20, 10]}}", "20 should be a list"),
         ("thruster_monitor: {dropout: 1}", "unknown key"),
-        ("thruster_events: [{thruster: 1, event: failure, time_s: 1, recoverable: 3}]", "3 should be a boolean"),
+        (
+            "thruster_events: [{thruster: 1, event: failure, time_s: 1, recoverable: 3}]",
+            "3 should be a boolean",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(fly, line, problem):
@@ -127,14 +154,21 @@ def test_what_cannot_be_is_refused(fly, line, problem):
 
 def flown(manager: str, **values: object) -> MissionResult:
     """One mission of seams2023 with other values, by key path with __ for a dot."""
-    still = {"calibration.altitude_error_m": 0.0, **{path.replace("__", "."): each for path, each in values.items()}}
-    return Simulator(with_values(load_scenario("seams2023"), still)).run(manager, run=1, seed=1, record=True)
+    still = {
+        "calibration.altitude_error_m": 0.0,
+        **{path.replace("__", "."): each for path, each in values.items()},
+    }
+    return Simulator(with_values(load_scenario("seams2023"), still)).run(
+        manager, run=1, seed=1, record=True
+    )
 
 
 @pytest.mark.parametrize("delay_s", [3.0, 20.0])
 def test_a_recovery_takes_as_long_as_the_revision_says(delay_s):
     events = flown("metacontrol", revision__recovery__delay_s=delay_s).events
-    began_s = next(event.t_s for event in events if event.detail == "f_maintain_motion = fd_recover_thrusters")
+    began_s = next(
+        event.t_s for event in events if event.detail == "f_maintain_motion = fd_recover_thrusters"
+    )
     first_s = next(event.t_s for event in events if event.detail == "c_thruster_1 RECOVERED")
     assert first_s - began_s == pytest.approx(delay_s)
 
@@ -147,7 +181,9 @@ def test_the_pipeline_is_followed_at_the_revisions_altitude(altitude_m):
 
 
 def test_weak_thrusters_limit_the_speed():
-    """Full ahead, four horizontal thrusters of F at 45 degrees hold a speed of sqrt(4 F sqrt(1/2) / c)."""
+    """Full ahead, four horizontal thrusters of F at 45 degrees hold a speed of sqrt(4 F sqrt(1/2) /
+    c).
+    """
     weak = flown("none", vehicle__thrust_limit_n=0.2)
     strong = flown("none")
     fastest = [

@@ -1,4 +1,6 @@
-"""Event-triggered managers are called when something has changed; their missions are those of time-triggered ones."""
+"""Event-triggered managers are called when something has changed; their missions are those of
+time-triggered ones.
+"""
 
 from dataclasses import replace
 
@@ -20,7 +22,14 @@ LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
 
 
 def steps(before: float, after: float, time_s: float) -> dict:
-    return {"signals.water_visibility": {"kind": "step", "time_s": time_s, "before": before, "after": after}}
+    return {
+        "signals.water_visibility": {
+            "kind": "step",
+            "time_s": time_s,
+            "before": before,
+            "after": after,
+        }
+    }
 
 
 def failure(time_s: float) -> list[dict]:
@@ -32,9 +41,17 @@ def with_settings(manager: str, **given: object) -> dict:
 
 
 def simulator_of(values: dict, name: str = "seams2023") -> Simulator:
-    """The keys of `values` are paths; that of a manager given as module:Class has dots in its name."""
-    managers = {key.partition(".")[2]: value for key, value in values.items() if key.startswith(f"managers.{OUTSIDE}")}
-    loaded = with_values(LOADED[name], {key: value for key, value in values.items() if "managers.tests" not in key})
+    """The keys of `values` are paths; that of a manager given as module:Class has dots in its
+    name.
+    """
+    managers = {
+        key.partition(".")[2]: value
+        for key, value in values.items()
+        if key.startswith(f"managers.{OUTSIDE}")
+    }
+    loaded = with_values(
+        LOADED[name], {key: value for key, value in values.items() if "managers.tests" not in key}
+    )
     if managers:
         data = loaded.scenario.model_dump(mode="python")
         data["managers"].update(managers)
@@ -53,10 +70,17 @@ EVERY_S = pytest.approx([11.0 + 2.0 * count for count in range(25)], abs=1e-9)
 
 @pytest.mark.parametrize(
     ("manager", "record"),
-    [("EventTriggered", True), ("MayDependOnAnything", False), ("DoesNotDeclare", False), ("NeverIdle", False)],
+    [
+        ("EventTriggered", True),
+        ("MayDependOnAnything", False),
+        ("DoesNotDeclare", False),
+        ("NeverIdle", False),
+    ],
 )
 def test_no_call_is_skipped(manager, record):
-    """Of a recorded mission, of a class that does not say itself what it depends on, after a call that changed much."""
+    """Of a recorded mission, of a class that does not say itself what it depends on, after a call
+    that changed much.
+    """
     assert called_s(steps(2.5, 2.6, 30.0), manager, record=record) == EVERY_S
 
 
@@ -65,7 +89,9 @@ def test_no_call_is_skipped(manager, record):
     [(2.6, []), (3.5, [33.0]), (3.0, [33.0]), (2.0, [33.0]), (1.0, [33.0])],
     ids=["no crossing", "above", "on the upper", "on the lower", "below"],
 )
-def test_it_is_called_at_the_first_of_its_times_after_a_value_has_crossed_a_threshold(value, called):
+def test_it_is_called_at_the_first_of_its_times_after_a_value_has_crossed_a_threshold(
+    value, called
+):
     assert called_s(steps(2.5, value, 31.5)) == called
     is_settled = with_settings("NeverIdle", settled=True)  # its generator returns True
     assert called_s({**steps(2.5, value, 31.5), **is_settled}, "NeverIdle") == called
@@ -97,7 +123,12 @@ def test_thresholds_may_come_from_its_settings():
 
 def test_one_that_depends_on_no_measured_value_is_called_after_its_hooks_alone():
     for events, called in (([], []), (failure(40.0), [41.0])):
-        assert called_s({**steps(2.5, 1.0, 31.5), "thruster_events": events}, "DependsOnNoMeasuredValue") == called
+        assert (
+            called_s(
+                {**steps(2.5, 1.0, 31.5), "thruster_events": events}, "DependsOnNoMeasuredValue"
+            )
+            == called
+        )
 
 
 # Metacontrol
@@ -156,7 +187,9 @@ def test_metacontrol_skips_no_cycle_with(values, calls):
 
 
 def assert_same_missions(simulator: Simulator, manager: str, runs: range) -> None:
-    """Metrics and effects are the same whether the manager is event-triggered or called at each of its times."""
+    """Metrics and effects are the same whether the manager is event-triggered or called at each of
+    its times.
+    """
     has_cache = not manager.startswith(OUTSIDE) or issubclass(manager_class(manager), Metacontrol)
     for run in runs:
         at_each_time = effects(simulator, manager, run, record=True)
@@ -184,7 +217,8 @@ def test_metacontrol_and_what_is_derived_from_it(name, change, manager):
 
 
 def test_metacontrol_skips_no_cycle_while_it_may_have_missed_a_value():
-    # 1.5 m is published before there is an objective, and ignored; 1.6 m, in the same region, is not.
+    # 1.5 m is published before there is an objective, and ignored; 1.6 m, in the same region, is
+    # not.
     values = {
         **steps(1.5, 1.6, 40.0),
         **NO_FAULTS,
@@ -202,7 +236,11 @@ def test_what_a_derived_class_plans_is_its_own():
     before = effects(simulator, "metacontrol", 1, record=False)
     _, found = effects(simulator, f"{OUTSIDE}:PlansLow", 1, record=False)
     searches = [effect for _, effect in found if "= fd_spiral" in effect]
-    assert searches == ["f_generate_search_path = fd_spiral_low"] != [effect for _, effect in before[1]]
+    assert (
+        searches
+        == ["f_generate_search_path = fd_spiral_low"]
+        != [effect for _, effect in before[1]]
+    )
     assert effects(simulator, "metacontrol", 1, record=False) == before
 
 
@@ -222,20 +260,35 @@ CONDITIONS = {
     "battery": {"battery": {"discharge_time_s": 90.0}},
     "short": {"mission.time_limit_s": 20.0},
 }
-FROM_OUTSIDE = ("SearchesAsHighAsItCanSee", "SubscribesToMeasuredValues", "ChangesModesInHooks", "TakesTime")
+FROM_OUTSIDE = (
+    "SearchesAsHighAsItCanSee",
+    "SubscribesToMeasuredValues",
+    "ChangesModesInHooks",
+    "TakesTime",
+)
 
 
-@pytest.mark.parametrize(("period_s", "condition", "manager"), each_pair((0.1, 2.0, 45.0), CONDITIONS, FROM_OUTSIDE))
+@pytest.mark.parametrize(
+    ("period_s", "condition", "manager"), each_pair((0.1, 2.0, 45.0), CONDITIONS, FROM_OUTSIDE)
+)
 def test_outside_managers(period_s, condition, manager):
-    given = with_settings(manager, period_s=period_s, starts_s=0.3 * period_s, takes_s=1.7 * period_s)
-    assert_same_missions(simulator_of({**CONDITIONS[condition], **given}), f"{OUTSIDE}:{manager}", range(1, 3))
+    given = with_settings(
+        manager, period_s=period_s, starts_s=0.3 * period_s, takes_s=1.7 * period_s
+    )
+    assert_same_missions(
+        simulator_of({**CONDITIONS[condition], **given}), f"{OUTSIDE}:{manager}", range(1, 3)
+    )
 
 
-VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(0.5, 4.5)
+VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(
+    0.5, 4.5
+)
 TIMES_S = st.floats(5.0, 110.0)
 SIGNALS = st.one_of(
     st.fixed_dictionaries({"kind": st.just("constant"), "value": VALUES}),
-    st.fixed_dictionaries({"kind": st.just("step"), "before": VALUES, "after": VALUES, "time_s": TIMES_S}),
+    st.fixed_dictionaries(
+        {"kind": st.just("step"), "before": VALUES, "after": VALUES, "time_s": TIMES_S}
+    ),
     st.fixed_dictionaries(
         {
             "kind": st.just("sinusoid"),
@@ -267,7 +320,9 @@ def with_another_signal(name: str) -> LoadedScenario:
     battery=st.none() | st.builds(lambda s: {"discharge_time_s": s}, st.floats(30.0, 300.0)),
 )
 @settings(max_examples=25, deadline=None)
-def test_built_in_managers(name, signal, other, inference_s, mode_change_s, fault_s, run, manager, battery):
+def test_built_in_managers(
+    name, signal, other, inference_s, mode_change_s, fault_s, run, manager, battery
+):
     values = {
         "mission.time_limit_s": 120.0,
         "signals.water_visibility": signal,

@@ -1,4 +1,6 @@
-"""The extended mission: the battery is recharged as the knowledge base says, and the task goes on where it was left."""
+"""The extended mission: the battery is recharged as the knowledge base says, and the task goes on
+where it was left.
+"""
 
 from functools import cache
 from itertools import pairwise
@@ -17,7 +19,9 @@ RECHARGES = pytest.mark.parametrize("manager", ["metacontrol", "bt_extended"])
 
 
 @cache
-def flown(manager: str, run: int = 3, disabled: tuple[str, ...] = (), **values: object) -> MissionResult:
+def flown(
+    manager: str, run: int = 3, disabled: tuple[str, ...] = (), **values: object
+) -> MissionResult:
     loaded = load_scenario("extended", disabled_rules=disabled)
     changed = {path.replace("__", "."): value for path, value in values.items()}
     return Simulator(with_values(loaded, changed)).run(manager, run=run, seed=1, record=True)
@@ -52,32 +56,47 @@ def test_nothing_else_moves_the_vehicle_on_the_way():
 
 def test_the_search_goes_on_around_the_same_centre():
     """With no pipeline to find, the vehicle comes back to where it was, and goes on outwards."""
-    result = flown("metacontrol", pipeline__vertices_m=((500.0, 500.0, -20.0), (510.0, 500.0, -20.0)))
+    result = flown(
+        "metacontrol", pipeline__vertices_m=((500.0, 500.0, -20.0), (510.0, 500.0, -20.0))
+    )
     centre = result.trajectory[0]
     distance_m = [max(abs(p.x_m - centre.x_m), abs(p.y_m - centre.y_m)) for p in result.trajectory]
     on_way = is_on_the_way(result)
     left, back = on_way.index(True), len(on_way) - on_way[::-1].index(True)
     assert distance_m[back] > 10.0
-    assert distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0  # a turn of a minute adds up to 3.5 m
+    assert (
+        distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0
+    )  # a turn of a minute adds up to 3.5 m
 
 
 def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept():
     result = flown("metacontrol", mission__time_limit_s=900.0, battery__discharge_time_s=240.0)
     assert result.metrics.distance_inspected_m > 20.0
     followed = [p for p in result.trajectory if p.mode == "fd_follow_pipeline"]
-    first_leg = [p for p in followed if p.t_s < times_s(result, "battery_crossing", "falls below")[0]]
-    # The second leg begins at the station, and inspects what lies beyond the first: it passes no place twice.
+    first_leg = [
+        p for p in followed if p.t_s < times_s(result, "battery_crossing", "falls below")[0]
+    ]
+    # The second leg begins at the station, and inspects what lies beyond the first: it passes no
+    # place twice.
     assert min(p.x_m for p in followed) < min(p.x_m for p in first_leg) - 3.0
 
 
 def test_the_trees_way_to_the_station_stays_active_and_draws_the_vehicle_back():
-    """The guard on the level halts the sequence that recharges before its last step, as in the exemplar."""
+    """The guard on the level halts the sequence that recharges before its last step, as in the
+    exemplar.
+    """
     result = flown("bt_extended")
-    assert [each.detail for each in result.events if each.event == "mode_set" and "recharge" in each.detail] == [
-        "generate_recharge_path = normal"
-    ]
+    assert [
+        each.detail
+        for each in result.events
+        if each.event == "mode_set" and "recharge" in each.detail
+    ] == ["generate_recharge_path = normal"]
     (recharged_s,) = times_s(result, "battery_crossing", "rises to")
-    assert recharged_s < times_s(result, "mode_set", "f_follow_pipeline = fd_follow_pipeline")[1] < recharged_s + 1.0
+    assert (
+        recharged_s
+        < times_s(result, "mode_set", "f_follow_pipeline = fd_follow_pipeline")[1]
+        < recharged_s + 1.0
+    )
     x_m = [each.x_m for each in result.trajectory if each.t_s > recharged_s]
     assert sum(later > earlier + 0.1 for earlier, later in pairwise(x_m)) > 5
 
@@ -115,7 +134,12 @@ def test_the_mission_ends_at_the_level_that_the_scenario_names(level):
         ("fd_no_recharge", 0.2),
         *(
             pytest.param(*case, marks=pytest.mark.slow)
-            for case in (("fd_recharge", 1.0), ("fd_recharge", 0.2), ("fd_no_recharge", 1.0), ("fd_no_recharge", 0.25))
+            for case in (
+                ("fd_recharge", 1.0),
+                ("fd_recharge", 0.2),
+                ("fd_no_recharge", 1.0),
+                ("fd_no_recharge", 0.25),
+            )
         ),
     ],
 )

@@ -1,4 +1,6 @@
-"""Whole missions: repeatable, common random numbers for every manager, and the facts of the exemplar end to end."""
+"""Whole missions: repeatable, common random numbers for every manager, and the facts of the
+exemplar end to end.
+"""
 
 import math
 from itertools import pairwise
@@ -21,7 +23,9 @@ scenario_names = st.sampled_from(["seams2023", "release15"])
 
 
 def events(result: MissionResult, event: str, detail: str = "") -> list[float]:
-    return [each.t_s for each in result.events if each.event == event and each.detail.startswith(detail)]
+    return [
+        each.t_s for each in result.events if each.event == event and each.detail.startswith(detail)
+    ]
 
 
 # Repeatable
@@ -62,7 +66,9 @@ def test_every_manager_meets_the_same_sea(simulator, scenario, run):
     assert all(other == drawn[0] for other in drawn)
 
 
-NOISY = {"signals": {"water_visibility": {"noise": {"distribution": "normal", "mean": 0.0, "std": 0.1}}}}
+NOISY = {
+    "signals": {"water_visibility": {"noise": {"distribution": "normal", "mean": 0.0, "std": 0.1}}}
+}
 
 
 def test_every_manager_is_told_the_same_measurements(simulator):
@@ -78,7 +84,10 @@ def test_every_manager_is_told_the_same_measurements(simulator):
 def test_another_noise_source_changes_nothing_else(simulator, manager, run):
     noise = {"distribution": "uniform", "minimum": 0.0, "maximum": 1.0}
     salinity = {"signals": {"salinity": {"kind": "constant", "value": 35.0, "noise": noise}}}
-    assert simulator(**salinity).run(manager, run, 5).metrics == simulator().run(manager, run, 5).metrics
+    assert (
+        simulator(**salinity).run(manager, run, 5).metrics
+        == simulator().run(manager, run, 5).metrics
+    )
 
 
 # Metrics
@@ -86,14 +95,18 @@ def test_another_noise_source_changes_nothing_else(simulator, manager, run):
 
 @SCENARIOS
 def test_a_pipeline_not_found_is_searched_until_the_limit_and_not_inspected(simulator, scenario):
-    result = simulator(scenario, signals={"water_visibility": {"minimum": 0.1, "maximum": 0.2}}).run("none", 1, 1)
+    result = simulator(
+        scenario, signals={"water_visibility": {"minimum": 0.1, "maximum": 0.2}}
+    ).run("none", 1, 1)
     assert not result.metrics.pipeline_found and result.metrics.search_time_s == 300.0
     assert result.metrics.distance_inspected_m == 0.0
 
 
 @SCENARIOS
 @pytest.mark.parametrize("manager", ["none", "bt"])
-def test_distance_of_an_undisturbed_inspection_is_the_way_along_some_of_the_path(simulator, scenario, manager):
+def test_distance_of_an_undisturbed_inspection_is_the_way_along_some_of_the_path(
+    simulator, scenario, manager
+):
     metrics = simulator(scenario, **NO_ERRORS).run(manager, 1, 1).metrics
     points = simulator(scenario).points
     first = int(np.argmin(np.abs(points[:, 0] - metrics.detection_x_m)))
@@ -128,11 +141,17 @@ def test_a_failure_too_early_to_take_effect_is_published_all_the_same(simulator)
         changes = {**NO_ERRORS, "revision": {"thruster_failures": failures}}
         return simulator(**changes, mission={"time_limit_s": 80.0}).run("none", 1, 1, record=True)
 
-    whole = simulator(**NO_ERRORS, thruster_events=[], mission={"time_limit_s": 80.0}).run("none", 1, 1, record=True)
+    whole = simulator(**NO_ERRORS, thruster_events=[], mission={"time_limit_s": 80.0}).run(
+        "none", 1, 1, record=True
+    )
     without_effect, failed = way(100.0), way(0.0)
     assert events(without_effect, "component_status", "c_thruster_1 FALSE")
-    assert events(without_effect, "failure_without_effect") and not events(failed, "failure_without_effect")
-    assert without_effect.trajectory[-1].x_m == whole.trajectory[-1].x_m != failed.trajectory[-1].x_m
+    assert events(without_effect, "failure_without_effect") and not events(
+        failed, "failure_without_effect"
+    )
+    assert (
+        without_effect.trajectory[-1].x_m == whole.trajectory[-1].x_m != failed.trajectory[-1].x_m
+    )
 
 
 def test_a_failure_takes_effect_from_the_very_time_on(simulator):
@@ -154,13 +173,23 @@ def test_an_event_or_else_the_revision_says_how_a_thruster_fails(simulator):
         made = simulator(**changes, thruster_events=failing, mission={"time_limit_s": 80.0})
         return [(each.x_m, each.y_m) for each in made.run("none", 1, 1, record=True).trajectory]
 
-    assert way("frozen") == way("dead", failure_mode="frozen") != way("dead") == way("frozen", failure_mode="dead")
+    assert (
+        way("frozen")
+        == way("dead", failure_mode="frozen")
+        != way("dead")
+        == way("frozen", failure_mode="dead")
+    )
 
 
 def test_a_nodes_frame_error_shifts_where_the_vehicle_goes(simulator):
     def altitude(offset_m: float) -> float:
         changes = {**NO_ERRORS, "revision": {"set_points": {"node_frame_offset_z_m": offset_m}}}
-        return simulator(**changes, mission={"time_limit_s": 40.0}).run("none", 1, 1, record=True).trajectory[-1].z_m
+        return (
+            simulator(**changes, mission={"time_limit_s": 40.0})
+            .run("none", 1, 1, record=True)
+            .trajectory[-1]
+            .z_m
+        )
 
     assert altitude(0.3) - altitude(0.0) == pytest.approx(0.3, abs=0.02)
 
@@ -171,10 +200,18 @@ class ReasoningTree(BehaviourTree):
     needs_knowledge = True
 
 
-@pytest.mark.parametrize(("inference_s", "share"), [(0.5, 0.25), (1.0, 0.5), (5.0, 1.0), ((0.5, 1.5), 0.5)])
-def test_the_reasoner_slows_the_world_down_in_proportion_to_its_share_of_the_time(simulator, inference_s, share):
+@pytest.mark.parametrize(
+    ("inference_s", "share"), [(0.5, 0.25), (1.0, 0.5), (5.0, 1.0), ((0.5, 1.5), 0.5)]
+)
+def test_the_reasoner_slows_the_world_down_in_proportion_to_its_share_of_the_time(
+    simulator, inference_s, share
+):
     if isinstance(inference_s, tuple):
-        inference_s = {"distribution": "uniform", "minimum": inference_s[0], "maximum": inference_s[1]}
+        inference_s = {
+            "distribution": "uniform",
+            "minimum": inference_s[0],
+            "maximum": inference_s[1],
+        }
 
     def flown(kind: type[BehaviourTree], **calibration: float) -> list[TrajectoryPoint]:
         latencies = {"inference_s": inference_s}  # in metacontrol's period of 2 s
@@ -183,11 +220,17 @@ def test_the_reasoner_slows_the_world_down_in_proportion_to_its_share_of_the_tim
 
     slower = flown(ReasoningTree, reasoning_slowdown=0.4)
     assert slower == flown(BehaviourTree, real_time_factor_loss=0.4 * share)
-    assert flown(BehaviourTree, reasoning_slowdown=0.4) == flown(BehaviourTree, reasoning_slowdown=0.0) != slower
+    assert (
+        flown(BehaviourTree, reasoning_slowdown=0.4)
+        == flown(BehaviourTree, reasoning_slowdown=0.0)
+        != slower
+    )
 
 
 @pytest.mark.parametrize("scenario", ["release15", "seams2023"])
-def test_a_recovery_goes_on_over_the_end_of_the_search_in_2023_and_begins_anew_in_15(simulator, scenario):
+def test_a_recovery_goes_on_over_the_end_of_the_search_in_2023_and_begins_anew_in_15(
+    simulator, scenario
+):
     def mission(failure_s: float) -> MissionResult:
         faults = [{"thruster": 1, "event": "failure", "time_s": failure_s}]
         return simulator(scenario, **NO_ERRORS, thruster_events=faults).run("bt", 1, 1, record=True)

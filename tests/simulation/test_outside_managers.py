@@ -1,4 +1,6 @@
-"""User-defined managers, given as module:Class: what happens when they fail, and that missions are freed."""
+"""User-defined managers, given as module:Class: what happens when they fail, and that missions are
+freed.
+"""
 
 import gc
 
@@ -12,28 +14,40 @@ from tests.helpers.outside_managers import Counted
 QUIET = {"calibration": {"altitude_error_m": 0.0, "reasoning_slowdown": 0.0}}
 
 
-def mission(simulator, manager: str, scenario: str = "seams2023", **changes: object) -> MissionResult:
+def mission(
+    simulator, manager: str, scenario: str = "seams2023", **changes: object
+) -> MissionResult:
     return simulator(scenario, **changes).run(f"{OUTSIDE}:{manager}", 1, 1, record=True)
 
 
 def times_of(result: MissionResult, event: str, detail: str = "") -> list[float]:
-    return [each.t_s for each in result.events if each.event == event and each.detail.startswith(detail)]
+    return [
+        each.t_s for each in result.events if each.event == event and each.detail.startswith(detail)
+    ]
 
 
 def test_adapt_is_called_every_period_and_may_let_mission_time_pass(simulator):
     result = mission(simulator, "Deliberate")
     assert times_of(result, "thinks")[:4] == pytest.approx([1.0, 3.0, 5.0, 7.0])
-    assert times_of(result, "mode_requested", "f_generate_search_path -> fd_spiral_high")[0] == pytest.approx(1.5)
-    assert times_of(result, "mode_set", "f_generate_search_path = fd_spiral_high")[0] == pytest.approx(2.0)
+    assert times_of(result, "mode_requested", "f_generate_search_path -> fd_spiral_high")[
+        0
+    ] == pytest.approx(1.5)
+    assert times_of(result, "mode_set", "f_generate_search_path = fd_spiral_high")[
+        0
+    ] == pytest.approx(2.0)
 
 
 def test_a_call_that_would_come_during_an_earlier_one_is_left_out(simulator):
     settings = {"managers": {f"{OUTSIDE}:Deliberate": {"takes_s": 5.0}}}
-    assert times_of(mission(simulator, "Deliberate", **settings), "thinks")[:4] == pytest.approx([1.0, 7.0, 13.0, 19.0])
+    assert times_of(mission(simulator, "Deliberate", **settings), "thinks")[:4] == pytest.approx(
+        [1.0, 7.0, 13.0, 19.0]
+    )
 
 
 def test_adapt_may_handle_the_failure_of_an_event_that_it_waits_for(simulator):
-    assert times_of(mission(simulator, "HandlesFailures"), "handles", "lost")[:2] == pytest.approx([1.0, 3.0])
+    assert times_of(mission(simulator, "HandlesFailures"), "handles", "lost")[:2] == pytest.approx(
+        [1.0, 3.0]
+    )
 
 
 def test_an_outside_manager_can_complete_the_mission(simulator):
@@ -41,7 +55,9 @@ def test_an_outside_manager_can_complete_the_mission(simulator):
 
 
 def test_it_gets_measured_values_and_components(simulator):
-    received = [each.detail for each in mission(simulator, "Observer").events if each.event == "received"]
+    received = [
+        each.detail for each in mission(simulator, "Observer").events if each.event == "received"
+    ]
     assert received[0] == "water_visibility 3.75" and "c_thruster_1 FALSE" in received
 
 
@@ -79,14 +95,49 @@ def failure(simulator, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("body", "cause", "earliest_s", "latest_s"),
     [
-        ("def __init__(self, system): raise RuntimeError('at launch')", "RuntimeError: at launch", 0.0, 0.0),
-        ("def task_requested(self, task): raise KeyError('no task')", "KeyError: 'no task'", 0.0, 0.0),
-        ("def task_cancelled(self, task): raise ValueError('no stop')", "ValueError: no stop", 300.0, 300.5),
-        ("def diagnostic(self, diagnostic): 1 / (diagnostic.value != 'FALSE')", "ZeroDivisionError: ", 35.0, 36.0),
+        (
+            "def __init__(self, system): raise RuntimeError('at launch')",
+            "RuntimeError: at launch",
+            0.0,
+            0.0,
+        ),
+        (
+            "def task_requested(self, task): raise KeyError('no task')",
+            "KeyError: 'no task'",
+            0.0,
+            0.0,
+        ),
+        (
+            "def task_cancelled(self, task): raise ValueError('no stop')",
+            "ValueError: no stop",
+            300.0,
+            300.5,
+        ),
+        (
+            "def diagnostic(self, diagnostic): 1 / (diagnostic.value != 'FALSE')",
+            "ZeroDivisionError: ",
+            35.0,
+            36.0,
+        ),
         ("def adapt(self): raise ValueError('not now')", "ValueError: not now", 12.0, 12.0),
-        ("def adapt(self): yield self.system.env.timeout(2.5); raise ValueError('later')", "ValueError: ", 14.5, 14.5),
-        ("def adapt(self): yield self.system.env.event().fail(LookupError('lost'))", "LookupError: lost", 12.0, 12.0),
-        ("def adapt(self): raise type('E', (Exception,), {'__str__': len})", "E: its text cannot be made", 12.0, 12.0),
+        (
+            "def adapt(self): yield self.system.env.timeout(2.5); raise ValueError('later')",
+            "ValueError: ",
+            14.5,
+            14.5,
+        ),
+        (
+            "def adapt(self): yield self.system.env.event().fail(LookupError('lost'))",
+            "LookupError: lost",
+            12.0,
+            12.0,
+        ),
+        (
+            "def adapt(self): raise type('E', (Exception,), {'__str__': len})",
+            "E: its text cannot be made",
+            12.0,
+            12.0,
+        ),
         ("def adapt(self): yield 1.0", "TypeError: adapt yielded 1.0", 12.0, 12.0),
         ("period_s = 0.0", "ValueError: period_s is 0.0", 0.0, 0.0),
         ("least_latency_s = -1.0", "ValueError: least_latency_s is -1.0", 0.0, 0.0),
@@ -97,7 +148,9 @@ def failure(simulator, tmp_path, monkeypatch):
         ),
     ],
 )
-def test_what_a_manager_raises_names_manager_run_and_time(failure, body, cause, earliest_s, latest_s):
+def test_what_a_manager_raises_names_manager_run_and_time(
+    failure, body, cause, earliest_s, latest_s
+):
     error = failure(body)
     assert error.manager.endswith(":Mine") and error.run == 4
     assert earliest_s <= error.time_s <= latest_s

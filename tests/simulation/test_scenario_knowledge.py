@@ -1,4 +1,6 @@
-"""What a scenario says of its knowledge base and only the ontology can judge: refused with file, line and key path."""
+"""What a scenario says of its knowledge base and only the ontology can judge: refused with file,
+line and key path.
+"""
 
 import shutil
 from pathlib import Path
@@ -38,8 +40,16 @@ def refused(content: str, **options: object) -> InputError:
             "line 5, knowledge.values.qa_water_visibilty_high",
             "did you mean qa_water_visibility_high?",
         ),
-        ("  values: {c_thruster_1: 1}\n", "line 3, knowledge.values.c_thruster_1", "known: qa_performance_all_thrust"),
-        ("  disabled_rules: [S1a, QAWaterVisibilty]\n", "line 3, knowledge.disabled_rules[1]", "did you mean"),
+        (
+            "  values: {c_thruster_1: 1}\n",
+            "line 3, knowledge.values.c_thruster_1",
+            "known: qa_performance_all_thrust",
+        ),
+        (
+            "  disabled_rules: [S1a, QAWaterVisibilty]\n",
+            "line 3, knowledge.disabled_rules[1]",
+            "did you mean",
+        ),
     ],
 )
 def test_what_the_ontology_does_not_have_is_told_with_its_place(content, place, remedy):
@@ -73,7 +83,14 @@ def test_missions_are_those_with_the_operator_written_in(tmp_path, caplog):
     assert "<tomasys:qa_comparison_operator" not in owl.read_text(encoding="utf-8")
     loaded = load_scenario("seams2023", ontologies=[owl])
     check_inputs([loaded], ["metacontrol"], {})
-    assert caplog.text.count("water_visibility has no qa_comparison_operator in the ontologies: < is assumed") == 1
+    assert (
+        caplog.text.count(
+            "water_visibility has no qa_comparison_operator in the ontologies: < is assumed"
+        )
+        == 1
+    )
     without, with_operator = Simulator(loaded), Simulator(load_scenario("seams2023"))
     for run in range(1, 4):
-        assert without.run("metacontrol", run, 1, record=True) == with_operator.run("metacontrol", run, 1, record=True)
+        assert without.run("metacontrol", run, 1, record=True) == with_operator.run(
+            "metacontrol", run, 1, record=True
+        )

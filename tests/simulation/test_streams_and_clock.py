@@ -29,7 +29,9 @@ def test_a_stream_does_not_depend_on_which_others_exist(name, others):
     assert draws(streams, name) == draws(Streams(1, 1), name)
 
 
-@pytest.mark.parametrize(("seed", "run", "name"), [(2, 1, "a"), (1, 2, "a"), (1, 1, "b")], ids=["seed", "run", "name"])
+@pytest.mark.parametrize(
+    ("seed", "run", "name"), [(2, 1, "a"), (1, 2, "a"), (1, 1, "b")], ids=["seed", "run", "name"]
+)
 def test_another_seed_run_or_name_is_another_stream(seed, run, name):
     assert draws(Streams(seed, run), name) != draws(Streams(1, 1), "a")
 
@@ -39,13 +41,16 @@ def test_streams_are_the_same_on_every_machine():
 
 
 @pytest.mark.parametrize(
-    ("t_s", "tick_s"), [(0.0, 0.3), (0.3, 0.3), (0.31, 1.3), (1.3, 1.3), (1.3 + 1e-12, 1.3), (7.2, 7.3), (-4.0, 0.3)]
+    ("t_s", "tick_s"),
+    [(0.0, 0.3), (0.3, 0.3), (0.31, 1.3), (1.3, 1.3), (1.3 + 1e-12, 1.3), (7.2, 7.3), (-4.0, 0.3)],
 )
 def test_first_tick_not_before_a_time(t_s, tick_s):
     assert tick_at_or_after(t_s, 0.3, 1.0) == pytest.approx(tick_s)
 
 
-@given(st.floats(0.0, 1000.0), st.floats(0.0, 10.0), st.sampled_from([0.1, 0.2, 0.5, 1.0, 2.0, 15.0]))
+@given(
+    st.floats(0.0, 1000.0), st.floats(0.0, 10.0), st.sampled_from([0.1, 0.2, 0.5, 1.0, 2.0, 15.0])
+)
 def test_the_next_tick_is_within_a_period(t_s, phase_s, period_s):
     tick_s = tick_at_or_after(t_s, phase_s, period_s)
     assert -1e-6 <= tick_s - t_s <= max(period_s, phase_s - t_s) + 1e-6

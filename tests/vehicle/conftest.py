@@ -12,10 +12,16 @@ MakeVehicle = Callable[..., Vehicle]
 
 @pytest.fixture(scope="session")
 def make_vehicle() -> MakeVehicle:
-    """Makes a BlueROV2 at (0, 0, -18), at rest, unless told otherwise; `lost` thrusters give no thrust from t = 0."""
+    """Makes a BlueROV2 at (0, 0, -18), at rest, unless told otherwise; `lost` thrusters give no
+    thrust from t = 0.
+    """
 
     def make(
-        start: Pose = START, duration_s: float = 150.0, *, lost: tuple[int, ...] = (), **options: object
+        start: Pose = START,
+        duration_s: float = 150.0,
+        *,
+        lost: tuple[int, ...] = (),
+        **options: object,
     ) -> Vehicle:
         vehicle = Vehicle(BLUEROV2, Autopilot(), start, duration_s, **options)  # type: ignore[arg-type]
         for thruster in lost:

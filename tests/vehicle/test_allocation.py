@@ -17,7 +17,8 @@ SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
 @pytest.mark.parametrize(
     ("thruster", "wrench"),
     [
-        # Moments worked out by hand, r x F: yaw = x Fy - y Fx for the horizontal ones, roll = y Fz for the vertical.
+        # Moments worked out by hand, r x F: yaw = x Fy - y Fx for the horizontal ones, roll = y Fz
+        # for the vertical.
         (1, (-S, -S, 0.0, 0.0, 0.0, -0.232 * S)),
         (2, (-S, S, 0.0, 0.0, 0.0, 0.232 * S)),
         (3, (S, -S, 0.0, 0.0, 0.0, 0.242 * S)),
@@ -61,10 +62,14 @@ def test_autopilot_commands_a_lost_thruster_as_if_it_worked(make_vehicle, lost):
 
 def test_thrust_is_limited(make_vehicle):
     vehicle = make_vehicle()
-    vehicle.track[0, kernel.VELOCITY][SURGE] = -40.0  # the velocity loop asks for far more than there is
+    vehicle.track[0, kernel.VELOCITY][
+        SURGE
+    ] = -40.0  # the velocity loop asks for far more than there is
     vehicle.command(0.0, 10.0, 0.0, -18.0)
     vehicle.look_ahead(1)
     drag_alone = -40.0 / (1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg)
     push = 4.0 * S * BLUEROV2.thrust_limit_n / BLUEROV2.mass_kg * STEP_S
-    with_push = (-40.0 + push) / (1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg)
+    with_push = (-40.0 + push) / (
+        1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg
+    )
     assert drag_alone < vehicle.track[1, kernel.VELOCITY][SURGE] == pytest.approx(with_push)

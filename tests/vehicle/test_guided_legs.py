@@ -1,4 +1,6 @@
-"""Legs of the guided controller, and when changes of control act: from their own time on, to the last bit."""
+"""Legs of the guided controller, and when changes of control act: from their own time on, to the
+last bit.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +14,10 @@ from tests.helpers.stand_ins import BLUEROV2, nu
 
 START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
 STIFF = Autopilot(
-    jerk_m_per_s3=1.0, position_gain_per_s=3.0, velocity_gain_per_s=10.0, velocity_integral_gain_per_s2=0.0
+    jerk_m_per_s3=1.0,
+    position_gain_per_s=3.0,
+    velocity_gain_per_s=10.0,
+    velocity_integral_gain_per_s2=0.0,
 )
 TO_HALF_A_METRE = (0.5, 0.0, -18.0)
 
@@ -23,17 +28,25 @@ def leg_start(vehicle: Vehicle, t_s: float) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize(("distance_m", "time_s"), [(0.1, 1.474), (0.3, 2.125), (0.5, 2.520)])
-def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over_two_jerks(distance_m, time_s):
-    """At its half time the target is half-way; a stiff vehicle is close behind it, and at the end stands at the end."""
+def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over_two_jerks(
+    distance_m, time_s
+):
+    """At its half time the target is half-way; a stiff vehicle is close behind it, and at the end
+    stands at the end.
+    """
     vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
     vehicle.command(0.0, distance_m, 0.0, -18.0)
     assert vehicle.position(time_s / 2)[0] == pytest.approx(distance_m / 2, rel=0.2)
     assert vehicle.position(time_s + 1.0)[0] == pytest.approx(distance_m, rel=0.06)
-    assert 4.0 * vehicle.track[row_at(time_s), kernel.LEG_QUARTER] == pytest.approx(time_s, abs=1e-3)
+    assert 4.0 * vehicle.track[row_at(time_s), kernel.LEG_QUARTER] == pytest.approx(
+        time_s, abs=1e-3
+    )
 
 
 def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point():
-    """Where the four parts of the leg meet, way and speed go on; the speed is greatest in the middle."""
+    """Where the four parts of the leg meet, way and speed go on; the speed is greatest in the
+    middle.
+    """
     vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
     vehicle.command(0.0, *TO_HALF_A_METRE)
     vehicle.look_ahead(row_at(5.0))
@@ -50,7 +63,9 @@ def test_an_interrupted_leg_starts_anew_from_the_stopping_point():
     x_m, y_m, z_m = vehicle.position(2.0)
     u_m_per_s = nu(vehicle, 2.0)[0]
     vehicle.command(2.0, 3.0, 1.0, -18.0)
-    assert leg_start(vehicle, 2.1) == pytest.approx((x_m + u_m_per_s, y_m, z_m), abs=1e-3)  # the position gain is 1 / s
+    assert leg_start(vehicle, 2.1) == pytest.approx(
+        (x_m + u_m_per_s, y_m, z_m), abs=1e-3
+    )  # the position gain is 1 / s
 
 
 def test_an_interrupted_leg_loses_the_integral():
@@ -114,8 +129,12 @@ def test_reading_at_any_times_changes_no_bit(make_vehicle, plan, readings):
 @given(st.lists(commands | faults, max_size=5), st.integers(0, 800))
 def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan, ahead):
     foresighted = make_vehicle(duration_s=DURATION_S)
-    foresighted.track_listeners.append(lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
-    assert np.array_equal(carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, []))
+    foresighted.track_listeners.append(
+        lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row))
+    )
+    assert np.array_equal(
+        carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, [])
+    )
 
 
 def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle):
@@ -134,4 +153,6 @@ def test_a_time_belongs_to_the_nearest_row(row, offset):
 
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
 def test_euler_angles_come_back_from_the_quaternion(roll, pitch, yaw):
-    assert euler_angles(np.array(quaternion(roll, pitch, yaw))) == pytest.approx((roll, pitch, yaw), abs=1e-6)
+    assert euler_angles(np.array(quaternion(roll, pitch, yaw))) == pytest.approx(
+        (roll, pitch, yaw), abs=1e-6
+    )

@@ -1,4 +1,6 @@
-"""The vehicle in the water: where it gets to, in which time, and what lost thrusters and currents do to it."""
+"""The vehicle in the water: where it gets to, in which time, and what lost thrusters and currents
+do to it.
+"""
 
 import math
 
@@ -109,7 +111,9 @@ def test_the_current_carries_it(make_vehicle):
 # Sea bed and surface
 
 
-@pytest.mark.parametrize(("z_m", "limit_m"), [(-25.0, -20.0), (3.0, 0.0)], ids=["sea bed", "surface"])
+@pytest.mark.parametrize(
+    ("z_m", "limit_m"), [(-25.0, -20.0), (3.0, 0.0)], ids=["sea bed", "surface"]
+)
 def test_vehicle_stays_in_the_water(make_vehicle, z_m, limit_m):
     vehicle = make_vehicle(z_limits_m=(-20.0, 0.0))
     vehicle.command(0.0, 0.0, 0.0, z_m)
@@ -119,7 +123,9 @@ def test_vehicle_stays_in_the_water(make_vehicle, z_m, limit_m):
 # Numerics
 
 
-@pytest.mark.parametrize("nu", [(0, 0, 0, 80, 0, 0), (0, 0, 0, 0, -80, 60), (30, -30, 30, 50, 50, 50)])
+@pytest.mark.parametrize(
+    "nu", [(0, 0, 0, 80, 0, 0), (0, 0, 0, 0, -80, 60), (30, -30, 30, 50, 50, 50)]
+)
 def test_a_wild_spin_dies_out(make_vehicle, nu):
     vehicle = make_vehicle()
     vehicle.track[0, kernel.VELOCITY] = nu
@@ -130,19 +136,26 @@ def test_turning_about_two_axes_turns_it_about_the_third(make_vehicle):
     vehicle, omega = make_vehicle(lost=ALL), np.array([3.0, -4.0, 2.0])
     vehicle.track[0, kernel.VELOCITY][3:] = omega
     inertia, drag = np.array(BLUEROV2.inertia_kg_m2), np.array(BLUEROV2.quadratic_drag[3:])
-    # Euler's equations: I omega' = -omega x (I omega) - drag, the drag taken at the end of the step.
+    # Euler's equations: I omega' = -omega x (I omega) - drag, the drag taken at the end of the
+    # step.
     turned = omega - STEP_S * np.cross(omega, inertia * omega) / inertia
     expected = turned / (1.0 + STEP_S * drag * np.abs(omega) / inertia)
     assert nu(vehicle, STEP_S)[3:] == pytest.approx(expected)
 
 
 def test_moving_while_turning_feels_the_coriolis_force(make_vehicle):
-    vehicle, v, omega = make_vehicle(lost=ALL), np.array([0.3, 0.2, -0.1]), np.array([0.5, -0.4, 1.0])
+    vehicle, v, omega = (
+        make_vehicle(lost=ALL),
+        np.array([0.3, 0.2, -0.1]),
+        np.array([0.5, -0.4, 1.0]),
+    )
     vehicle.track[0, kernel.VELOCITY] = (*v, *omega)
     mass, drag = BLUEROV2.mass_kg, np.array(BLUEROV2.quadratic_drag[:3])
     net_buoyancy = np.array([0.0, 0.0, NET_BUOYANCY_N])
     pushed = v + STEP_S * (net_buoyancy / mass - np.cross(omega, v))
-    assert nu(vehicle, STEP_S)[:3] == pytest.approx(pushed / (1.0 + STEP_S * drag * np.abs(v) / mass))
+    assert nu(vehicle, STEP_S)[:3] == pytest.approx(
+        pushed / (1.0 + STEP_S * drag * np.abs(v) / mass)
+    )
 
 
 def test_slower_simulated_world_shows_the_same_motion_later(make_vehicle):
@@ -157,8 +170,8 @@ def test_nothing_is_read_beyond_the_missions_end(make_vehicle):
         make_vehicle(duration_s=10.0).position(20.0)
 
 
-# The BlueROV2's constants, by numbers worked out by hand from the exemplar's description of it (kas-lab/suave): not
-# read from the vehicle file, so that a slip there, or in the model, shows.
+# The BlueROV2's constants, by numbers worked out by hand from the exemplar's description of it
+# (kas-lab/suave): not read from the vehicle file, so that a slip there, or in the model, shows.
 
 FULL_THRUST = Autopilot(10.0, 100.0, 100.0, 0.15)
 """Demands more than the thrusters give."""
@@ -170,7 +183,8 @@ FULL_THRUST = Autopilot(10.0, 100.0, 100.0, 0.15)
         # Four thrusters of 50 N at 45 degrees give 141.42 N: sqrt(141.42 / 33.732).
         ((1e4, 0.0, -18.0), 0, 2.0475),
         ((-1e4, 0.0, -18.0), 0, -2.0475),
-        # Two vertical ones give 100 N, buoyancy 998 * 0.01004029 * 9.80665 = 98.265 N, less the weight 98.067 N.
+        # Two vertical ones give 100 N, buoyancy 998 * 0.01004029 * 9.80665 = 98.265 N, less the
+        # weight 98.067 N.
         ((0.0, 0.0, 1e4), 2, 1.1698),  # sqrt(100.198 / 73.225)
         ((0.0, 0.0, -1e4), 2, -1.1675),  # sqrt(99.802 / 73.225)
     ],
@@ -190,15 +204,20 @@ def test_its_greatest_speeds_follow_from_thrust_and_drag(way, component, speed_m
     ],
     ids=["surge", "sway", "yaw"],
 )
-def test_without_thrust_it_slows_down_as_mass_inertia_and_drag_say(make_vehicle, component, after_s, speed):
+def test_without_thrust_it_slows_down_as_mass_inertia_and_drag_say(
+    make_vehicle, component, after_s, speed
+):
     vehicle = make_vehicle(lost=ALL)
-    vehicle.track[0, kernel.VELOCITY][component] = 1.0  # v' = -(c / m) v |v| gives v = 1 / (1 + c t / m)
+    vehicle.track[0, kernel.VELOCITY][component] = (
+        1.0  # v' = -(c / m) v |v| gives v = 1 / (1 + c t / m)
+    )
     assert nu(vehicle, after_s)[component] == pytest.approx(speed, rel=0.01)
 
 
 @pytest.mark.parametrize(
     ("tilt", "period_s"),
-    # The righting moment 98.265 N * 0.049 m = 4.815 N m swings it like a pendulum: 2 pi sqrt(I / 4.815).
+    # The righting moment 98.265 N * 0.049 m = 4.815 N m swings it like a pendulum: 2 pi sqrt(I /
+    # 4.815).
     [((0.01, 0.0), 0.9009), ((0.0, 0.01), 1.2081)],
     ids=["roll: I 0.099 kg m^2", "pitch: I 0.178 kg m^2"],
 )
@@ -208,5 +227,7 @@ def test_tilted_it_swings_with_the_period_of_its_inertia(make_vehicle, tilt, per
     poses = [vehicle.pose(t_s) for t_s in times_s.tolist()]
     angles = np.array([pose.roll_rad if tilt[0] else pose.pitch_rad for pose in poses])
     downward = np.flatnonzero((angles[:-1] > 0.0) & (angles[1:] <= 0.0))
-    crossings_s = times_s[downward] + STEP_S * angles[downward] / (angles[downward] - angles[downward + 1])
+    crossings_s = times_s[downward] + STEP_S * angles[downward] / (
+        angles[downward] - angles[downward + 1]
+    )
     assert np.diff(crossings_s).mean() == pytest.approx(period_s, rel=0.02)

@@ -14,7 +14,9 @@ BOUNDS = tuple(POINTS.min(axis=0).tolist()), tuple(POINTS.max(axis=0).tolist())
 HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
 
 
-def above(index: int, height_m: float, dx_m: float = 0.0, dy_m: float = 0.0) -> tuple[float, float, float]:
+def above(
+    index: int, height_m: float, dx_m: float = 0.0, dy_m: float = 0.0
+) -> tuple[float, float, float]:
     x, y, z = POINTS[index]
     return float(x) + dx_m, float(y) + dy_m, float(z) + height_m
 
@@ -23,7 +25,9 @@ def test_pipeline_has_100_points():
     assert POINTS.shape == (100, 3)
 
 
-@pytest.mark.parametrize(("index", "vertex"), [(19, (-25.0, 0.0)), (59, (-37.41, -1.0)), (99, (-51.56, -15.14))])
+@pytest.mark.parametrize(
+    ("index", "vertex"), [(19, (-25.0, 0.0)), (59, (-37.41, -1.0)), (99, (-51.56, -15.14))]
+)
 def test_each_piece_ends_with_its_last_vertex(index, vertex):
     assert POINTS[index, :2] == pytest.approx(vertex)
 
@@ -41,7 +45,9 @@ def test_view_is_a_square_of_half_width_h_tan_30(dx_m, dy_m, seen):
 
 @pytest.mark.parametrize(("visibility_m", "seen"), [(1.999, False), (2.0, True), (2.001, True)])
 def test_point_is_visible_up_to_the_water_visibility(visibility_m, seen):
-    assert (first_point_in_view(*above(30, 2.0), visibility_m, POINTS, HALF_WIDTH_AT_1_M) >= 0) is seen
+    assert (
+        first_point_in_view(*above(30, 2.0), visibility_m, POINTS, HALF_WIDTH_AT_1_M) >= 0
+    ) is seen
 
 
 def test_lowest_index_of_the_points_in_view_counts():
@@ -54,7 +60,9 @@ def test_without_a_measurement_nothing_is_seen():
 
 
 def test_height_of_the_detected_points_narrows_the_view():
-    raised = POINTS + np.array([0.0, 0.0, 0.75])  # revision 2023: 0.25 m below a vehicle at 1 m altitude
+    raised = POINTS + np.array(
+        [0.0, 0.0, 0.75]
+    )  # revision 2023: 0.25 m below a vehicle at 1 m altitude
     camera = above(30, 1.0, dy_m=0.2)
     assert first_point_in_view(*camera, 3.0, POINTS, HALF_WIDTH_AT_1_M) >= 0
     assert first_point_in_view(*camera, 3.0, raised, HALF_WIDTH_AT_1_M) == -1
@@ -74,20 +82,31 @@ def test_first_detection_is_the_first_row_with_a_point_in_view():
         for row, position in enumerate(track)
         if (point := first_point_in_view(*position, 3.0, POINTS, HALF_WIDTH_AT_1_M)) >= 0
     )
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M) == expected
+    assert (
+        first_detection(
+            track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M
+        )
+        == expected
+    )
 
 
 def test_first_detection_waits_for_the_visibility():
     track = line_of_positions(0.0)
     visibility = np.array([3.0, 250.0]), np.array([1.0, 2.5])
-    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M)[0] == 250
+    assert (
+        first_detection(
+            track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M
+        )[0]
+        == 250
+    )
 
 
 PAPER = sinusoid(80.0, 1.25, 3.75)
 
 
 @pytest.mark.parametrize(
-    ("t_s", "value"), [(0.0, 3.75), (20.0, 2.5), (40.0, 1.25), (60.0, 2.5), (80.0, 3.75), (240.0, 3.75)]
+    ("t_s", "value"),
+    [(0.0, 3.75), (20.0, 2.5), (40.0, 1.25), (60.0, 2.5), (80.0, 3.75), (240.0, 3.75)],
 )
 def test_sinusoid_starts_at_its_maximum(t_s, value):
     assert PAPER(t_s) == pytest.approx(value)
@@ -105,7 +124,9 @@ def test_step_has_its_new_value_from_its_time_on():
 TIMES, VALUES = (0.0, 10.0, 20.0), (1.0, 3.0, 2.0)
 
 
-@pytest.mark.parametrize(("t_s", "value"), [(-5.0, 1.0), (0.0, 1.0), (9.9, 1.0), (10.0, 3.0), (19.0, 3.0), (99.0, 2.0)])
+@pytest.mark.parametrize(
+    ("t_s", "value"), [(-5.0, 1.0), (0.0, 1.0), (9.9, 1.0), (10.0, 3.0), (19.0, 3.0), (99.0, 2.0)]
+)
 def test_table_keeps_the_value_before(t_s, value):
     assert table(TIMES, VALUES)(t_s) == value
 

@@ -1,4 +1,6 @@
-"""suave-des kb infer, explain, why-not, policy, query: what follows in a state, why, and what is decided."""
+"""suave-des kb infer, explain, why-not, policy, query: what follows in a state, why, and what is
+decided.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from suave_des.cli.console import counted, errors
-from suave_des.cli.kb.options import At, KnowledgeOptions, MaxFailed, ReasonerOptions, TimeLimitS, shown, state_at
+from suave_des.cli.kb.options import (
+    At,
+    KnowledgeOptions,
+    MaxFailed,
+    ReasonerOptions,
+    TimeLimitS,
+    shown,
+    state_at,
+)
 from suave_des.errors import InputError
 from suave_des.files import csv_text, write_files
 from suave_des.interrupts import ends_at_once
@@ -36,7 +46,11 @@ def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
     for objective in state.objectives:
         status = f"  {objective.status}" if objective.status else ""
         yield f"  objective   {objective.function}{status}"
-    parts = {"grounding": state.groundings, "component": state.components, "measured": state.measurements}
+    parts = {
+        "grounding": state.groundings,
+        "component": state.components,
+        "measured": state.measurements,
+    }
     for kind, pairs in parts.items():
         yield from (f"  {kind:<10}  {name} = {value}" for name, value in pairs)
     yield "inferred"
@@ -45,7 +59,9 @@ def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
     if not decisions:
         yield "  nothing to adapt"
     for decision in decisions:
-        stays = " stays" * (decision.design is not None and decision.design == state.grounded(decision.function))
+        stays = " stays" * (
+            decision.design is not None and decision.design == state.grounded(decision.function)
+        )
         yield f"  {decision.function}: {decision.design or 'no design left'}{stays}  ({decision.reason})"
         for rejection in decision.rejected:
             yield f"    not {rejection.design}: {rejection.reason}"
@@ -70,12 +86,17 @@ def explain(
 def policy(
     options: ReasonerOptions,
     max_failed: MaxFailed = 2,
-    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write all rows of the table.")] = None,
-    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="Draw the tables.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write all rows of the table.")
+    ] = None,
+    png: Annotated[
+        Path | None, typer.Option("--png", metavar="FILE", help="Draw the tables.")
+    ] = None,
 ) -> None:
     """Tabulate the decision in every state.
 
-    Measured values are divided into ranges: at and between the numbers that the knowledge base mentions.
+    Measured values are divided into ranges: at and between the numbers that the knowledge base
+    mentions.
     """
     from suave_des.kb.policy import function_table
 
@@ -98,10 +119,15 @@ def policy(
 def query(
     options: ReasonerOptions,
     text: Annotated[
-        str, typer.Argument(metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known.")
+        str,
+        typer.Argument(
+            metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known."
+        ),
     ],
     at: At = None,
-    inferred: Annotated[bool, typer.Option("--inferred", help="Include what Pellet infers.")] = False,
+    inferred: Annotated[
+        bool, typer.Option("--inferred", help="Include what Pellet infers.")
+    ] = False,
     form: Annotated[TableFormat, typer.Option("--format", help="Output format.")] = "text",
 ) -> None:
     """Query the knowledge base in SPARQL.
@@ -122,17 +148,23 @@ def query(
         print(csv_text(found.columns, found.rows), end="")
     else:
         rows = [[cell or "" for cell in row] for row in found.rows]
-        print(shown(Table(found.columns, rows, align="l" * len(found.columns))), *["no rows"] * (not rows), sep="\n")
+        print(
+            shown(Table(found.columns, rows, align="l" * len(found.columns))),
+            *["no rows"] * (not rows),
+            sep="\n",
+        )
 
 
 def why_not(
     options: KnowledgeOptions,
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="RULE", help="Rules; by default all that do not fire.")
+        list[str] | None,
+        typer.Argument(metavar="RULE", help="Rules; by default all that do not fire."),
     ] = None,
     at: At = None,
     facts: Annotated[
-        list[str] | None, typer.Option("--fact", metavar="FACT", help='Additional fact, such as "Binding(b1)".')
+        list[str] | None,
+        typer.Option("--fact", metavar="FACT", help='Additional fact, such as "Binding(b1)".'),
     ] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
-OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak is the previous version.")]
+OwlFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak is the previous version.")
+]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
 FindingsFormat = Literal["text", "json"]
 FailOn = Literal["error", "warn"]
@@ -32,13 +34,16 @@ FailOn = Literal["error", "warn"]
 def check(
     options: KnowledgeOptions,
     modes: Modes = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")] = "error",
+    fail_on: Annotated[
+        FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")
+    ] = "error",
     time_limit: TimeLimitS = 60.0,
     form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = "text",
 ) -> None:
     """Check ontologies and rules.
 
-    Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
+    Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something
+    cannot be read.
     """
     from suave_des.errors import Finding, Level, has_level, ordered, summary
     from suave_des.kb.check import check as run_checks
@@ -48,7 +53,10 @@ def check(
 
     loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
     findings = run_checks(replace(subject_of(loaded), time_limit_s=time_limit))
-    useless = (Finding(Level.WARN, words, shown_name(loaded.path)) for words in loaded.scenario.without_effect())
+    useless = (
+        Finding(Level.WARN, words, shown_name(loaded.path))
+        for words in loaded.scenario.without_effect()
+    )
     findings = ordered([*findings, *useless])
     if form == "json":
         print(json.dumps(list(map(asdict, findings)), indent=2, ensure_ascii=False))
@@ -71,7 +79,9 @@ def rules_text(base: Ontology) -> str:
 
     named = naming(lambda iri: not base.vocabulary.means_itself(iri))
     blocks = []
-    for file in dict.fromkeys(rule.file for rule in sorted(base.rules, key=lambda rule: base.files.index(rule.file))):
+    for file in dict.fromkeys(
+        rule.file for rule in sorted(base.rules, key=lambda rule: base.files.index(rule.file))
+    ):
         blocks.append(f"# {file}\n")
         for rule in base.rules:
             if rule.file == file:
@@ -85,7 +95,9 @@ def rules_text(base: Ontology) -> str:
 
 def add_rule(
     file: OwlFile,
-    rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')],
+    rule: Annotated[
+        str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')
+    ],
 ) -> None:
     """Add a rule, or those of a file, to an OWL file; nothing else changes."""
     from suave_des.kb.rule_editor import add_rules
@@ -127,11 +139,14 @@ def try_(
     on: Annotated[
         Path,
         typer.Option(
-            "--on", metavar="DIR", help="Folder of run, of a campaign that recorded its knowledge, or of such folders."
+            "--on",
+            metavar="DIR",
+            help="Folder of run, of a campaign that recorded its knowledge, or of such folders.",
         ),
     ],
     rule: Annotated[
-        str | None, typer.Argument(metavar="RULE", help='Rule to try, "name: body -> head", or a .swrl file.')
+        str | None,
+        typer.Argument(metavar="RULE", help='Rule to try, "name: body -> head", or a .swrl file.'),
     ] = None,
     disable: Annotated[
         str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
@@ -140,8 +155,8 @@ def try_(
 ) -> None:
     """Show when a rule would have fired in recorded missions, and what it would have changed.
 
-    No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
-    the consequences of a different decision.
+    No mission is run again: the reasoner evaluates each recorded state with and without the rule.
+    Only a new run shows the consequences of a different decision.
     """
     from suave_des.kb.replay import summary, try_rules
 
@@ -154,7 +169,12 @@ class MissionOptions:
 
     missions: Annotated[
         int | None,
-        typer.Option("--missions", min=1, metavar="N", help="Run N missions with each, and compare them in pairs."),
+        typer.Option(
+            "--missions",
+            min=1,
+            metavar="N",
+            help="Run N missions with each, and compare them in pairs.",
+        ),
     ] = None
     modes: Modes = None
     seed: Seed = 1
@@ -165,14 +185,17 @@ class MissionOptions:
 def diff(
     options: ReasonerOptions,
     mission_options: MissionOptions,
-    one: Annotated[Path, typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add.")],
+    one: Annotated[
+        Path, typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add.")
+    ],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
     max_failed: MaxFailed = 2,
 ) -> None:
     """Compare two ontologies, or two sets of rules: axioms, decisions, missions.
 
     --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
-    scenario's. Decisions are compared in every state; missions with the same number use common random numbers.
+    scenario's. Decisions are compared in every state; missions with the same number use common
+    random numbers.
     """
     from suave_des.kb.difference import compare_axioms, compare_missions, firing_states
     from suave_des.knowledge.pellet import TimeLimit
@@ -185,7 +208,9 @@ def diff(
     missions, last = None, list[str]()
     if mission_options.missions is not None:
         replaced = [each.replacements | {"modes_file": mission_options.modes} for each in both]
-        with progress.shown("missions with A, then with B", quiet=mission_options.quiet) as on_progress:
+        with progress.shown(
+            "missions with A, then with B", quiet=mission_options.quiet
+        ) as on_progress:
             missions = compare_missions(
                 both[0].scenario,
                 mission_options.missions,
@@ -200,7 +225,9 @@ def diff(
             firing, states = firing_states(
                 both[0].scenario, mission_options.missions, *replaced, seed=seed, limit=limit
             )
-            last = [f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"]
+            last = [
+                f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"
+            ]
     if removed or added:
         print(f"axioms and rules: {len(removed)} removed, {len(added)} added")
         print(*(f"  - {text}" for text in removed), *(f"  + {text}" for text in added), sep="\n")

@@ -22,10 +22,17 @@ if TYPE_CHECKING:
 
 
 TimeLimitS = Annotated[
-    float, typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s.")
+    float,
+    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s."),
 ]
 MaxFailed = Annotated[
-    int, typer.Option("--max-failed", min=0, metavar="N", help="States with up to N components failed or recovered.")
+    int,
+    typer.Option(
+        "--max-failed",
+        min=0,
+        metavar="N",
+        help="States with up to N components failed or recovered.",
+    ),
 ]
 
 
@@ -34,7 +41,8 @@ class KnowledgeOptions(KnowledgeFiles):
     """Options that name a scenario, ontologies and rules."""
 
     scenario: Annotated[
-        str, typer.Option("--scenario", metavar="SCENARIO", help="Scenario with the knowledge base.")
+        str,
+        typer.Option("--scenario", metavar="SCENARIO", help="Scenario with the knowledge base."),
     ] = DEFAULT_SCENARIO
 
     def loaded(self) -> LoadedScenario:

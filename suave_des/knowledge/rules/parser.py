@@ -8,8 +8,9 @@
 
     disabled "a name with spaces": Component(?c) -> my:seen(?c, true)
 
-A rule ends where its head does. Atoms are joined by ^ or a comma. Names are bare where that is unambiguous, else
-prefixed or in angle brackets; names of rules that are not a single word are quoted.
+A rule ends where its head does. Atoms are joined by ^ or a comma. Names are bare where that is
+unambiguous, else prefixed or in angle brackets; names of rules that are not a single word are
+quoted.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 
 MAX_DIGITS: Final = 400
 _WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
-#: What stands for the terminals of which the first is expected, and what would be right; the first that fits counts.
+#: What stands for the terminals of which the first is expected, and what would be right; the first
+# that fits counts.
 _EXPECTED: Final = (
     ("VARIABLE", 'an argument, such as ?o, 2.5, "text", true or an individual,', None),
     ("PREFIXED", "an atom, such as Objective(?o),", None),
@@ -47,21 +49,28 @@ _LACKING: Final = (
     (re.compile(r"\|\|?|∨|(?i:or)\b"), "'or'", "write a rule for each case"),
     (re.compile(r"[¬!~]|(?i:not)\b"), "negation", "say what holds instead"),
 )
-_HEADER: Final = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE)
+_HEADER: Final = re.compile(
+    rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE
+)
 _ESCAPE: Final = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
 _ESCAPED: Final = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
-#: What no text may contain: control characters, and halves of surrogate pairs, which no file can encode.
+#: What no text may contain: control characters, and halves of surrogate pairs, which no file can
+# encode.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 _FOUND: Final = re.compile(r"=>|\??[^\s\"<>(),^?]+|.", re.DOTALL)
 _BLANK: Final = re.compile(r"(?:\s|#[^\n]*)*")
 _lock: Final = threading.Lock()
 
 
-def parse_rules(text: str, file: Path | None = None) -> tuple[tuple[Rule, ...], tuple[RuleError, ...]]:
-    """Parse all rules of a text; after an error, parsing continues with the next rule that begins a line.
+def parse_rules(
+    text: str, file: Path | None = None
+) -> tuple[tuple[Rule, ...], tuple[RuleError, ...]]:
+    """Parse all rules of a text; after an error, parsing continues with the next rule that begins a
+    line.
 
     Returns:
-        the rules, in which names are not looked up yet, and an error for each that could not be read.
+        the rules, in which names are not looked up yet, and an error for each that could not be
+        read.
     """
     from lark import TextSlice, UnexpectedInput
 
@@ -78,9 +87,15 @@ def parse_rules(text: str, file: Path | None = None) -> tuple[tuple[Rule, ...], 
                 errors.append(error)
                 at = builder.failed_at
             except UnexpectedInput as error:
-                state: Any = error.interactive_parser  # which knows what is possible after all that was read
+                state: Any = (
+                    error.interactive_parser
+                )  # which knows what is possible after all that was read
                 at = _BLANK.match(text, error.pos_in_stream or 0).end()  # type: ignore[union-attr]
-                at = len(text) if getattr(getattr(error, "token", None), "type", "") == "$END" else at
+                at = (
+                    len(text)
+                    if getattr(getattr(error, "token", None), "type", "") == "$END"
+                    else at
+                )
                 errors.append(_error(text, at, state.accepts(), file))
             line_end = text.find("\n", at)
             header = _HEADER.search(text, line_end + 1) if line_end >= 0 else None
@@ -98,7 +113,9 @@ def parse_rule(text: str, file: Path | None = None) -> Rule:
     if errors:
         raise errors[0]
     if len(rules) != 1:
-        raise RuleError(f"{len(rules)} rules instead of one", file=file, remedy='write "name: body -> head"')
+        raise RuleError(
+            f"{len(rules)} rules instead of one", file=file, remedy='write "name: body -> head"'
+        )
     return rules[0]
 
 
@@ -107,7 +124,9 @@ def _parser() -> tuple[Lark, _Builder]:
     from lark import Lark
 
     builder = _Builder()
-    return Lark.open("grammar.lark", rel_to=__file__, parser="lalr", lexer="contextual", transformer=builder), builder
+    return Lark.open(
+        "grammar.lark", rel_to=__file__, parser="lalr", lexer="contextual", transformer=builder
+    ), builder
 
 
 def _error(text: str, at: int, accepted: set[str], file: Path | None) -> RuleError:
@@ -129,7 +148,9 @@ def _error(text: str, at: int, accepted: set[str], file: Path | None) -> RuleErr
 
 
 class _Builder:
-    """Builds rules while lark parses: each method gets the parts of what it is named after in the grammar."""
+    """Builds rules while lark parses: each method gets the parts of what it is named after in the
+    grammar.
+    """
 
     def begin(self, file: Path | None) -> None:
         self.rules: list[Rule] = []
@@ -143,7 +164,9 @@ class _Builder:
     def rule(self, parts: Sequence[Any]) -> None:
         disabled, (place, name), body, head = parts  # no body: a rule that always holds
         begins = self._place(disabled) if disabled else place
-        self.rules.append(Rule(name, body or (), head, not disabled, self._file or Path(), begins.line))
+        self.rules.append(
+            Rule(name, body or (), head, not disabled, self._file or Path(), begins.line)
+        )
 
     def rule_name(self, parts: Sequence[Token]) -> tuple[Place, str]:
         """A word, or a text that is not blank."""
@@ -159,7 +182,9 @@ class _Builder:
 
     def atom(self, parts: Sequence[Any]) -> Atom:
         (place, predicate), *terms = parts
-        return Atom("", predicate, tuple(term for _, term in terms), (place, *(where for where, _ in terms)))
+        return Atom(
+            "", predicate, tuple(term for _, term in terms), (place, *(where for where, _ in terms))
+        )
 
     def name(self, parts: Sequence[Token]) -> tuple[Place, str]:
         """A bare name as it is, a prefixed name or one in angle brackets as IRI."""
@@ -180,7 +205,9 @@ class _Builder:
         if isinstance(first, tuple):
             place, name = first
             return place, Lit(name, XSD + "boolean") if name in ("true", "false") else Named(name)
-        return self._place(first), Variable(first[1:]) if first.type == "VARIABLE" else self._literal(first, parts[1:])
+        return self._place(first), Variable(
+            first[1:]
+        ) if first.type == "VARIABLE" else self._literal(first, parts[1:])
 
     def _literal(self, token: Token, more: Sequence[Any]) -> Lit:
         if token.type == "NUMBER":
@@ -195,7 +222,9 @@ class _Builder:
             return Lit(text, str(more[0]))
         datatype = more[0][1]
         if ":" not in datatype:
-            raise self._wrong(token, f"datatype {datatype} without a prefix", f"write xsd:{datatype}")
+            raise self._wrong(
+                token, f"datatype {datatype} without a prefix", f"write xsd:{datatype}"
+            )
         literal = Lit(text, datatype)
         if not is_well_formed(literal):
             raise self._wrong(token, f"{text!r} is not an xsd:{local_name(datatype)}")
@@ -221,12 +250,16 @@ class _Builder:
                 code = int(short or long, 16)
                 return chr(code) if code <= 0x10FFFF else "\ud800"
             if single not in _ESCAPED:
-                raise self._wrong(token, f"unknown escape \\{single}", r"one of \" \\ \n \t \r \uXXXX")
+                raise self._wrong(
+                    token, f"unknown escape \\{single}", r"one of \" \\ \n \t \r \uXXXX"
+                )
             return _ESCAPED[single]
 
         return self._clean(_ESCAPE.sub(unescape, token[1:-1]), token)
 
     def _clean(self, text: str, token: Token) -> str:
         if _FORBIDDEN.search(text):
-            raise self._wrong(token, "a character that no file can hold", "leave out control characters")
+            raise self._wrong(
+                token, "a character that no file can hold", "leave out control characters"
+            )
         return text

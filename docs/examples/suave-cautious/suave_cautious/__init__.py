@@ -4,7 +4,9 @@ from suave_des import Threshold
 
 
 class Cautious(Threshold):
-    """Searches as high as the visibility allows that is left when a margin is taken off the measured one."""
+    """Searches as high as the visibility allows that is left when a margin is taken off the
+    measured one.
+    """
 
     def wanted(self, visibility_m):
         """The modes that fit a visibility that is lower by the setting `margin_m`."""
