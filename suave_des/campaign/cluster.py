@@ -146,13 +146,14 @@ def _outcomes(
 
 def pack(campaign: Campaign) -> bytes:
     """Pack a campaign with the versions and the content of every file that it needs."""
-    from suave_des.knowledge.ontology_file import collect
+    from suave_des.knowledge.resolver import collect
 
     managers = {name: manager_class(name) for name in campaign.spec.managers}
     loaded = replace(campaign.loaded, manager_files=declared_files(campaign.scenarios(), managers))
     with suppress(InputError):  # reported by the managers that reason with it, if there are any
         loaded = replace(
-            loaded, ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies)))
+            loaded,
+            ontologies=tuple(sorted(source.path for source in collect(loaded.ontologies).files)),
         )
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]
     modules = user_modules(campaign.spec.managers, functions).items()

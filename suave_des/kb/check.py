@@ -27,10 +27,11 @@ from suave_des.knowledge.checks import (
     static_findings,
 )
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.ontology_file import OntologyFile, collect, place_of
+from suave_des.knowledge.ontology_file import OntologyFile, place_of
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import HAS_VALUE, local_name
 from suave_des.knowledge.reasoner import Reasoner, regions_of
+from suave_des.knowledge.resolver import collect
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState, measurement_name
 from suave_des.monitor.diagnostics import RECOVERED
 from suave_des.resources import shipped_folder
@@ -63,7 +64,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         )
     except KnowledgeError as error:
         sources = collect(subject.ontologies)
-        findings = [*static_findings(subject, sources), *check_shapes(sources)]
+        findings = [*static_findings(subject, sources), *check_shapes(sources.files)]
         message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
         is_known = has_level(findings, Level.ERROR)
         return ordered([*findings, Finding(Level.NOTE, message) if is_known else Finding.of(error)])

@@ -22,9 +22,10 @@ from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_p
 from suave_des.knowledge import rdf
 from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import OPERATORS, Content, Model, Ontology, wrong_values
-from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
+from suave_des.knowledge.ontology_file import place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.resolver import Sources, as_written, is_metamodel
 from suave_des.knowledge.rules import (
     Atom,
     Named,
@@ -42,6 +43,7 @@ from suave_des.knowledge.rules.files import (
     fatal_problems,
     looked_up,
 )
+from suave_des.resources import shipped_folder, shown_name
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,7 @@ class Material:
         return about_rule(rule, message, place, remedy, level)
 
 
-def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> list[Finding]:
+def static_findings(subject: Subject, sources: Sources) -> list[Finding]:
     """Find what needs no reasoner, which takes some 10 ms, in files that may have errors.
 
     The sources are the subject's ontologies and their imports.
@@ -223,6 +225,19 @@ def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
     """Find what needs no reasoner in a knowledge base that has been opened from a subject."""
     material = Material(subject, base)
     return [finding for check in CHECKS for finding in check(material)]
+
+
+# The files.
+
+
+def imports(material: Material) -> Iterator[Finding]:
+    """Note which file supplies each import of the user's files."""
+    shipped = shipped_folder("ontology")
+    for supply in material.base.supplies:
+        if supply.importing.parent != shipped:
+            what = f"imports {as_written(supply.iri)}"
+            message = f"{what}: {shown_name(supply.file)} supplies it ({supply.reason})"
+            yield Finding(Level.NOTE, message, str(supply.importing), supply.line or None)
 
 
 # The model, and what missions have to do with it.
@@ -761,6 +776,7 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
 
 
 CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
+    imports,
     values,
     undefined_names,
     functions_without_design,

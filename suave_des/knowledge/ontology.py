@@ -21,12 +21,11 @@ from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology_file import (
     OntologyFile,
-    collect,
     enumerated_texts,
     place_of,
-    supplies,
 )
 from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.resolver import Sources, Supply, collect
 from suave_des.knowledge.rules import EXPRESSION, Rule
 from suave_des.knowledge.rules.files import (
     RulesFile,
@@ -43,7 +42,6 @@ from suave_des.knowledge.state import (
     measurement_name,
     objective_name,
 )
-from suave_des.resources import shipped_folder
 
 # The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all
 # libraries in use write and read without loss.
@@ -162,19 +160,13 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
     """Merge the triples and rules of files, with the values of named QAvalue individuals
     replaced.
     """
-    triples, structure, rules = dict[rdf.Triple, None](), list[str](), list[Rule]()
-    shipped = shipped_folder("ontology")
-    # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology replaces
-    # them.
-    given_mros = (
-        each for each in sources if each.path.parent != shipped and supplies(each, rdf.MROS)
-    )
-    replaced = {rule.name for source in given_mros for rule in rules_of(source)}
+    triples = dict[rdf.Triple, None]()
+    structure: list[str] = []
+    rules: dict[tuple[str, str], Rule] = {}  # of two that say the same in several files, the first
     for source in sorted(sources, key=lambda source: source.content):
         found = rules_of(source)
-        rules += [
-            rule for rule in found if source.path.parent != shipped or rule.name not in replaced
-        ]
+        for rule in found:
+            rules.setdefault((rule.name, rule.text), rule)
         # Triples about the ontology itself (imports, versions) are no part of its content.
         ontologies = {
             s for s, p, o in source.triples if p == rdf.RDF_TYPE and o == rdf.OWL + "Ontology"
@@ -192,7 +184,7 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
             if predicate == rdf.HAS_VALUE and local_name(subject) in values:
                 value = Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal")
             triples[subject, predicate, value] = None
-    return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules))
+    return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules.values()))
 
 
 def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
@@ -495,9 +487,8 @@ class Ontology:
     changes.
 
         ontology = Ontology.load(["suave.owl"], rules=["mine.swrl"])
-        ontology.designs("f_generate_search_path")  # ('fd_spiral_high', 'fd_spiral_low',
-        'fd_spiral_medium') ontology.expected("fd_spiral_low")  # {'performance': Decimal('0.25'),
-        'water_visibility': Decimal('1.25')}
+        ontology.designs("f_maintain_motion")  # ('fd_all_thrusters', 'fd_recover_thrusters')
+        ontology.expected("fd_all_thrusters")  # {'performance': Decimal('1.0')}
 
     Attributes:
         files: the ontology files in use, imports included, sorted by path, and the files of rules
@@ -512,6 +503,7 @@ class Ontology:
         stated: all triples of the files, those that only states assert among them.
         assumed: the comparison operators that were added to the ontologies, by quality attribute
             type.
+        supplies: which file supplies each import.
     """
 
     files: tuple[Path, ...]
@@ -523,6 +515,7 @@ class Ontology:
     sources: tuple[OntologyFile, ...] = field(repr=False)
     stated: tuple[rdf.Triple, ...] = field(repr=False)
     assumed: Mapping[str, str]
+    supplies: tuple[Supply, ...]
 
     @classmethod
     def load(
@@ -557,14 +550,14 @@ class Ontology:
         )
         base.check_names(values or {}, disabled_rules)
         for subject, problem, remedy in wrong_values(base.stated):
-            raise _wrong_in(subject, sources, problem, remedy)
+            raise _wrong_in(subject, sources.files, problem, remedy)
         check_property_use(base.content.enabled_rules, base.vocabulary)
         return base
 
     @classmethod
     def merged(
         cls,
-        sources: Sequence[OntologyFile],
+        sources: Sources,
         values: Mapping[str, Decimal],
         operators: Mapping[str, str],
     ) -> Ontology:
@@ -575,9 +568,9 @@ class Ontology:
             KnowledgeError: two functions, designs, components or quality attribute types share a
                 name.
         """
-        contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources)
-        merged = merge(sources, values)
-        model, content = build_model(merged, sources)
+        contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources.files)
+        merged = merge(sources.files, values)
+        model, content = build_model(merged, sources.files)
         present = {
             subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR
         }
@@ -591,15 +584,18 @@ class Ontology:
             content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
         numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
         return cls(
-            files=tuple(sorted(source.path for source in sources)),
+            files=tuple(sorted(source.path for source in sources.files)),
             content_hash=_digest(contents, numbers, assumed),
             content=content,
             names=rdf.Names(merged.triples),
             model=model,
-            vocabulary=Vocabulary.of(merged.triples, model.in_states, enumerated_texts(sources)),
-            sources=tuple(sources),
+            vocabulary=Vocabulary.of(
+                merged.triples, model.in_states, enumerated_texts(sources.files)
+            ),
+            sources=sources.files,
             stated=merged.triples,
             assumed=assumed,
+            supplies=sources.supplies,
         )
 
     def with_files(

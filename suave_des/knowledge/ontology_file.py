@@ -1,12 +1,7 @@
-"""Read ontology files, and resolve their imports to local files. Nothing is ever fetched.
+"""Read ontology files.
 
 Files are in RDF/XML. lxml reads the XML first: it stops at entities that expand too far, and knows
 line numbers. Simple internal entities, as Protégé writes them, are accepted.
-
-An import is looked for among the files that were given, by the IRI (of the ontology, or xml:base),
-then by the last part of the IRI, which for the exemplar's ontologies is the name of the file
-(tomasys, mros, suave); then, by that name, among the files beside the importing one, and among the
-shipped ones.
 """
 
 from __future__ import annotations
@@ -19,7 +14,7 @@ from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import urldefrag, urljoin
+from urllib.parse import urljoin
 from xml.sax import SAXParseException
 
 import rdflib
@@ -32,19 +27,15 @@ from rdflib.term import Node
 from suave_des.errors import KnowledgeError
 from suave_des.files import read_bytes
 from suave_des.knowledge.rdf import (
-    MROS,
     OWL,
     RDF,
     RDFS,
-    TOMASYS,
     XSD,
     Lit,
     Triple,
-    local_name,
     term_of,
     without_log,
 )
-from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20
 _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
@@ -62,9 +53,8 @@ _OTHER_NOTATIONS: Final = {
 # reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
 _EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
-_ENDINGS: Final = (".owl", ".rdf", ".xml")
-#: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
-_SHIPPED: Final = {"tomasys": "tomasys.owl", "mros": "tomasys.owl", "suave": "suave.owl"}
+#: Stands for the folder of a file without xml:base, and reveals nothing of this machine's folders.
+RELATIVE_TO: Final = "http://ontology.invalid/"
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +187,7 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
     base = root.get(_BASE)
     lines: dict[str, int] = {}
     for element in root.iter(f"{{{OWL}}}imports"):
-        iri = urljoin(base or "", element.get(f"{{{RDF}}}resource", ""))
+        iri = urljoin(base or RELATIVE_TO, element.get(f"{{{RDF}}}resource", ""))
         lines.setdefault(iri, element.sourceline or 0)
     imports = {str(iri): lines.get(str(iri), 0) for iri in graph.objects(None, OWL_TERMS.imports)}
     return OntologyFile(
@@ -262,8 +252,7 @@ def _parse_rdf(path: Path, text: str) -> Graph:
     )  # it would write the ill-formed 1e3 as 1000
     try:
         with without_log():
-            # A file without xml:base gets a base that reveals nothing of this machine's folders.
-            graph.parse(data=text, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
+            graph.parse(data=text, format="xml", publicID=RELATIVE_TO + path.stem)
     except (
         Exception
     ) as error:  # the parser raises many kinds; each means that this file is not RDF/XML
@@ -308,96 +297,3 @@ def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]
         for file, name, start in lists
     )
     return {name: frozenset(found) for name, found in texts if found}
-
-
-def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
-    """Read the given files, or the shipped suave.owl, and all that they import, directly or not,
-    each once.
-
-    Raises:
-        KnowledgeError: a file cannot be used, two different files supply one ontology, or an import
-            does not resolve.
-    """
-    files: list[OntologyFile] = []
-    for path in given or [shipped_folder("ontology") / "suave.owl"]:
-        _add(files, read_ontology(path))
-    for file in files:  # grows meanwhile, by imports of imports
-        for iri, line in file.imports:
-            if _supplier(files, iri) is None:
-                found = _beside(file, iri) or _shipped(files, iri)
-                if found is not None:
-                    _add(files, found)
-                else:
-                    problem, place = (
-                        f"import {iri} does not resolve to a local file",
-                        f"line {line}" if line else None,
-                    )
-                    remedy = "give the imported ontology's file too, or put it beside this one"
-                    raise KnowledgeError(problem, file=file.path, place=place, remedy=remedy)
-    return tuple(files)
-
-
-def supplies(file: OntologyFile, iri: str, *, by_name: bool = True) -> bool:
-    """Whether a file supplies an imported ontology, according to its IRI, or else its name."""
-    known = (*file.iris, file.base) if file.base else file.iris
-    if _comparable(iri) in map(_comparable, known):
-        return True
-    return by_name and _name(iri) in {file.path.stem, *map(_name, file.iris)}
-
-
-def is_metamodel(file: OntologyFile) -> bool:
-    """Whether a file supplies TOMASys or its terms for robots (mros), which have rules for any
-    model.
-    """
-    return supplies(file, TOMASYS) or supplies(file, MROS)
-
-
-def _add(files: list[OntologyFile], new: OntologyFile) -> None:
-    for old in files:
-        if old.path.resolve() == new.path.resolve() or old.content == new.content:
-            return
-        if set(map(_comparable, old.iris)) & set(map(_comparable, new.iris)):
-            problem = f"supplies the ontology {new.iris[0]}, and so does {old.path}"
-            raise KnowledgeError(problem, file=new.path, remedy="give one of the two")
-    files.append(new)
-
-
-def _comparable(iri: str) -> str:
-    """Return an IRI without scheme and final mark: two IRIs of the same ontology are equal in this
-    form.
-    """
-    return urldefrag(iri)[0].partition("://")[2].rstrip("/") or iri
-
-
-def _name(iri: str) -> str:
-    """Return the name of an ontology from its IRI: the last part without the file extension."""
-    return Path(local_name(_comparable(iri))).stem
-
-
-def _supplier(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
-    """The file that supplies an imported ontology: by IRI, else by name."""
-    found = (
-        file for by_name in (False, True) for file in files if supplies(file, iri, by_name=by_name)
-    )
-    return next(found, None)
-
-
-def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
-    """The file of that name in the folder of the importing file."""
-    for path in sorted(file.path.parent.iterdir()):
-        if (
-            path.stem == _name(iri)
-            and path.suffix in _ENDINGS
-            and path.resolve() != file.path.resolve()
-        ):
-            return read_ontology(path)
-    return None
-
-
-def _shipped(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
-    name = _SHIPPED.get(_name(iri))
-    if name is None:
-        return None
-    found = read_ontology(shipped_folder("ontology") / name)
-    # A given tomasys ontology is not mixed with the shipped one for the sake of its mros terms.
-    return None if any(_supplier(files, known) for known in found.iris) else found

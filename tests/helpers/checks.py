@@ -7,7 +7,7 @@ from pathlib import Path
 from suave_des.errors import Finding, Level, ordered
 from suave_des.kb.check import check, check_shapes
 from suave_des.knowledge.checks import Subject, static_findings
-from suave_des.knowledge.ontology_file import collect
+from suave_des.knowledge.resolver import collect
 from suave_des.resources import shipped_folder
 
 SUAVE = "http://www.metacontrol.org/suave#"
@@ -43,7 +43,7 @@ def found(
 def findings_of(subject: Subject) -> tuple[Finding, ...]:
     """What `kb check` finds without a reasoner."""
     sources = collect(subject.ontologies)
-    return ordered([*static_findings(subject, sources), *check_shapes(sources)])
+    return ordered([*static_findings(subject, sources), *check_shapes(sources.files)])
 
 
 def errors(findings: tuple[Finding, ...]) -> list[Finding]:

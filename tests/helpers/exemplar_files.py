@@ -1,8 +1,6 @@
-"""Three ontology files split the exemplar's way, made from the shipped two: tomasys.owl, mros.owl,
-suave.owl.
+"""The three ontology files as the exemplar's users have them, made from the shipped ones.
 
-In the exemplar the terms and rules for robots have a file of their own, which suave.owl imports;
-the oldest rules speak of INTERNAL_ERROR, and a recovered component gives its objectives the status
+The oldest rules speak of INTERNAL_ERROR, and a recovered component gives its objectives the status
 UPDATABLE.
 """
 
@@ -11,9 +9,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from rdflib import BNode, Graph, Literal, URIRef
+from rdflib import Graph, Literal, URIRef
 from rdflib.namespace import OWL, RDF, RDFS, XSD
-from rdflib.term import Node
 
 from suave_des.resources import shipped_folder
 
@@ -21,36 +18,7 @@ MROS_IMPORT = "https://raw.githubusercontent.com/meta-control/mros_ontology/main
 TOMASYS_IMPORT = "http://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl"
 SWRL = "http://www.w3.org/2003/11/swrl#"
 TOMASYS = "http://metacontrol.org/tomasys#"
-MROS = "http://ros/mros#"
-MROS_RULES = {
-    "compError",
-    "compErrFG",
-    "compRecov",
-    "QAenergy",
-    "QAsafety",
-    "mros_S4",
-    "S1a",
-    "S1b",
-    "S1c",
-}
 OLDEST_STATUS = {"IN_ERROR_NFR": "INTERNAL_ERROR", "IN_ERROR_COMPONENT": "INTERNAL_ERROR"}
-
-
-def _parts(graph: Graph, start: Node) -> set[Node]:
-    found, waiting = {start}, [start]
-    while waiting:
-        for value in graph.objects(waiting.pop(), None):
-            if isinstance(value, BNode) and value not in found:
-                found.add(value)
-                waiting.append(value)
-    return found
-
-
-def _move(source: Graph, target: Graph, nodes: set[Node]) -> None:
-    for node in nodes:
-        for triple in list(source.triples((node, None, None))):
-            source.remove(triple)
-            target.add(triple)
 
 
 def _oldest_forms(graph: Graph) -> None:
@@ -70,23 +38,14 @@ def _oldest_forms(graph: Graph) -> None:
 
 def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -> dict[str, Path]:
     """Write the three files; returns them by stem."""
-    tomasys, mros, suave = Graph(), Graph(), Graph()
-    tomasys.parse(shipped / "tomasys.owl", format="xml")
-    suave.parse(shipped / "suave.owl", format="xml")
-    rules = {
-        str(label): rule
-        for rule, label in tomasys.subject_objects(RDFS.label)
-        if isinstance(rule, BNode)
+    files = {
+        name: Graph().parse(shipped / f"{name}.owl", format="xml")
+        for name in ("tomasys", "mros", "suave")
     }
-    for name in MROS_RULES:
-        _move(tomasys, mros, _parts(tomasys, rules[name]))
-    _move(tomasys, mros, {s for s in tomasys.subjects() if str(s).startswith(MROS)})
-    for variable in tomasys.subjects(RDF.type, URIRef(SWRL + "Variable")):
-        mros.add((variable, RDF.type, URIRef(SWRL + "Variable")))
     for ontology, iri, imports in (
-        (tomasys, "http://metacontrol.org/tomasys", []),
-        (mros, "http://ros/mros", [TOMASYS_IMPORT]),
-        (suave, "http://www.metacontrol.org/suave", [TOMASYS_IMPORT, MROS_IMPORT]),
+        (files["tomasys"], "http://metacontrol.org/tomasys", []),
+        (files["mros"], "http://ros/mros", [TOMASYS_IMPORT]),
+        (files["suave"], "http://www.metacontrol.org/suave", [TOMASYS_IMPORT, MROS_IMPORT]),
     ):
         ontology.remove((None, OWL.imports, None))
         ontology.add((URIRef(iri), RDF.type, OWL.Ontology))
@@ -95,7 +54,6 @@ def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -
         if oldest:
             _oldest_forms(ontology)
     folder.mkdir(parents=True, exist_ok=True)
-    files = {"tomasys": tomasys, "mros": mros, "suave": suave}
     for name, graph in files.items():
         graph.serialize(folder / f"{name}.owl", format="xml")
     return {name: folder / f"{name}.owl" for name in files}

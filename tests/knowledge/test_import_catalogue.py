@@ -9,6 +9,8 @@ import pytest
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.resolver import as_written, collect
+from tests.helpers.checks import found
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 
@@ -39,7 +41,9 @@ def decisions(reasoner: Reasoner) -> list[dict[str, str | None]]:
 
 
 @pytest.mark.parametrize("oldest", [False, True])
-def test_the_exemplars_three_files_decide_as_the_shipped_two(kb, pellet, shipped, tmp_path, oldest):
+def test_the_exemplars_three_files_decide_as_the_shipped_ones(
+    kb, pellet, shipped, tmp_path, oldest
+):
     files = write_exemplar_files(shipped, tmp_path / "owl", oldest=oldest)
     base = Ontology.load(list(files.values()))
     assert set(base.files) == set(files.values())
@@ -66,14 +70,14 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
     suave_copy, shipped, tmp_path
 ):
     path = suave_copy()
-    assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
+    assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl", shipped / "mros.owl"}
     beside = path.with_name("tomasys.owl")
     beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- beside -->")
-    assert set(Ontology.load([path]).files) == {path, beside}
+    assert set(Ontology.load([path]).files) == {path, beside, shipped / "mros.owl"}
     given = tmp_path / "elsewhere" / "tomasys.owl"
     given.parent.mkdir()
     given.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- given -->")
-    assert set(Ontology.load([path, given]).files) == {path, given}
+    assert set(Ontology.load([path, given]).files) == {path, given, shipped / "mros.owl"}
 
 
 @pytest.mark.parametrize(
@@ -87,7 +91,7 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
 )
 def test_known_iris_resolve_to_the_shipped_files(suave_copy, shipped, iri):
     path = suave_copy(replace={IMPORT: iri})
-    assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
+    assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl", shipped / "mros.owl"}
 
 
 def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy):
@@ -131,5 +135,163 @@ def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path, shipped):
     )
     base = Ontology.load([path])
     assert "fd_zigzag" in base.designs(SEARCH)
-    assert set(base.files) == {path, shipped / "suave.owl", shipped / "tomasys.owl"}
+    assert set(base.files) == {
+        path,
+        *(shipped / f"{name}.owl" for name in ("suave", "tomasys", "mros")),
+    }
     assert Reasoner(base, "pellet").analyze(searching("fd_zigzag")).facts == frozenset()
+
+
+def written(path, iri, *imports, base=None, inside=""):
+    """Write an ontology without anything but its imports."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = "".join(f'<owl:imports rdf:resource="{each}"/>\n' for each in imports)
+    path.write_text(
+        '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"\n'
+        f'xmlns:owl="http://www.w3.org/2002/07/owl#"{f" xml:base={base!r}" if base else ""}>\n'
+        f'<owl:Ontology rdf:about="{iri}">\n{lines}</owl:Ontology>{inside}</rdf:RDF>',
+        encoding="utf-8",
+    )
+    return path
+
+
+def reasons(*given):
+    return {
+        (each.importing.name, each.iri): (each.file, each.reason)
+        for each in collect(given).supplies
+    }
+
+
+LIB = "http://example.org/lib"
+
+
+def test_an_importing_file_does_not_supply_its_own_import(tmp_path):
+    """Its xml:base, or the last part of its name, may well be that of what it imports."""
+    app = written(tmp_path / "lib.owl", "http://example.org/app/lib", LIB, base=LIB)
+    lib = written(tmp_path / "other.owl", LIB)
+    found = reasons(app)
+    assert found["lib.owl", LIB] == (lib, "by its IRI, beside the importing file")
+
+
+def test_an_iri_wins_over_a_name(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
+    same_name = written(tmp_path / "elsewhere" / "lib.owl", "http://example.com/lib")
+    beside = written(tmp_path / "renamed.owl", LIB)
+    assert reasons(app, same_name)["app.owl", LIB][0] == beside
+
+
+def test_names_with_dots_are_whole_names(tmp_path):
+    iri = "http://example.org/lib-v1.2"
+    app = written(tmp_path / "app.owl", "http://example.org/app", iri)
+    written(tmp_path / "lib-v1.owl", "http://example.com/old")
+    lib = written(tmp_path / "lib-v1.2.owl", "http://example.com/new")
+    assert reasons(app)["app.owl", iri] == (lib, "by its name, beside the importing file")
+
+
+def test_relative_paths_are_relative_to_the_file(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", "sub/lib.owl")
+    lib = written(tmp_path / "sub" / "lib.owl", LIB)
+    ((_, iri),) = reasons(app)
+    assert as_written(iri) == "sub/lib.owl"
+    assert reasons(app)["app.owl", iri] == (lib, "by its path")
+
+
+def test_a_relative_path_that_leads_nowhere_is_told_as_written_with_its_line(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", "sub/lib.owl")
+    with pytest.raises(KnowledgeError, match=r"line 4: import sub/lib.owl does not resolve"):
+        collect([app])
+
+
+def test_file_urls_are_read(tmp_path):
+    lib = written(tmp_path / "sub folder" / "lib.owl", LIB)
+    app = written(tmp_path / "app.owl", "http://example.org/app", lib.as_uri())
+    assert reasons(app)["app.owl", lib.as_uri()] == (lib, "by its path")
+
+
+CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
+<catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
+    <group id="Folder Repository"><uri id="x" name="{iri}" uri="{uri}"/></group>
+</catalog>
+"""
+
+
+def test_the_catalog_of_protege_wins_over_files_beside_and_shipped(tmp_path):
+    tomasys = "http://metacontrol.org/tomasys"
+    app = written(tmp_path / "app.owl", "http://example.org/app", tomasys)
+    mine = written(tmp_path / "sub" / "my%20own.owl", "http://example.org/mine")
+    mine = mine.rename(tmp_path / "sub" / "my own.owl")
+    written(tmp_path / "tomasys.owl", "http://example.org/tomasys")
+    catalog = CATALOG.format(iri=tomasys, uri="sub/my%20own.owl")
+    (tmp_path / "catalog-v001.xml").write_text(catalog, encoding="utf-8")
+    assert reasons(app)["app.owl", tomasys] == (mine, "by catalog-v001.xml")
+
+
+def test_a_catalog_that_names_a_missing_file_is_passed_over(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
+    lib = written(tmp_path / "lib.owl", LIB)
+    catalog = CATALOG.format(iri=LIB, uri="gone.owl")
+    (tmp_path / "catalog-v001.xml").write_text(catalog, encoding="utf-8")
+    assert reasons(app)["app.owl", LIB][0] == lib
+
+
+def test_a_catalog_that_is_no_xml_is_named(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
+    (tmp_path / "catalog-v001.xml").write_text("<catalog", encoding="utf-8")
+    with pytest.raises(KnowledgeError, match=r"catalog-v001.xml: not well-formed XML"):
+        collect([app])
+
+
+def test_damaged_files_beside_are_nobodys_input(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", "http://ros/mros")
+    (tmp_path / "old.owl").write_text("about http://ros/mros, and no XML", encoding="utf-8")
+    assert reasons(app)["app.owl", "http://ros/mros"][1] == "shipped with suave-des"
+
+
+@pytest.mark.parametrize("order", [(IMPORT, MROS_IMPORT), (MROS_IMPORT, IMPORT)])
+def test_the_order_of_imports_does_not_matter(tmp_path, shipped, order):
+    app = written(tmp_path / "app.owl", "http://example.org/app", *order)
+    files = {each.path for each in collect([app]).files}
+    assert files == {app, shipped / "tomasys.owl", shipped / "mros.owl"}
+
+
+def test_terms_of_mros_come_only_with_it(tmp_path, shipped):
+    """A model of one's own may have an `energy` of its own."""
+    energy = (
+        '<rdf:Description rdf:about="http://example.org/app#energy"><rdf:type '
+        'rdf:resource="http://metacontrol.org/tomasys#QualityAttributeType"/></rdf:Description>'
+    )
+    app = written(tmp_path / "app.owl", "http://example.org/app", IMPORT, inside=energy)
+    base = Ontology.load([app])
+    assert set(base.files) == {app, shipped / "tomasys.owl"}
+    assert base.model.attributes == {"energy": "http://example.org/app#energy"}
+
+
+def test_files_that_use_mros_through_tomasys_alone_still_have_it(suave_copy, shipped):
+    """Until version 1.0 the shipped tomasys.owl held the terms of mros."""
+    path = suave_copy(replace={f'<owl:imports rdf:resource="{MROS_IMPORT}"/>': ""})
+    found = collect([path])
+    assert {each.path for each in found.files} == {
+        path,
+        shipped / "tomasys.owl",
+        shipped / "mros.owl",
+    }
+    assert found.supplies[-1].reason.endswith("its terms are used without an import")
+
+
+def test_rules_that_two_files_share_count_once(suave_copy, shipped, tmp_path, kb):
+    """As with an older tomasys.owl, which holds the rules of mros, beside mros.owl."""
+    text = (shipped / "tomasys.owl").read_text(encoding="utf-8")
+    rules = (shipped / "mros.owl").read_text(encoding="utf-8").partition("// Rules")[2]
+    rules = rules[rules.index("<rdf:Description") :]
+    path = suave_copy()
+    older = path.with_name("tomasys.owl")
+    older.write_text(text.replace("</rdf:RDF>", rules), encoding="utf-8")
+    base = Ontology.load([path])
+    assert older in base.files
+    assert [rule.name for rule in base.rules] == [rule.name for rule in kb.rules]
+
+
+def test_kb_check_tells_which_file_supplies_an_import(tmp_path):
+    messages = [each.message for each in found(tmp_path)]
+    told = f"imports {IMPORT}: shipped/ontology/tomasys.owl supplies it (shipped with suave-des)"
+    assert told in messages

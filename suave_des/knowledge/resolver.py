@@ -1,0 +1,281 @@
+"""Find the local file that supplies each import of ontology files. Nothing is ever fetched.
+
+In this order, as Protégé and owlready2 find them, with the shipped files last:
+
+1. a file that was given, or imported already, whose ontology has the imported IRI;
+2. the file that Protégé's catalog-v001.xml beside the importing file names for the IRI;
+3. the file that the IRI itself names: a file: URL, or a path relative to the importing file;
+4. a file beside the importing one whose ontology has the IRI;
+5. a file that was given, by its name: the last part of the IRI;
+6. a file of that name beside the importing one;
+7. a shipped file, by the IRI or by the name.
+
+A file never supplies what it imports itself. Two IRIs are the same if they differ in no more than
+their scheme and their last mark, '#' or '/'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from urllib.parse import urldefrag, urlsplit
+from urllib.request import url2pathname
+
+from lxml import etree
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.files import read_bytes
+from suave_des.knowledge.ontology_file import MAX_BYTES, RELATIVE_TO, OntologyFile, read_ontology
+from suave_des.knowledge.rdf import MROS, TOMASYS, local_name
+from suave_des.resources import shipped_folder
+
+_ENDINGS: Final = (".owl", ".rdf", ".xml")
+_CATALOG: Final = "catalog-v001.xml"
+_CATALOG_ENTRY: Final = "{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"
+_SHIPPED: Final = ("tomasys", "mros", "suave", "suave_extended")
+_BESIDE: Final = "give the imported ontology's file too, or put it beside this one"
+
+
+@dataclass(frozen=True)
+class Supply:
+    """Which file supplies an import, and why that one.
+
+    Attributes:
+        importing: the file with the import.
+        line: of the import in it; 0 where it is not known.
+        iri: of the imported ontology.
+        file: that supplies it.
+        reason: how the file was found, for users.
+    """
+
+    importing: Path
+    line: int
+    iri: str
+    file: Path
+    reason: str
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Ontology files with all that they import, directly or not.
+
+    Attributes:
+        files: each once; those that were given come first.
+        supplies: which file supplies each import.
+    """
+
+    files: tuple[OntologyFile, ...]
+    supplies: tuple[Supply, ...]
+
+
+def collect(given: Sequence[Path]) -> Sources:
+    """Read the given files, or the shipped suave.owl, and all that they import, directly or not.
+
+    Raises:
+        KnowledgeError: a file cannot be used, two different files supply one ontology, or an import
+            does not resolve.
+    """
+    files: list[OntologyFile] = []
+    supplies: list[Supply] = []
+    for path in given or [shipped_folder("ontology") / "suave.owl"]:
+        _add(files, read_ontology(path))
+    # The user's files first, so that the order of imports does not matter.
+    for find in (_among_own_files, _among_all_files):
+        for file in files:  # grows meanwhile, by imports of imports
+            for iri, line in file.imports:
+                if any(each.importing == file.path and each.iri == iri for each in supplies):
+                    continue
+                found = find(file, iri, files)
+                if found is not None:
+                    source, reason = found
+                    supplies.append(Supply(file.path, line, iri, source.path, reason))
+                    _add(files, source)
+    _add_mros_if_used(files, supplies)
+    return Sources(tuple(files), tuple(supplies))
+
+
+def is_shipped(file: OntologyFile) -> bool:
+    """Return whether a file is one of those that come with the program."""
+    return file.path.parent == shipped_folder("ontology")
+
+
+def is_metamodel(file: OntologyFile) -> bool:
+    """Return whether a file is TOMASys or mros, whose rules are for any model."""
+    return any(has_iri(file, iri) or has_name(file.path, iri) for iri in (TOMASYS, MROS))
+
+
+def as_written(iri: str) -> str:
+    """Return an imported IRI as its file writes it: a relative one without the made-up base."""
+    return iri.removeprefix(RELATIVE_TO)
+
+
+def _among_own_files(
+    file: OntologyFile, iri: str, files: Sequence[OntologyFile]
+) -> tuple[OntologyFile, str] | None:
+    """Return the file of the user's that supplies an import, and how it was found."""
+    others = [each for each in files if each is not file and not is_shipped(each)]
+    for other in others:
+        if has_iri(other, iri):
+            return other, "by its IRI"
+    beside = [] if is_shipped(file) else list(_beside(file))
+    found = _where_the_file_says(file, iri, beside)
+    if found is not None:
+        return found
+    for other in others:
+        if has_name(other.path, iri):
+            return other, "by its name"
+    for path in beside:
+        if has_name(path, iri):
+            return read_ontology(path), "by its name, beside the importing file"
+    return None
+
+
+def _where_the_file_says(
+    file: OntologyFile, iri: str, beside: Sequence[Path]
+) -> tuple[OntologyFile, str] | None:
+    """Return the file that a catalog, the IRI itself or an IRI beside the importing file names."""
+    catalogued = _in_catalog(file, iri)
+    if catalogued is not None and catalogued.parent != shipped_folder("ontology"):
+        return read_ontology(catalogued), f"by {_CATALOG}"
+    named = _path_of(file, iri)
+    if named is not None and named.is_file():
+        return read_ontology(named), "by its path"
+    for path in beside:
+        if _may_have_iri(path, iri) and has_iri(read_ontology(path), iri):
+            return read_ontology(path), "by its IRI, beside the importing file"
+    return None
+
+
+def _among_all_files(
+    file: OntologyFile, iri: str, files: Sequence[OntologyFile]
+) -> tuple[OntologyFile, str]:
+    """Return the file that supplies an import, a shipped one where the user has none.
+
+    Raises:
+        KnowledgeError: there is none.
+    """
+    found = _among_own_files(file, iri, files)
+    if found is not None:
+        return found
+    for name in _SHIPPED:
+        source = read_ontology(shipped_folder("ontology") / f"{name}.owl")
+        if has_iri(source, iri) or has_name(source.path, iri):
+            return source, "shipped with suave-des"
+    line = dict(file.imports)[iri]
+    raise KnowledgeError(
+        f"import {as_written(iri)} does not resolve to a local file",
+        file=file.path,
+        place=f"line {line}" if line else None,
+        remedy="give the imported ontology's file too, or put it beside this one",
+    )
+
+
+def _add_mros_if_used(files: list[OntologyFile], supplies: list[Supply]) -> None:
+    """Add the shipped mros.owl for files that use its terms without any that describes them.
+
+    Until mros.owl was shipped, its terms stood in the shipped tomasys.owl.
+    """
+    is_described = any(subject.startswith(MROS) for file in files for subject, _, _ in file.triples)
+    if is_described:
+        return
+    for file in files:
+        terms = (term for triple in file.triples for term in triple[1:])
+        if any(isinstance(term, str) and term.startswith(MROS) for term in terms):
+            source = read_ontology(shipped_folder("ontology") / "mros.owl")
+            reason = "shipped with suave-des: its terms are used without an import"
+            supplies.append(Supply(file.path, 0, MROS, source.path, reason))
+            files.append(source)
+            return
+
+
+def _add(files: list[OntologyFile], new: OntologyFile) -> None:
+    for old in files:
+        if old.path.resolve() == new.path.resolve() or old.content == new.content:
+            return
+        if set(map(_comparable, old.iris)) & set(map(_comparable, new.iris)):
+            problem = f"supplies the ontology {new.iris[0]}, and so does {old.path}"
+            raise KnowledgeError(problem, file=new.path, remedy="give one of the two")
+    files.append(new)
+
+
+def has_iri(file: OntologyFile, iri: str) -> bool:
+    """Return whether a file's ontology has an IRI; an anonymous one has that of xml:base."""
+    known = file.iris
+    if not known and file.base is not None:
+        known = (file.base,)
+    return _comparable(iri) in map(_comparable, known)
+
+
+def has_name(path: Path, iri: str) -> bool:
+    """Return whether a file has the name of an ontology: the last part of its IRI."""
+    last = local_name(_comparable(iri))
+    names = {last}
+    for ending in _ENDINGS:
+        names.add(last.removesuffix(ending))
+    return _without_ending(path.name) in {_without_ending(name) for name in names}
+
+
+def _without_ending(name: str) -> str:
+    for ending in _ENDINGS:
+        if name.endswith(ending):
+            return name.removesuffix(ending)
+    return name
+
+
+def _comparable(iri: str) -> str:
+    """Return an IRI without scheme and last mark: those of one ontology are equal in this form."""
+    return urldefrag(iri)[0].partition("://")[2].rstrip("/") or iri
+
+
+def _beside(file: OntologyFile) -> Iterator[Path]:
+    """Yield the other ontology files in the folder of a file, by name."""
+    for path in sorted(file.path.parent.iterdir()):
+        is_other = path.resolve() != file.path.resolve()
+        if path.suffix in _ENDINGS and path.name != _CATALOG and is_other and path.is_file():
+            yield path
+
+
+def _may_have_iri(path: Path, iri: str) -> bool:
+    """Return whether a file has the text of an IRI, and can be read as an ontology."""
+    try:
+        if _comparable(iri).encode() not in read_bytes(path, MAX_BYTES):
+            return False
+        read_ontology(path)
+    except InputError:  # a file that happens to lie there is nobody's input
+        return False
+    return True
+
+
+def _path_of(file: OntologyFile, iri: str) -> Path | None:
+    """Return the path that an import itself names; None if it names none."""
+    if iri.startswith(RELATIVE_TO):
+        return file.path.parent / url2pathname(iri.removeprefix(RELATIVE_TO))
+    parts = urlsplit(iri)
+    if parts.scheme == "file":
+        return Path(url2pathname(parts.path))
+    return None
+
+
+def _in_catalog(file: OntologyFile, iri: str) -> Path | None:
+    """Return the file that Protégé's catalog in the folder names for an import, if it is there.
+
+    Raises:
+        KnowledgeError: the catalog is no XML.
+    """
+    catalog = file.path.parent / _CATALOG
+    if not catalog.is_file():
+        return None
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
+    try:
+        root = etree.fromstring(read_bytes(catalog, MAX_BYTES), parser)
+    except etree.XMLSyntaxError as error:
+        raise KnowledgeError(
+            f"not well-formed XML: {error.msg}", file=catalog, remedy="remove it, or correct it"
+        ) from error
+    for entry in root.iter(_CATALOG_ENTRY):
+        path = catalog.parent / url2pathname(urlsplit(entry.get("uri", "")).path)
+        if _comparable(entry.get("name", "")) == _comparable(iri) and path.is_file():
+            return path
+    return None
