@@ -16,7 +16,15 @@ from rdflib import RDF, Graph, Namespace, URIRef
 from rdflib.term import Node
 
 from suave_des.caches import SharedEntries, private_cache
-from suave_des.errors import Finding, InputError, KnowledgeError, Level, has_level, ordered
+from suave_des.errors import (
+    Finding,
+    InputError,
+    KnowledgeError,
+    Level,
+    has_level,
+    ordered,
+    relative_path,
+)
 from suave_des.kb.space import PolicySpace
 from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.checks import (
@@ -89,6 +97,7 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
         pellet = Reasoner(base, "cached", TimeLimit(subject.time_limit_s, "--time-limit"))
         for state in [KnowledgeState(), *islice(states_to_ask(base, subject.measured), MAX_STATES)]:
             pellet.analyze(state)
+        yield from ignored_by_pellet(base)
     except InputError as error:
         found, left_out = Finding.of(error), "contradictions were not checked with Pellet"
         if found.rule in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
@@ -96,6 +105,21 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
                 Level.NOTE, f"{left_out}: it does not use rule {found.rule} until it is corrected"
             )
         yield found
+
+
+def ignored_by_pellet(base: Ontology) -> Iterator[Finding]:
+    """Find the axioms that Pellet ignores; the same ontology is loaded once, then cached."""
+    program = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    kept = SharedEntries(private_cache("findings"), f"{base.content_hash[:32]}{program[:32]}")
+    said = next((found for _, found in kept.read()), None)
+    if said is None:
+        from suave_des.knowledge.pellet.in_process import ignored_axioms
+
+        said = ignored_axioms(base)
+        kept.add("ignored", said)
+    for axiom in said:
+        file = ", ".join(map(relative_path, base.files))
+        yield Finding(Level.WARN, f"Pellet ignores an axiom: {axiom}", file)
 
 
 def states_to_ask(

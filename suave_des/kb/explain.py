@@ -50,7 +50,6 @@ from suave_des.knowledge.state import (
     Fact,
     KnowledgeState,
     Reasoning,
-    objective_name,
     value_text,
 )
 
@@ -720,7 +719,8 @@ class Explainer:
         """Why a decision is made: the answer, which begins with the design that was asked about,
         and the reasons.
         """
-        function, objective = decision.function, objective_name(decision.function)
+        function = decision.function
+        objective = self.base.objectives[function]
         answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
         lines: list[str] = []
         for fact in self.facts:

@@ -231,13 +231,15 @@ def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
 
 
 def imports(material: Material) -> Iterator[Finding]:
-    """Note which file supplies each import of the user's files."""
+    """Note which files supply what the user's files import, in one line for each of these."""
     shipped = shipped_folder("ontology")
+    by_file: dict[Path, list[str]] = defaultdict(list)
     for supply in material.base.supplies:
         if supply.importing.parent != shipped:
-            what = f"imports {as_written(supply.iri)}"
-            message = f"{what}: {shown_name(supply.file)} supplies it ({supply.reason})"
-            yield Finding(Level.NOTE, message, str(supply.importing), supply.line or None)
+            said = f"{as_written(supply.iri)} is {shown_name(supply.file)} ({supply.reason})"
+            by_file[supply.importing].append(said)
+    for file, said_of_file in by_file.items():
+        yield Finding(Level.NOTE, f"imports: {'; '.join(said_of_file)}", str(file))
 
 
 # The model, and what missions have to do with it.
@@ -776,7 +778,6 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
 
 
 CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
-    imports,
     values,
     undefined_names,
     functions_without_design,
@@ -796,4 +797,5 @@ CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
     two_values,
     no_effect,
     misspelt_statuses,
+    imports,
 )

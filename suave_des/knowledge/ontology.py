@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Literal, NamedTuple, TypeGuard
+from typing import Final, NamedTuple, TypeGuard
 
 from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge import rdf
@@ -52,6 +52,12 @@ _PROPERTIES: Final = rdf.terms(
     rdf.OWL,
     "ObjectProperty DatatypeProperty FunctionalProperty InverseFunctionalProperty TransitiveProperty "
     "SymmetricProperty AsymmetricProperty ReflexiveProperty IrreflexiveProperty",
+)
+#: What only an object property can be: it is one, whether or not it is declared as one.
+_OF_OBJECT_PROPERTIES: Final = rdf.terms(
+    rdf.OWL,
+    "InverseFunctionalProperty TransitiveProperty SymmetricProperty AsymmetricProperty ReflexiveProperty "
+    "IrreflexiveProperty",
 )
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
 RULE_IRI: Final = "urn:suave-des:rule:"
@@ -184,6 +190,8 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
             if predicate == rdf.HAS_VALUE and local_name(subject) in values:
                 value = Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal")
             triples[subject, predicate, value] = None
+            if predicate == rdf.RDF_TYPE and value in _OF_OBJECT_PROPERTIES:
+                triples[subject, rdf.RDF_TYPE, rdf.OWL + "ObjectProperty"] = None
     return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules.values()))
 
 
@@ -334,60 +342,135 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
         KnowledgeError: two functions, designs, components or quality attribute types share a name.
     """
     triples = content.triples
-
-    def linked(predicate: str, place: Literal[0, 2]) -> set[str]:
-        """Subjects (0) or things as objects (2) of a property."""
-        return {
-            str(each[place])
-            for each in triples
-            if each[1] == predicate and isinstance(each[2], str)
-        }
-
-    def by_name(iris: Iterable[str], what: str) -> dict[str, str]:
-        """IRI by name; two of one kind must not share a name, since states are written with
-        names.
-        """
-        found: dict[str, str] = {}
-        for iri in sorted(iris):
-            other = found.setdefault(local_name(iri), iri)
-            if other != iri:
-                raise _wrong_in(
-                    iri,
-                    sources,
-                    f"two {what} have this name: {other} and {iri}",
-                    "rename one of them",
-                )
-        return dict(sorted(found.items()))
-
-    functions = by_name(_members(triples, "Function") | linked(_SOLVES_F, 2), "functions")
-    designs = by_name(
-        _members(triples, "FunctionDesign") | linked(_SOLVES_F, 0), "function designs"
-    )
-    parts = _members(triples, "Component") | linked(rdf.MROS + "requiredBy", 0)
-    components = by_name(parts | {s for s, p, _ in triples if p == rdf.C_STATUS}, "components")
-    types = _members(triples, "QualityAttributeType") | linked(rdf.IS_QA_TYPE, 2)
-    attributes = by_name(types, "quality attribute types")
-    existing = {
-        local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)
+    solved = _objects(triples, _SOLVES_F)
+    solving = _subjects(triples, _SOLVES_F)
+    parts = _subjects(triples, rdf.MROS + "requiredBy") | _subjects(triples, rdf.C_STATUS)
+    types = _objects(triples, rdf.IS_QA_TYPE)
+    found = {
+        "Function": _members(triples, "Function") | solved,
+        "FunctionDesign": _members(triples, "FunctionDesign") | solving,
+        "Component": _members(triples, "Component") | parts,
+        "QualityAttributeType": _members(triples, "QualityAttributeType") | types,
     }
-    named = ((functions, objective_name), (designs, grounding_name), (attributes, measurement_name))
-    objectives, groundings, measurements = (
-        {
-            name: existing.get(rename(name), rdf.namespace(iri) + rename(name))
-            for name, iri in things.items()
-        }
-        for things, rename in named
-    )
+    by_name = {kind: _by_name(iris, kind, sources) for kind, iris in found.items()}
+    objectives = _in_states(content, by_name["Function"], _OBJECTIVES)
+    groundings = _in_states(content, by_name["FunctionDesign"], _GROUNDINGS)
+    measurements = _in_states(content, by_name["QualityAttributeType"], _MEASUREMENTS)
     in_states = [*objectives.values(), *groundings.values(), *measurements.values()]
     if len(set(in_states)) < len(in_states):
-        problem = (
-            "two functions, function designs or quality attribute types differ in their prefix only"
-        )
         raise KnowledgeError(
-            problem, file=sources[0].path, remedy="rename one, for example f_search and search"
+            "two functions, function designs or quality attribute types differ in their prefix only",
+            file=sources[0].path,
+            remedy="rename one, for example f_search and search",
         )
-    own: dict[str, list[rdf.Triple]] = {iri: [] for iri in (*in_states, *components.values())}
-    individuals, kept = {*in_states}, list[rdf.Triple]()
+    components = by_name["Component"]
+    own, kept = _separated(triples, in_states, components.values())
+    model = Model(
+        functions=by_name["Function"],
+        designs=by_name["FunctionDesign"],
+        components=components,
+        attributes=by_name["QualityAttributeType"],
+        objectives=objectives,
+        groundings=groundings,
+        measurements=measurements,
+        own=own,
+        estimated=_estimated(triples, by_name["FunctionDesign"]),
+    )
+    return model, replace(content, triples=kept)
+
+
+_IN_WORDS: Final = {
+    "Function": "functions",
+    "FunctionDesign": "function designs",
+    "Component": "components",
+    "QualityAttributeType": "quality attribute types",
+}
+
+
+def _subjects(triples: Iterable[rdf.Triple], predicate: str) -> set[str]:
+    return {subject for subject, each, _ in triples if each == predicate}
+
+
+def _objects(triples: Iterable[rdf.Triple], predicate: str) -> set[str]:
+    return {value for _, each, value in triples if each == predicate and isinstance(value, str)}
+
+
+def _by_name(iris: Iterable[str], kind: str, sources: Sequence[OntologyFile]) -> dict[str, str]:
+    """Return IRIs by name; two of one kind must not share one, as states are written with names."""
+    found: dict[str, str] = {}
+    for iri in sorted(iris):
+        other = found.setdefault(local_name(iri), iri)
+        if other != iri:
+            problem = f"two {_IN_WORDS[kind]} have this name: {other} and {iri}"
+            raise _wrong_in(iri, sources, problem, "rename one of them")
+    return dict(sorted(found.items()))
+
+
+class _OfStates(NamedTuple):
+    """A kind of individuals that only states assert.
+
+    Attributes:
+        class_name: their class in TOMASys.
+        property: that leads to the function or the function design that one is for; None where
+            other individuals have that property, too.
+        rename: makes the name of one from that of what it is for.
+    """
+
+    class_name: str
+    property: str | None
+    rename: Callable[[str], str]
+
+
+_OBJECTIVES: Final = _OfStates("Objective", _TYPE_F, objective_name)
+_GROUNDINGS: Final = _OfStates("FunctionGrounding", _TYPE_FD, grounding_name)
+_MEASUREMENTS: Final = _OfStates("QAvalue", None, measurement_name)
+
+
+def _in_states(content: Content, things: Mapping[str, str], kind: _OfStates) -> dict[str, str]:
+    """Return the individual that states have for each of some things, by the thing's name.
+
+    It is the one that an ontology describes: by its property, else by its usual name, unless that
+    is the name of something else. Otherwise it is a new one.
+    """
+    triples = content.triples
+    named = {local_name(iri): iri for iri in sorted(_described(triples), reverse=True)}
+    others = _described(triples) - _members(triples, kind.class_name) - _without_class(triples)
+    linked: dict[str, list[str]] = {}
+    for subject, predicate, value in triples:
+        if predicate == kind.property and isinstance(value, str):
+            linked.setdefault(value, []).append(subject)
+    found: dict[str, str] = {}
+    for name, iri in things.items():
+        usual = kind.rename(name)
+        described = sorted(linked.get(iri, ()), key=lambda each: (local_name(each) != usual, each))
+        if described:
+            found[name] = described[0]
+        elif usual in named and named[usual] not in others:
+            found[name] = named[usual]
+        else:
+            new = rdf.namespace(iri) + usual
+            while new in others:
+                new += "_"
+            found[name] = new
+    return found
+
+
+def _described(triples: Iterable[rdf.Triple]) -> set[str]:
+    return {subject for subject, _, _ in triples}
+
+
+def _without_class(triples: Sequence[rdf.Triple]) -> set[str]:
+    """Return what has no class but those of OWL, such as owl:NamedIndividual."""
+    return _described(triples) - {individual for individual, _ in rdf.memberships(triples)}
+
+
+def _separated(
+    triples: Iterable[rdf.Triple], in_states: Iterable[str], components: Iterable[str]
+) -> tuple[dict[str, tuple[rdf.Triple, ...]], tuple[rdf.Triple, ...]]:
+    """Separate what holds only in states: return it by individual or component, and the rest."""
+    individuals = set(in_states)
+    own: dict[str, list[rdf.Triple]] = {iri: [] for iri in (*in_states, *components)}
+    kept: list[rdf.Triple] = []
     for triple in triples:
         subject, predicate, value = triple
         holder = next((str(term) for term in (subject, value) if term in individuals), None)
@@ -397,28 +480,32 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
             kept.append(triple)
         elif predicate not in _STATE_PROPERTIES and rdf.is_fact(triple):
             own[holder].append(triple)
+    return {iri: tuple(found) for iri, found in own.items()}, tuple(kept)
+
+
+def _estimated(
+    triples: Sequence[rdf.Triple], designs: Mapping[str, str]
+) -> dict[str, dict[str, Decimal | None]]:
+    """Return the smallest expected value of each quality attribute, by the design's name."""
     numbers = {
-        s: Decimal(o.text.strip()) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o)
+        subject: Decimal(value.text.strip())
+        for subject, predicate, value in triples
+        if predicate == rdf.HAS_VALUE and _is_decimal(value)
     }
     type_of = {
-        s: local_name(o) for s, p, o in triples if p == rdf.IS_QA_TYPE and isinstance(o, str)
+        subject: local_name(value)
+        for subject, predicate, value in triples
+        if predicate == rdf.IS_QA_TYPE and isinstance(value, str)
     }
-    estimated: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
-    for design, individual in (
-        (s, str(o)) for s, p, o in triples if p == _HAS_QA_ESTIMATION and o in type_of
-    ):
-        if designs.get(name := local_name(design)) == design:
-            values = (estimated[name].get(type_of[individual]), numbers.get(individual))
-            estimated[name][type_of[individual]] = min(
-                (each for each in values if each is not None), default=None
-            )
-    model = Model(
-        *(functions, designs, components, attributes),
-        *(objectives, groundings, measurements),
-        own={iri: tuple(found) for iri, found in own.items()},
-        estimated={name: dict(sorted(found.items())) for name, found in estimated.items()},
-    )
-    return model, replace(content, triples=tuple(kept))
+    found: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
+    for design, predicate, value in triples:
+        name = local_name(design)
+        if predicate != _HAS_QA_ESTIMATION or value not in type_of or designs.get(name) != design:
+            continue
+        attribute = type_of[str(value)]
+        values = (found[name].get(attribute), numbers.get(str(value)))
+        found[name][attribute] = min((each for each in values if each is not None), default=None)
+    return {name: dict(sorted(values.items())) for name, values in found.items()}
 
 
 def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
@@ -688,6 +775,16 @@ class Ontology:
         return self._designs.get(function, ())
 
     @cached_property
+    def objectives(self) -> Mapping[str, str]:
+        """Name of the objective that states have for a function, by the function's name."""
+        return {name: self.names.short(iri) for name, iri in self.model.objectives.items()}
+
+    @cached_property
+    def groundings(self) -> Mapping[str, str]:
+        """Name of the grounding that states have of a design, by the design's name."""
+        return {name: self.names.short(iri) for name, iri in self.model.groundings.items()}
+
+    @cached_property
     def _designs(self) -> Mapping[str, tuple[str, ...]]:
         solving = sorted(
             (fact.subject, fact.value) for fact in self.facts if fact.property == "solvesF"
@@ -744,10 +841,23 @@ class Ontology:
         for name in sorted(functions):
             if name not in self.model.functions:
                 remedy = f"functions in the ontology: {', '.join(self.functions) or 'none'}"
+                other = self._other_namespace
+                if other is not None:
+                    remedy += (
+                        f"; it uses terms of {other}, but those of TOMASys are in {rdf.TOMASYS}"
+                    )
                 yield name, f"there is no function {name}, which the mission needs", remedy
             elif not self.designs(name):
                 remedy = f"add an individual of FunctionDesign with solvesF {name}"
                 yield name, f"function {name} has no function design", remedy
+
+    @property
+    def _other_namespace(self) -> str | None:
+        """The namespace in which solvesF is used, if that is not TOMASys' own."""
+        for _, predicate, _ in self.stated:
+            if local_name(predicate) == local_name(_SOLVES_F) and predicate != _SOLVES_F:
+                return rdf.namespace(predicate)
+        return None
 
     def check(self, functions: Collection[str]) -> None:
         """Check that the mission's functions have function designs.

@@ -59,7 +59,6 @@ from suave_des.knowledge.state import (
     Rejection,
     Value,
     exact,
-    objective_name,
 )
 
 _SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
@@ -227,7 +226,7 @@ def triggers_adaptation(status: str) -> bool:
 
 def _trigger(objective: ObjectiveState, inference: Inference) -> str | None:
     """Return why an objective is adapted; None if it need not be."""
-    name = objective_name(objective.function)
+    name = inference.objectives[objective.function]
     for status in map(str, inference.values(name, "o_status")):
         if triggers_adaptation(status):
             return f"o_status {status}"
@@ -262,7 +261,7 @@ def _decide(ontology: Ontology, inference: Inference, function: str, trigger: st
 
 
 def _rejection_reasons(inference: Inference, design: str, function: str) -> Iterator[str]:
-    objective = objective_name(function)
+    objective = inference.objectives[function]
     if False in inference.values(design, "fd_realisability"):
         yield "not realisable"
     if objective in inference.values(design, "fd_error_log"):
@@ -471,7 +470,7 @@ class Reasoner:
         asserted_in = partial(self.base.asserted, facts=facts)
         inferred = self._known.get(key)
         if inferred is not None:
-            return Inference(state, asserted_in, inferred)
+            return self._inference(state, asserted_in, inferred)
         entailed = self._backend(state, (*self.base.assertions(state), *facts))
         inferred = frozenset(facts_of(entailed, self.base.names)) - asserted_in(state)
         if facts or not self._mentions_measured(state, inferred):
@@ -480,7 +479,16 @@ class Reasoner:
                 del self._known[next(iter(self._known))]
             if self._disk is not None and not facts:
                 self._disk.add(str(key), sorted(map(_written, inferred)))
-        return Inference(state, asserted_in, inferred)
+        return self._inference(state, asserted_in, inferred)
+
+    def _inference(
+        self,
+        state: KnowledgeState,
+        asserted_in: Callable[[KnowledgeState], frozenset[Fact]],
+        inferred: frozenset[Fact],
+    ) -> Inference:
+        base = self.base
+        return Inference(state, asserted_in, inferred, base.objectives, base.groundings)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
         """Whether a measured value is among the inferred ones, so that it would be wrong for

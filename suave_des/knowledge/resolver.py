@@ -162,7 +162,7 @@ def _among_all_files(
     for name in _SHIPPED:
         source = read_ontology(shipped_folder("ontology") / f"{name}.owl")
         if has_iri(source, iri) or has_name(source.path, iri):
-            return source, "shipped with suave-des"
+            return source, "shipped"
     line = dict(file.imports)[iri]
     raise KnowledgeError(
         f"import {as_written(iri)} does not resolve to a local file",
@@ -184,7 +184,7 @@ def _add_mros_if_used(files: list[OntologyFile], supplies: list[Supply]) -> None
         terms = (term for triple in file.triples for term in triple[1:])
         if any(isinstance(term, str) and term.startswith(MROS) for term in terms):
             source = read_ontology(shipped_folder("ontology") / "mros.owl")
-            reason = "shipped with suave-des: its terms are used without an import"
+            reason = "shipped: its terms are used without an import"
             supplies.append(Supply(file.path, 0, MROS, source.path, reason))
             files.append(source)
             return

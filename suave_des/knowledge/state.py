@@ -163,11 +163,15 @@ class Inference:
         state: the state that was analyzed.
         asserted_in: finds the facts of the knowledge base and of a state, when they are needed.
         facts: the inferred facts, none of which is asserted.
+        objectives: name of a function's objective, by the function's name.
+        groundings: name of a function design's grounding, by the design's name.
     """
 
     state: KnowledgeState
     asserted_in: Callable[[KnowledgeState], frozenset[Fact]] = field(compare=False, repr=False)
     facts: frozenset[Fact]
+    objectives: Mapping[str, str] = field(compare=False, repr=False)
+    groundings: Mapping[str, str] = field(compare=False, repr=False)
 
     @cached_property
     def asserted(self) -> frozenset[Fact]:
@@ -197,14 +201,16 @@ class Inference:
 
     def objective_status(self, function: str) -> str | None:
         """Status of a function's objective, asserted or inferred; None while it is met."""
-        return next(map(str, self.values(objective_name(function), "o_status")), None)
+        return next(map(str, self.values(self.objectives[function], "o_status")), None)
 
     def grounding_status(self, function: str) -> str | None:
         """Status of a function's current grounding; None if it has no problem, or if there is no
         grounding.
         """
-        grounding = grounding_name(self.state.grounded(function) or "")
-        return next(map(str, self.values(grounding, "fg_status")), None)
+        design = self.state.grounded(function)
+        if design is None:
+            return None
+        return next(map(str, self.values(self.groundings[design], "fg_status")), None)
 
     @cached_property
     def statuses(self) -> frozenset[str]:
@@ -215,7 +221,7 @@ class Inference:
             if status is not None and status != objective.status:
                 found.append(f"objective of {objective.function} is {status}")
             if (
-                True in self.values(objective_name(objective.function), "o_updatable")
+                True in self.values(self.objectives[objective.function], "o_updatable")
                 and not objective.always_improve
             ):
                 found.append(f"objective of {objective.function} is updatable")
@@ -289,17 +295,17 @@ class Reasoning:
 
 
 def objective_name(function: str) -> str:
-    """Name of the objective of a function: o_generate_search_path for f_generate_search_path."""
+    """Usual name of the objective of a function: o_generate_search_path for f_generate_search_path."""
     return f"o_{function.removeprefix('f_')}"
 
 
 def grounding_name(design: str) -> str:
-    """Name of the grounding of a function design: fg_spiral_high for fd_spiral_high."""
+    """Usual name of the grounding of a function design: fg_spiral_high for fd_spiral_high."""
     return f"fg_{design.removeprefix('fd_')}"
 
 
 def measurement_name(attribute: str) -> str:
-    """Name of the measured value of a quality attribute type: obs_water_visibility for
+    """Usual name of the measured value of a quality attribute type: obs_water_visibility for
     water_visibility.
     """
     return f"obs_{attribute}"

@@ -169,18 +169,16 @@ def take_warnings() -> list[str]:
 
 
 def _capture_log() -> None:
-    """Send java.util.logging to a list instead of the terminal.
+    """Send java.util.logging to a list, and what Java prints nowhere, instead of to the terminal.
 
-    Jena's logger is loaded while nothing reaches the terminal: SLF4J reports there that it found
-    nothing to log with.
+    Pellet prints there when a built-in fails, and SLF4J that it found nothing to log with.
     """
     system = jpype.JClass("java.lang.System")
-    terminal = system.err
-    system.setErr(
-        jpype.JClass("java.io.PrintStream")(jpype.JClass("java.io.OutputStream").nullOutputStream())
+    nowhere = jpype.JClass("java.io.PrintStream")(
+        jpype.JClass("java.io.OutputStream").nullOutputStream()
     )
-    jpype.JClass("org.slf4j.LoggerFactory").getILoggerFactory()
-    system.setErr(terminal)
+    system.setErr(nowhere)
+    system.setOut(nowhere)
 
     @jpype.JImplements("java.util.logging.Filter")
     class Keep:
@@ -205,6 +203,7 @@ def _capture_log() -> None:
 _ESCAPE: Final = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
 _RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
 _PELLET: Final = "org.mindswap.pellet."
+_UNSUPPORTED: Final = "Unsupported axiom: "
 #: One inference at a time in a process: Pellet's term factory is shared by all its knowledge bases.
 one_at_a_time: Final = threading.RLock()
 
@@ -293,12 +292,17 @@ class InProcessPellet:
             copy = self._with(assertions)
             individuals = list(copy.getIndividuals())
             found: set[Triple] = {
-                (str(one), SAME, str(each)) for one in individuals for each in copy.getAllSames(one)
+                (_name(one), SAME, _name(each))
+                for one in individuals
+                for each in copy.getAllSames(one)
             }
             # Pellet names some that may be the same, and others in one direction only.
-            for one, other in {
-                tuple(sorted((str(a), str(b)))) for a in individuals for b in copy.getDifferents(a)
-            }:
+            pairs = {
+                tuple(sorted((_name(one), _name(other))))
+                for one in individuals
+                for other in copy.getDifferents(one)
+            }
+            for one, other in pairs:
                 if not load_n_triples(text + n_triple((one, SAME, other))).isConsistent():
                     found |= {(one, DIFFERENT, other), (other, DIFFERENT, one)}
             take_warnings()
@@ -374,13 +378,13 @@ class InProcessPellet:
 def _values(entries: Any, name: str) -> Iterator[Triple]:
     """Read the values of a property from Pellet's (subject, values) entries."""
     for entry in entries:
-        subject = str(entry.getKey().toString())
+        subject = _name(entry.getKey())
         for value in entry.getValue():
             yield subject, name, _read_term(value)
 
 
 def _members(individuals: Any, name: str) -> Iterator[Triple]:
-    return ((str(each.toString()), RDF_TYPE, name) for each in individuals)
+    return ((_name(each), RDF_TYPE, name) for each in individuals)
 
 
 def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
@@ -402,6 +406,16 @@ def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
                 found.update(_members(knowledge_base.getInstances(term(name)), name))
         take_warnings()
         return frozenset(found)
+
+
+def ignored_axioms(ontology: Ontology) -> list[str]:
+    """Return what Pellet says of axioms that it ignores, such as a transitivity that contradicts a
+    cardinality; each once, as it says it.
+    """
+    with one_at_a_time, _java_errors(ontology):
+        load_n_triples(ontology.content.n_triples()).isConsistent()
+        found = [each for each in take_warnings() if each.startswith(_UNSUPPORTED)]
+        return sorted(each.removeprefix(_UNSUPPORTED) for each in dict.fromkeys(found))
 
 
 def trace_contradiction(text: str) -> tuple[str, list[str]]:
@@ -458,10 +472,15 @@ def _files(ontology: Ontology) -> str:
     return ", ".join(map(str, ontology.files))
 
 
+def _name(term: Any) -> str:
+    """Return the IRI that a term of Pellet stands for; as text it would have escapes."""
+    return str(term.getName())
+
+
 def _read_term(term: Any) -> str | Lit:
     """Read one of Pellet's terms: an IRI, or a literal of text, language and datatype."""
     if term.getArity() != 3:
-        return str(term.toString())
+        return _name(term)
     text, language, datatype = (str(term.getArgument(number).getName()) for number in range(3))
     if datatype.endswith("PlainLiteral"):  # Pellet keeps all text so
         datatype = f"@{language}" if language else XSD + "string"

@@ -7,6 +7,7 @@ Slow (about a second each) and simple: the reference for the reasoner in this pr
 from __future__ import annotations
 
 import io
+import re
 import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -36,6 +37,12 @@ from suave_des.knowledge.rdf import (
 
 _PLAIN: Final = RDF_IRI + "PlainLiteral"
 _STATE_IRI: Final = "urn:suave-des:state"
+#: Literals of N-Triples, and IRIs that come back otherwise from Pellet's output, which owlready2
+#: reads: there Pellet writes apostrophes and characters beyond U+FFFF with escapes.
+_LITERAL_OR_ODD_IRI: Final = re.compile(
+    r"""("(?:[^"\\]|\\.)*")|<([^<>]*['\U00010000-\U0010ffff][^<>]*)>"""
+)
+_STAND_IN: Final = "urn:suave-des:name:"
 
 
 class StockPellet:
@@ -47,8 +54,26 @@ class StockPellet:
     """
 
     def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
-        self._text = ontology.content.n_triples()
+        self._stand_ins: dict[str, str] = {}
+        self._text = self._with_stand_ins(ontology.content.n_triples())
         self._properties, self._classes = terms or ontology.content.decision_terms()
+
+    def _with_stand_ins(self, text: str) -> str:
+        """Return N-Triples with another IRI in place of each that would come back otherwise."""
+
+        def stand_in(found: re.Match[str]) -> str:
+            literal, iri = found.groups()
+            if literal is not None:
+                return str(literal)
+            return f"<{self._stand_ins.setdefault(iri, f'{_STAND_IN}{len(self._stand_ins)}')}>"
+
+        return _LITERAL_OR_ODD_IRI.sub(stand_in, text)
+
+    def _named(self, term: str | Lit) -> str | Lit:
+        """Return the term that one read from the world stands for."""
+        if isinstance(term, Lit) or not term.startswith(_STAND_IN):
+            return term
+        return list(self._stand_ins)[int(term.removeprefix(_STAND_IN))]
 
     def infer(
         self, assertions: Sequence[Triple], limit_s: float | None = None
@@ -69,14 +94,14 @@ class StockPellet:
                 for each in assertions
                 if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"
             ]
-            text = self._text + "".join(
-                n_triple(triple) for triple in assertions if triple not in numbers
-            )
+            others = [triple for triple in assertions if triple not in numbers]
+            text = self._text + self._with_stand_ins("".join(map(n_triple, others)))
             ontology = world.get_ontology(_STATE_IRI).load(
                 fileobj=io.BytesIO(text.encode()), only_local=True
             )
             for triple in numbers:
-                _add_exactly(world, ontology, triple)
+                subject = self._stand_ins.get(triple[0], triple[0])
+                _add_exactly(world, ontology, (subject, *triple[1:]))
             if not _reason(world):
                 return None
             return frozenset(self._read(world)).difference(map(_as_float, numbers)).union(numbers)
@@ -86,12 +111,13 @@ class StockPellet:
     def _read(self, world: Any) -> Iterator[Triple]:
         graph = world.as_rdflib_graph()
         for name in self._properties:
-            for subject, _, value in graph.triples((None, URIRef(name), None)):
-                yield str(subject), name, _value(value)
+            iri = URIRef(self._stand_ins.get(name, name))
+            for subject, _, value in graph.triples((None, iri, None)):
+                yield str(self._named(str(subject))), name, self._named(_value(value))
         for name in self._classes:
-            for kind in _below(graph, name):
+            for kind in _below(graph, self._stand_ins.get(name, name)):
                 for subject in graph.subjects(RDF.type, kind):
-                    yield str(subject), RDF_TYPE, name
+                    yield str(self._named(str(subject))), RDF_TYPE, name
 
 
 def _value(term: Node) -> str | Lit:
