@@ -304,7 +304,7 @@ def _values_compared(x: Sample, y: Sample, *, is_paired: bool) -> dict[str, Any]
             row["difference"] = statistics.mean_interval(x - y)
         else:
             row["difference"] = statistics.difference_interval(x, y)
-    else:
+    elif not is_paired:
         x, y = statistics.with_finite_ranks(x, y)
     test = statistics.signed_rank_test if is_paired else statistics.rank_sum_test
     greater, less = statistics.shares_of_comparisons(x, y, is_paired=is_paired)

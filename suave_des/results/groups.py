@@ -27,7 +27,6 @@ from suave_des.results.horizon import (
     HORIZON,
     SAME_LIMIT_S,
     at_horizons,
-    common_horizon_s,
     to_horizon,
 )
 from suave_des.results.real import matched
@@ -132,7 +131,7 @@ def grouped(
         return _assisted(missions, frame, managers, metrics, simulated)
     frame = at_horizons(frame, missions.swept, by)
     averaged = [name for name in missions.swept if averages and name not in by]
-    alike = _alike_by_source(frame) if averages else {}
+    alike = alike_by_source(frame) if averages else {}
     groups, lacking = [], []
     for part, name, point in _parts(frame, managers, by):
         found = independent(part, _same_points(frame, part, by), averaged, alike)
@@ -177,7 +176,8 @@ def _of_managers(
         for name in managers or known:
             if name not in theirs:
                 raise unknown(f"there is no mission of {name}", name, theirs, "there are", place)
-    return missions.frame.query("manager in @managers") if managers else missions.frame
+    is_wanted = missions.frame["manager"].isin(list(managers) or known)
+    return missions.frame.loc[is_wanted]
 
 
 def _parts(
@@ -209,7 +209,8 @@ def _same_points(
     for name in by:
         value = part[name].iloc[0]
         is_same &= frame[name].isna() if value != value else frame[name] == value
-    return frame[is_same]
+    same: pandas.DataFrame = frame[is_same]
+    return same
 
 
 def _by_run(rows: pandas.DataFrame) -> pandas.DataFrame:
@@ -248,7 +249,7 @@ def _assisted(
             to_horizon(each, limit_s) for each in (frame, simulated_same, drawn)
         )
     else:
-        frame = to_horizon(frame, common_horizon_s(frame, ()))
+        frame = at_horizons(frame, ())
     sides = (*matched(frame, simulated_same, same.swept), drawn)
     groups = [
         Group(name, _by_run(part), horizon_s=limit_s)
@@ -396,7 +397,7 @@ def _with_draws(population: Missions) -> pandas.DataFrame:
     return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 
-def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
+def alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
     """Return by source how many runs are averaged, because some share a draw; of sources without
     runs nothing is.
     """
@@ -424,7 +425,7 @@ def independent(
     part: pandas.DataFrame,
     whole: pandas.DataFrame,
     averaged: Sequence[str],
-    alike_by_source: Mapping[str, int],
+    alike: Mapping[str, int],
 ) -> Independent:
     """Average the missions of one manager and source to what is independent.
 
@@ -433,11 +434,11 @@ def independent(
         whole: those of any manager from the same source: what they have is to be had by each run
             and draw.
         averaged: swept parameters, over whose points a run is averaged.
-        alike_by_source: how many runs in a row share their draws, and are averaged; 1 if a source
+        alike: by source how many runs in a row share their draws, and are averaged; 1 if a source
             is not named.
     """
     points = len(whole[list(averaged)].drop_duplicates()) if averaged else 1
-    sharing = alike_by_source.get(str(part["source"].iloc[0]), 1)
+    sharing = alike.get(str(part["source"].iloc[0]), 1)
     rows, left_out = part, 0
     if points > 1:
         rows = _means(part, points)

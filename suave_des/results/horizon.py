@@ -13,6 +13,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas
 
 from suave_des.records.metrics import DETECTION_TIME, DURATION, FOUND, SEARCH_TIME
@@ -32,49 +33,60 @@ SAME_LIMIT_S = 1.5
 """Programs write limits that differ by a second for the same one."""
 
 
-def common_horizon_s(frame: pandas.DataFrame, swept: Sequence[str]) -> float:
-    """Return the time up to which all missions tell whether the pipeline was found.
+def horizons_s(
+    frame: pandas.DataFrame, swept: Sequence[str], by: Sequence[str] = ()
+) -> pandas.Series[float]:
+    """Return for each mission the time up to which all with the same values of `by` tell whether
+    the pipeline was found.
 
     That is the shortest time limit of those managers and points of a sweep that did not always find
     it; the longest search if all did; infinite if no limit is known.
     """
-    shortest_s, is_always_found = math.inf, True
-    for _, source in frame.groupby(["source", *swept], dropna=False, observed=True):
-        lasted_s = _whole_seconds(source[DURATION].max()) if DURATION in source else math.nan
-        for _, own in source.groupby("manager", observed=True):
-            if (own[FOUND] == 0.0).any():
-                is_always_found = False
-                shortest_s = min(shortest_s, _time_limit_s(own, lasted_s))
-    return float(frame[SEARCH_TIME].max()) if is_always_found else shortest_s
+    is_lost = frame[FOUND] == 0.0
+    compared = _numbers(frame, by)
+    limits_s = _time_limits_s(frame, swept).where(is_lost)
+    shortest_s = limits_s.groupby(compared).transform("min")
+    is_always_found = ~is_lost.groupby(compared).transform("any")
+    longest_s = frame[SEARCH_TIME].groupby(compared).transform("max")
+    return shortest_s.where(~is_always_found, longest_s)
 
 
-def _time_limit_s(own: pandas.DataFrame, lasted_s: float) -> float:
-    """Return the time limit of missions of which some did not find the pipeline; infinite if it is
-    not known.
+def _time_limits_s(frame: pandas.DataFrame, swept: Sequence[str]) -> pandas.Series[float]:
+    """Return the time limit of each mission that did not find the pipeline; infinite if it is not
+    known.
 
-    Without a column for it, it is the time of those that did not, unless a mission found the
-    pipeline later, or lasted longer: then these ended before the limit.
-
-    Args:
-        lasted_s: duration of the longest mission with the same limit, of any manager; nan if it is
-            not known.
+    Missions of one source have one limit, but for a sweep's points. Where no column has it, it is
+    the time of those of a manager that did not find the pipeline, unless one of them found it
+    later, or any mission of the source lasted longer: then these had ended before the limit.
     """
-    if TIME_LIMIT in own and own[TIME_LIMIT].notna().any():
-        return float(own[TIME_LIMIT].max())
-    lost = own[FOUND] == 0.0
-    lost_s = float(own.loc[lost, SEARCH_TIME].max())
-    found_s = float(own.loc[~lost, SEARCH_TIME].max())
-    if not math.isnan(lasted_s):
-        return min(lost_s, lasted_s) if lost_s > lasted_s - SAME_LIMIT_S else lasted_s
-    return math.inf if found_s > lost_s + SAME_LIMIT_S else lost_s
+    source, own = (
+        _numbers(frame, ["source", *swept]),
+        _numbers(frame, ["source", "manager", *swept]),
+    )
+    times_s, is_lost = frame[SEARCH_TIME], frame[FOUND] == 0.0
+    lost_s = times_s.where(is_lost).groupby(own).transform("max")
+    found_s = times_s.where(~is_lost).groupby(own).transform("max")
+    limits_s = lost_s.where(~(found_s > lost_s + SAME_LIMIT_S), math.inf)
+    if DURATION in frame:
+        lasted_s = np.floor(frame[DURATION].groupby(source).transform("max"))  # as search times
+        has_reached = lost_s > lasted_s - SAME_LIMIT_S
+        by_duration_s = lasted_s.where(~has_reached, np.minimum(lost_s, lasted_s))
+        limits_s = by_duration_s.fillna(limits_s)
+    if TIME_LIMIT in frame:
+        limits_s = frame[TIME_LIMIT].fillna(limits_s)
+    return limits_s
 
 
-def _whole_seconds(time_s: float) -> float:
-    """Return a time as search times are counted; nan for nan."""
-    return time_s if math.isnan(time_s) else float(math.floor(time_s))
+def _numbers(frame: pandas.DataFrame, columns: Sequence[str]) -> pandas.Series[int]:
+    """Return a number for each mission, the same of those with equal values in columns."""
+    if not columns:
+        return pandas.Series(0, frame.index)
+    return frame.groupby(list(columns), dropna=False, observed=True).ngroup()
 
 
-def to_horizon(frame: pandas.DataFrame, horizon_s: float) -> pandas.DataFrame:
+def to_horizon(
+    frame: pandas.DataFrame, horizon_s: float | pandas.Series[float]
+) -> pandas.DataFrame:
     """Return missions with the times of search and detection as they are known at a horizon, and
     with the columns FOUND_BY_HORIZON, HORIZON and ENDED.
 
@@ -103,9 +115,8 @@ def at_horizons(
     """Return missions brought to the horizon that all have in common; where managers are compared
     at each value of swept parameters, `by`, to that of each.
     """
-    parts = frame.groupby(list(by), sort=False, dropna=False, observed=True) if by else ()
-    groups = frame.drop_duplicates(["manager", "source", *by])
-    if len(parts) == len(groups) or len(parts) < 2:  # the values are compared with each other
-        return to_horizon(frame, common_horizon_s(frame, swept))
-    brought = [to_horizon(part, common_horizon_s(part, swept)) for _, part in parts]
-    return pandas.concat(brought).loc[frame.index]
+    values = len(frame[list(by)].drop_duplicates())
+    groups = len(frame[["manager", "source", *by]].drop_duplicates())
+    if values == groups:  # the values of one manager are compared with each other
+        by = ()
+    return to_horizon(frame, horizons_s(frame, swept, by))

@@ -294,10 +294,14 @@ def differences_of_pairs(first: Sample, second: Sample) -> Sample:
     """Return the differences of pairs in units of the greatest value.
 
     Means that are equal but for rounding errors have a difference of 0, and differences that are
-    equal but for these are ties.
+    equal but for these are ties. Infinite values differ by more than all others from finite ones,
+    and not from each other.
     """
-    scale = max(float(np.abs([first, second]).max()), math.ulp(0.0))
-    return np.round((first - second) / scale, 9)
+    pooled = np.abs([first, second])
+    scale = max(float(pooled[np.isfinite(pooled)].max(initial=0.0)), math.ulp(0.0))
+    with _quiet():
+        difference = np.nan_to_num((first - second) / scale, nan=0.0, posinf=3.0, neginf=-3.0)
+    return np.round(difference, 9)
 
 
 def _exact_ps(ranks: Sample, is_positive: NDArray[np.bool_]) -> list[float]:
