@@ -208,6 +208,42 @@ class TestSweep:
         assert "period_s 80: " in found.conclusion and "bt, period_s" not in found.conclusion
 
 
+@pytest.fixture(scope="module")
+def at_points() -> pandas.DataFrame:
+    """Missions of a and b at two points of a sweep, and of c at the first only."""
+    frame = runs(a=[100.0, 110.0], b=[120.0, 130.0], c=[140.0, 150.0])
+    second = frame[frame["manager"] != "c"].assign(search_time_s=frame["search_time_s"] + 5.0)
+    return pandas.concat([frame.assign(**{"x.y": 1.0}), second.assign(**{"x.y": 2.0})])
+
+
+@pytest.mark.parametrize(
+    ("against", "pairs"),
+    [
+        ("a, y 2", {("b, y 2", "a, y 2")}),  # at its own point only
+        ("c", {("a, y 1", "c, y 1"), ("b, y 1", "c, y 1")}),
+        ("a", {("b, y 1", "a, y 1"), ("c, y 1", "a, y 1"), ("b, y 2", "a, y 2")}),
+    ],
+)
+def test_others_are_compared_with_one_at_its_own_point(at_points, against, pairs):
+    found = compare_frame(at_points, by=["x.y"], against=against, metrics=["search_time_s"])
+    assert set(zip(found.differences["group"], found.differences["other"], strict=True)) == pairs
+
+
+def test_one_that_is_alone_at_its_point_is_compared_with_all_points(at_points):
+    alone = at_points[(at_points["manager"] == "a") | (at_points["x.y"] == 1.0)]
+    found = compare_frame(alone, by=["x.y"], against="a, y 2", metrics=["search_time_s"])
+    assert set(found.differences["group"]) == {"a, y 1", "b, y 1", "c, y 1"}
+
+
+def test_half_widths_are_a_twentieth_of_the_greater_mean_unless_the_metric_has_its_own():
+    frame = runs(a=[100.0, 140.0, 90.0], b=[120.0, 80.0, 95.0])
+    frame["adaptations"] = [-2.0, 4.0, 4.0, -8.0, -6.0, -4.0]  # means 2 and -6
+    found = compare_frame(frame, metrics=["adaptations", "search_time_s"])
+    assert list(found.differences["half_width"]) == pytest.approx([0.05 * 6.0, 5.0])
+    asked = compare_frame(frame, metrics=["adaptations"], half_widths=["adaptations:2"])
+    assert list(asked.differences["half_width"]) == [2.0]
+
+
 def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_named_as_such(
     tmp_path,
 ):

@@ -414,6 +414,17 @@ class TestManagers:
             agreement(sign, samples, (20, 20), rng(), subsamples=200) for sign in (1, 0, -1)
         ] == [0.0, 0.0, 1.0]
 
+    def test_a_subsample_has_no_mission_twice(self):
+        # Drawn without replacement, a sample of the whole is the sample, and its conclusion the same.
+        first, second = np.arange(6.0), np.arange(6.0) + 2.2
+        sign = sign_of(
+            *(
+                mann_whitney(first, second, "asymptotic")[f"p_{each}"]
+                for each in ("less", "greater")
+            )
+        )
+        assert agreement(sign, (first, second), (6, 6), rng(), subsamples=200) == 1.0
+
     def test_equal_managers_are_told_apart_by_chance_in_one_of_twenty_each_way(self):
         samples = normal(100, 20, 4_000, 1), normal(100, 20, 4_000, 2)
         shares = [agreement(sign, samples, (20, 20), rng()) for sign in (1, 0, -1)]
