@@ -29,6 +29,7 @@ from suave_des.records.missions import Missions, read_missions
 from suave_des.records.store import read_manifest
 from suave_des.results.compare import compare_groups
 from suave_des.results.groups import grouped
+from suave_des.results.horizon import at_horizons
 from suave_des.results.mission import Adaptation, adaptations
 from suave_des.results.style import looks
 from suave_des.tables import capital
@@ -132,7 +133,7 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
         is_paired: whether runs of the same seed and number share their random numbers.
     """
     groups = grouped(missions).groups
-    frame = missions.frame
+    frame = at_horizons(missions.frame, missions.swept)
     numbers = frame.groupby(["manager", "source"], sort=False).ngroup()  # as grouped() orders them
     every = max(1, math.ceil(len(frame) / MOST_DRAWN))
     has_runs = bool(frame["run"].notna().all())

@@ -21,6 +21,7 @@ COLUMN_TYPES = {
 COLUMNS = tuple(COLUMN_TYPES)
 SEARCH_TIME, DISTANCE = "search_time_s", "distance_inspected_m"
 FOUND, REACTION_TIME = "pipeline_found", "mean_reaction_time_s"
+DURATION, DETECTION_TIME = "mission_duration_s", "detection_time_s"
 REQUIREMENT = "requirement_"
 """Beginning of the columns of a scenario's requirements."""
 
@@ -97,6 +98,16 @@ class Metric:
         """Write an interval for a table; empty if there is none."""
         text = found.text(f".{self.interval_decimals}f", self.scale)
         return f"{text}%" if text and self.name == FOUND else text
+
+    def difference(self, value: float) -> str:
+        """Write a difference for a table: one of shares in points, which are percentage points."""
+        points = " points" if self.name == FOUND else ""
+        return f"{self.scale * value:.{self.decimals}f}{points}"
+
+    def difference_interval(self, found: Estimate) -> str:
+        """Write the interval of a difference for a table; empty if there is none."""
+        text = found.text(f".{self.interval_decimals}f", self.scale)
+        return f"{text} points" if text and self.name == FOUND else text
 
     def amount(self, value: float) -> str:
         """Write a difference's size for a sentence, with its unit."""

@@ -87,7 +87,10 @@ def _read_source(path: Path) -> Missions:
     """
     is_campaign, is_file = (path / RUNS_FILE).exists(), not path.is_dir()
     is_exemplars = not (is_campaign or is_file)
-    manifest = read_manifest(path.parent if is_file else path)
+    folder = path.parent if is_file else path
+    manifest = read_manifest(folder)
+    if is_file and path.name == RUNS_FILE and manifest:
+        is_campaign = True
     if is_exemplars and (path / STORE_FILE).is_file():
         remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
         raise InputError(
@@ -121,7 +124,9 @@ def _read_source(path: Path) -> Missions:
         frame, swept = in_papers_order(frame), ()
     if is_campaign:
         frame = frame.assign(**{SHARING: _sharing(manifest)})
-        notes += _unfinished(path, manifest)
+        notes += _unfinished(folder, manifest)
+    elif is_ours:
+        frame = frame.assign(**{SHARING: _sharing_seen(frame, swept)})
     return Missions(frame, swept, tuple(notes))
 
 
@@ -155,7 +160,7 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
     plain = pandas.DataFrame(frame).reset_index(drop=True)
     texts = ("scenario", "manager", "seed")
     missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in plain}
-    plain = plain.assign(**missing, source="", **{SHARING: int(frame.attrs.get(SHARING, 1))})
+    plain = plain.assign(**missing, source="")
     plain = plain.assign(**{name: plain[name].astype(str) for name in texts})
     numbers = [
         str(name) for name in plain if name == "run" or (name not in texts and metric_of(str(name)))
@@ -169,7 +174,8 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
         raise InputError(problem, remedy="it needs the columns of runs.csv") from None
     swept = _swept({}, plain)
     _check_once(plain, swept)
-    return Missions(plain, swept)
+    sharing = frame.attrs.get(SHARING) or _sharing_seen(plain, swept)
+    return Missions(plain.assign(**{SHARING: int(sharing)}), swept)
 
 
 def in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
@@ -186,6 +192,25 @@ def _sharing(manifest: Mapping[str, Any]) -> int:
         return max(1, int(manifest["runs_per_draw"])) if manifest["perturbations"] else 1
     except (ValueError, KeyError, TypeError):
         return 1
+
+
+def _sharing_seen(frame: pandas.DataFrame, swept: Sequence[str]) -> int:
+    """Return how many runs in a row share their draws, as the columns of drawn values show it: they
+    change only from one draw to the next. It is 1 if none do, or nothing shows it.
+    """
+    drawn = [
+        str(name)
+        for name in frame
+        if "." in str(name) and name not in swept and metric_of(str(name)) is None
+    ]
+    runs = frame.dropna(subset=["run"]).drop_duplicates(["seed", "run"])
+    runs = runs.sort_values(["seed", "run"], kind="stable")
+    if not drawn or len(runs) < 2:
+        return 1
+    follows = (runs["seed"] == runs["seed"].shift()) & (runs["run"] == runs["run"].shift() + 1)
+    values = runs[drawn].astype(str)
+    changes = runs.loc[follows & (values != values.shift()).any(axis=1), "run"]
+    return math.gcd(*(int(run) - 1 for run in changes)) or 1
 
 
 def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:

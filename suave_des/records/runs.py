@@ -89,7 +89,7 @@ _LAYOUT_1_5: _Layout = {
     "mission name": ("manager", lambda of: of["name"]),
     "datetime": ("", lambda of: f"{of['stamp']:%d}-{of['month']}-{of['stamp']:%Y-%H-%M-%S}"),
     "initial pos (x,y)": ("", lambda of: of["position"]),
-    "mission duration (s)": ("", lambda of: int(of[_DURATION])),
+    "mission duration (s)": (_DURATION, lambda of: int(of[_DURATION])),
     "pipeline found": (FOUND, lambda of: of[FOUND]),
     # The program writes the mission's duration when the pipeline was not found.
     "time searching pipeline (s)": (
@@ -275,6 +275,8 @@ class _Cells:
             DISTANCE: self._numbers(DISTANCE, least=0.0),
             FOUND: found,
         }
+        if limit_s is not None:
+            values[_LIMIT] = limit_s
         frame = pandas.DataFrame(values, index=self.text.index)
         if not is_campaigns:  # the exemplar writes 0.0 for none, a campaign nothing
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
 
 import numpy as np
 import pandas
+from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, number_of, shown, unknown
-from suave_des.estimates import STUDENT, Estimate, share_of, t_quantile
+from suave_des.estimates import STUDENT, Estimate, known, share_of, t_quantile
 from suave_des.files import as_number
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
 from suave_des.records.missions import SHARING, Missions, Source, missions_in
@@ -31,6 +32,7 @@ from suave_des.results.comparison import (
     concluded,
 )
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
+from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
 from suave_des.results.real import CONDITION
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
@@ -180,15 +182,13 @@ def compare_groups(
         (*pair, metric, widths.get(metric.name)) for metric in groups.metrics for pair in pairs
     )
     found = [_difference(*each, unpaired=unpaired) for each in asked]
-    tested = [row for row in found if row["test"]]
-    for row, p in zip(tested, statistics.holm([row["p"] for row in tested]), strict=True):
-        row["p_holm"] = p
+    for column, name in (("p", "p_holm"), ("mean_p", "mean_p_holm")):
+        tested = [row for row in found if row.get(column) is not None]
+        ps = statistics.holm([row[column] for row in tested])
+        for row, p in zip(tested, ps, strict=True):
+            row[name] = p
     largest = _largest(() if unpaired else pairs, groups.metrics[0], groups.missions.folders)
-    summaries = [
-        _summary(group, metric, groups.time_limit_s)
-        for metric in groups.metrics
-        for group in groups.groups
-    ]
+    summaries = [_summary(group, metric) for metric in groups.metrics for group in groups.groups]
     return concluded(groups, summaries, found, *largest)
 
 
@@ -224,15 +224,15 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
-def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
-    """Estimate one metric of one group; the restricted mean of search times reaches to
-    horizon_s.
+def _summary(group: Group, metric: Metric) -> dict[str, Any]:
+    """Estimate one metric of one group; the restricted mean of search times reaches to the
+    horizon.
     """
-    known = group.frame[group.frame[metric.name].notna()]
-    sample = known[metric.name].to_numpy(float)
+    rows = group.frame[group.frame[metric.name].notna()]
+    sample = rows[metric.name].to_numpy(float)
     row: dict[str, Any] = {"group": group.name, "metric": metric.name}
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
-    if not len(sample):
+    if not len(sample) or np.isinf(sample).any():
         return row
     is_share = metric.name == FOUND and group.is_of_missions
     mean = (
@@ -244,11 +244,11 @@ def _summary(group: Group, metric: Metric, horizon_s: float) -> dict[str, Any]:
     )
     row["std"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
     if metric.name == SEARCH_TIME and group.is_of_missions:
-        was_found = known[FOUND].to_numpy(float)
-        if not np.isnan(was_found).any():
-            restricted, half = statistics.search_times(sample, was_found > 0.0, horizon_s)
+        was_found = rows[FOUND_BY_HORIZON].to_numpy(float)
+        if math.isfinite(group.horizon_s) and not np.isnan(was_found).any():
+            restricted, half = statistics.search_times(sample, was_found > 0.0, group.horizon_s)
             row |= {
-                "horizon_s": horizon_s,
+                "horizon_s": group.horizon_s,
                 "restricted_mean_s": restricted,
                 "censored_median_s": half,
             }
@@ -266,22 +266,49 @@ def _difference(
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row
-    is_share = metric.name == FOUND and first.is_of_missions and second.is_of_missions
-    if is_paired and is_share:
-        difference = statistics.paired_share_difference(x > 0.0, y > 0.0)
-        test = statistics.paired_shares_test(x > 0.0, y > 0.0)
-    elif is_paired:
-        difference, test = statistics.mean_interval(x - y), statistics.signed_rank_test(x, y)
-    elif is_share:
-        counts = (int(x.sum()), len(x)), (int(y.sum()), len(y))
-        difference, test = statistics.share_difference(*counts), statistics.shares_test(*counts)
+    if metric.name == FOUND and first.is_of_missions and second.is_of_missions:
+        row |= _shares_compared(x > 0.0, y > 0.0, is_paired=is_paired)
     else:
-        difference, test = statistics.difference_interval(x, y), statistics.rank_sum_test(x, y)
-    row |= test | {"difference": difference.cut(-1.0, 1.0) if metric.name == FOUND else difference}
+        row |= _values_compared(x, y, is_paired=is_paired)
+    if metric.name == FOUND:
+        row["difference"] = row["difference"].cut(-1.0, 1.0)
+    if math.isnan(row["difference"].value):
+        return row
     half_width = (
         half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
     )
     return row | _runs_needed(x, y, half_width, is_paired=is_paired)
+
+
+def _shares_compared(
+    x: NDArray[np.bool_], y: NDArray[np.bool_], *, is_paired: bool
+) -> dict[str, Any]:
+    if is_paired:
+        difference = statistics.paired_share_difference(x, y)
+        return statistics.paired_shares_test(x, y) | {"difference": difference}
+    counts = (int(x.sum()), len(x)), (int(y.sum()), len(y))
+    difference = statistics.share_difference(*counts)
+    return statistics.shares_test(*counts) | {"difference": difference}
+
+
+def _values_compared(x: Sample, y: Sample, *, is_paired: bool) -> dict[str, Any]:
+    """Compare means, ranks, and in how many pairs the one or the other has more.
+
+    Infinite values are later than all others by ranks, and have no mean.
+    """
+    row: dict[str, Any] = {"difference": Estimate(), "mean_test": None, "mean_p": None}
+    if np.isfinite(x).all() and np.isfinite(y).all():
+        name, p = statistics.means_test(x, y, is_paired=is_paired)
+        row |= {"mean_test": name, "mean_p": known(p)}
+        if is_paired:
+            row["difference"] = statistics.mean_interval(x - y)
+        else:
+            row["difference"] = statistics.difference_interval(x, y)
+    elif not is_paired:
+        x, y = statistics.with_finite_ranks(x, y)
+    test = statistics.signed_rank_test if is_paired else statistics.rank_sum_test
+    greater, less = statistics.shares_of_comparisons(x, y, is_paired=is_paired)
+    return row | test(x, y) | {"share_greater": greater, "share_less": less}
 
 
 def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) -> dict[str, Any]:
@@ -311,6 +338,9 @@ def _samples(
     same order if so.
     """
     x, y = first.frame[metric], second.frame[metric]
+    if metric in TIMES and first.horizon_s != second.horizon_s:
+        horizon_s = min(first.horizon_s, second.horizon_s)
+        x, y = x.clip(upper=horizon_s), y.clip(upper=horizon_s)
     apart = x.dropna().to_numpy(float), y.dropna().to_numpy(float)
     if unpaired:
         return False, "not paired: as asked", *apart
@@ -345,10 +375,11 @@ def _largest(
     for first, second in pairs:
         if not all(each.has_runs and each.is_of_missions for each in (first, second)):
             continue
-        apart = (first.frame[metric.name] - second.frame[metric.name]).dropna()
+        apart = first.frame[metric.name] - second.frame[metric.name]
+        apart = apart[np.isfinite(apart)]
         if apart.any():
             ends = least_and_greatest(apart)
-            cells = (text for value, run in ends for text in (metric.number(value), str(run)))
+            cells = (text for value, run in ends for text in (metric.difference(value), str(run)))
             rows.append((f"{first.name} - {second.name}", *cells))
             firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
             managers, sources = (

@@ -14,16 +14,9 @@ import pandas
 from suave_des.errors import number_of
 from suave_des.estimates import Estimate, interval_names
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
+from suave_des.results.conclusions import conclusion, difference_claim, overall_conclusion
 from suave_des.results.groups import Groups, listed
-from suave_des.results.statistics import (
-    A12,
-    FISHER,
-    MANN_WHITNEY,
-    MCNEMAR,
-    RANK_BISERIAL,
-    SIGNIFICANCE,
-    WILCOXON,
-)
+from suave_des.results.statistics import A12, RANK_BISERIAL
 from suave_des.tables import EFFECT, Section, Table, Written, capital, rows_of
 
 Row = Mapping[str, Any]
@@ -33,16 +26,10 @@ _EFFECTS = {
     RANK_BISERIAL: "Effect: rank-biserial correlation, 1 if the first has the greater value in all pairs.",
     A12: "Effect: A12, the probability that a mission of the first has the greater value.",
 }
-_SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
-_MOST_SENTENCES = 3
-"""Of a metric of which neither more nor less is better, in the conclusion from all differences."""
 _WORSE = 0.9
 """Ratio of variances below which pairing is said to be worse than not pairing; chance explains what
 is nearer 1.
 """
-_OPEN = (
-    "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
-)
 
 
 def _ends(name: str) -> tuple[str, ...]:
@@ -50,44 +37,15 @@ def _ends(name: str) -> tuple[str, ...]:
 
 
 _SUMMARY = (
-    *(
-        "group",
-        "metric",
-        "n",
-        "missing",
-        *_ends("mean"),
-        "mean_interval",
-        "std",
-        "median",
-        "q1",
-        "q3",
-        "horizon_s",
-    ),
-    *(*_ends("restricted_mean_s"), "restricted_mean_s_interval", *_ends("censored_median_s")),
+    *("group", "metric", "n", "missing", *_ends("mean"), "mean_interval", "std"),
+    *("median", "q1", "q3", "horizon_s", *_ends("restricted_mean_s")),
+    *("restricted_mean_s_interval", *_ends("censored_median_s")),
 )
 _DIFFERENCE = (
-    *(
-        "group",
-        "other",
-        "metric",
-        "paired",
-        "why",
-        "n",
-        "n_other",
-        *_ends("difference"),
-        "difference_interval",
-    ),
-    *(
-        "test",
-        "p",
-        "p_holm",
-        "p_less",
-        "p_greater",
-        "effect_name",
-        *_ends("effect"),
-        "variance_ratio",
-        "half_width",
-    ),
+    *("group", "other", "metric", "paired", "why", "n", "n_other"),
+    *(*_ends("difference"), "difference_interval", "mean_test", "mean_p", "mean_p_holm"),
+    *("test", "p", "p_holm", "p_less", "p_greater", "effect_name", *_ends("effect")),
+    *("share_greater", "share_less", "variance_ratio", "half_width"),
     *("runs_needed_paired", "runs_needed_unpaired", "conclusion"),
 )
 """Columns of the frames, in order."""
@@ -117,14 +75,18 @@ class Comparison(Written):
             its value of a sweep where that is needed), metric, n (independent values: missions, or
             runs where several points of a sweep are averaged), missing (missions without a value),
             mean (of `pipeline_found` the share), std, median, q1 and q3; of the search time
-            horizon_s (the time to which the restricted mean reaches), restricted_mean_s (of the
-            time until found or horizon_s, missions without it being censored) and censored_median_s
-            (time by which half of the missions have found the pipeline; nan if less than half do).
+            horizon_s (the shortest time limit, up to which search times count; missions that had
+            not found the pipeline by then have it as their time), restricted_mean_s (the mean up to
+            it) and censored_median_s (time by which half of the missions have found the pipeline;
+            nan if less than half do).
         differences: a row for each metric and pair: group, other, metric, paired (whether they are
             compared run by run), why, n (values of the one, or pairs), n_other, difference (of the
-            means, group - other), test, p (two-sided), p_holm (adjusted for all tests of this
-            comparison), p_less (one-sided: that the one is not less than the other), p_greater,
-            effect_name, effect, variance_ratio (by how much pairing divides the variance of the
+            means, group - other), mean_test, mean_p (two-sided: that the means are equal; none of
+            shares), mean_p_holm (adjusted for all these tests of this comparison), test (of ranks,
+            or of shares), p (two-sided), p_holm (adjusted likewise), p_less (one-sided: that the
+            one is not less than the other), p_greater, effect_name, effect, share_greater (of
+            pairs, or of comparisons of each with each, in which the one has more), share_less,
+            variance_ratio (by how much pairing divides the variance of the
             difference), half_width (of the interval for which the number of runs is given),
             runs_needed_paired (runs of each manager for that, if they are paired),
             runs_needed_unpaired (none: over ten million, or not known), and conclusion.
@@ -189,8 +151,10 @@ class Comparison(Written):
             pairs = list(dict.fromkeys(own["group"] + " - " + own["other"]))
             yield f"{capital(str(why))}{'' if len(whys) == 1 else f' ({listed(pairs, 4)})'}."
         if len(tested):
-            over_all = f", Holm's correction over all {len(tested)}" if len(tested) > 1 else ""
-            yield f"Tests: {', '.join(tested['test'].unique())}; two-sided{over_all}."
+            yield f"Tests: {', '.join(tested['test'].unique())}; two-sided{_over_all(len(tested))}."
+        of_means = tested["mean_test"].dropna()
+        if len(of_means):
+            yield f"Tests of means: {', '.join(of_means.unique())}; two-sided{_over_all(len(of_means))}."
         yield from (_EFFECTS[name] for name in tested["effect_name"].unique() if name)
         methods = (
             pandas.concat([self.summaries["mean_interval"], tested["difference_interval"]])
@@ -301,6 +265,10 @@ class AssistedComparison(Written):
         return [*how, *(f"Note: {note}." for note in self.notes)]
 
 
+def _over_all(tests: int) -> str:
+    return f", Holm's correction over all {tests}" if tests > 1 else ""
+
+
 # Tables
 
 
@@ -368,8 +336,8 @@ def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
     effect += f" ({size.text('.2f')})" if size.has_interval else ""
     return (
         *names,
-        metric.number(mean.value),
-        metric.interval(mean),
+        "" if math.isnan(mean.value) else metric.difference(mean.value),
+        metric.difference_interval(mean),
         _p(each["p"]),
         _p(each["p_holm"]),
         effect,
@@ -383,7 +351,7 @@ def _runs_row(each: Row, metric: Metric) -> tuple[str, ...]:
         f"{each['runs_needed_unpaired']:,}" if each["runs_needed_unpaired"] else "over 10,000,000"
     )
     half = (
-        f"{100 * each['half_width']:g}%"
+        f"{100 * each['half_width']:g} points"
         if metric.name == FOUND
         else f"{each['half_width']:.4g} {metric.unit}"
     )
@@ -399,9 +367,11 @@ def _p(p: float) -> str:
 
 def _assisted_cells(row: Row, metric: Metric) -> tuple[str, ...]:
     both = [estimate_in(row, name) for name in ("alone", "assisted")]
-    cells = [
-        text for found in both for text in (metric.number(found.value), metric.interval(found))
-    ]
+    if row["other"]:
+        value, interval = metric.difference, metric.difference_interval
+    else:
+        value, interval = metric.number, metric.interval
+    cells = [text for found in both for text in (value(found.value), interval(found))]
     equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] is not None else ""
     return (
         _group_name(row),
@@ -432,11 +402,13 @@ def concluded(
     Summaries and differences have the columns of Comparison's frames, but whole estimates.
     """
     by_name = {metric.name: metric for metric in groups.metrics}
+    tested = [row for row in differences if row["test"]]
     for row in differences:
+        row["tests"] = len(tested)
         row["conclusion"] = conclusion(row, by_name[row["metric"]])
     counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
     frames = (
-        _frame(summaries, _SUMMARY).astype({"horizon_s": "Int64"}),
+        _frame(summaries, _SUMMARY).astype({"horizon_s": "Float64"}),
         _frame(differences, _DIFFERENCE).astype(counts),
     )
     sentences = " ".join(_conclusions(groups, summaries, differences))
@@ -450,7 +422,7 @@ def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
     """
     plain = []
     for row in rows:
-        cells = dict.fromkeys(columns) | dict(row)
+        cells: dict[str, Any] = dict.fromkeys(columns) | dict(row)
         for name, found in row.items():
             if isinstance(found, Estimate):
                 cells |= found.columns(name) | {
@@ -470,7 +442,7 @@ def _conclusions(
     means = {
         each["group"]: each["mean"].value
         for each in summaries
-        if each["metric"] == metric.name and each["n"]
+        if each["metric"] == metric.name and "mean" in each
     }
     points = dict.fromkeys(group.point for group in groups.groups)
     if len(points) == 1 or len(points) == len(groups.groups):
@@ -481,15 +453,28 @@ def _conclusions(
         text = overall_conclusion(
             metric, differences, {name: means[name] for name in names if name in means}, names
         )
-        lost = [f"{name} in {groups.lost[name]}" for name in names if name in groups.lost]
-        if lost and metric.name == SEARCH_TIME:
-            what = "their search time is when they ended"
-            text = f"The pipeline was not found by {listed(lost)}; {what}. {text}"
+        if metric.name == SEARCH_TIME:
+            text = f"{_lost(groups, names)}{text}"
         points_of.setdefault(text.replace(point, "") if point else text, []).append(
             point.removeprefix(", ")
         )
     for text, where in points_of.items():
         yield f"{'; '.join(where)}: {text}" if where[0] else text
+
+
+def _lost(groups: Groups, names: Sequence[str]) -> str:
+    """Write which groups did not find the pipeline in most missions, and what these count with;
+    empty if none did not.
+    """
+    lost = [f"{name} in {groups.lost[name]}" for name in names if name in groups.lost]
+    if not lost:
+        return ""
+    horizon_s = min(group.horizon_s for group in groups.groups if group.name in names)
+    if math.isinf(horizon_s):
+        counts = "count as later than all that found it"
+    else:
+        counts = f"have {horizon_s:g} s as their search time"
+    return f"The pipeline was not found by {listed(lost)}, which {counts}. "
 
 
 def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
@@ -503,208 +488,20 @@ def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
         yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
 
 
-def conclusion(found: Row, metric: Metric) -> str:
-    """Write the conclusion from one difference.
-
-    The test is one of ranks, the difference one of means: what only one of them shows is not said
-    of the other.
-    """
-    group, other = found["group"], found["other"]
-    if not found["test"]:
-        return (
-            f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
-        )
-    apart, ranks = found["difference"], _direction_of_ranks(found)
-    if _is_equal(found):
-        return f"{group} and {other} have the same {metric.title} in all {number_of(found['n'], 'pair')}."
-    test, interval = f"{_basis(found)}, {p_text(found['p_holm'])}", _interval(found, metric)
-    mean = f"{group} - {other}: {metric.amount(apart.value)}, {interval}"
-    if found["p_holm"] >= SIGNIFICANCE:
-        but = f" by the test, though {_OPEN}" if _is_open(found) else ""
-        return f"No difference in {metric.title} is shown between {group} and {other}{but} ({mean}; {test})."
-    if not _is_claimed(found):
-        less, greater = (other, group)[:: 1 if ranks > 0.0 else -1]
-        first, phrase, second = (
-            (less, metric.less, greater) if metric.better < 0 else (greater, metric.more, less)
-        )
-        claim = f"{first} {phrase.format('mostly')} {second}"
-        if not metric.better:
-            claim = f"{greater} mostly exceeds {less} in {metric.title}"
-        return f"By ranks, {claim} ({test}), but no difference of the means is shown ({mean})."
-    claim = difference_claim(group, other, apart.value, metric)
-    if ranks * apart.value < 0.0:
-        greater = group if ranks > 0 else other
-        return (
-            f"{claim} on average, yet {greater} has the greater value in most comparisons of single runs"
-            f" ({interval}; {test}): the distributions differ in shape, so look at them."
-        )
-    return f"{claim} ({interval}; {test})."
-
-
-def _is_equal(found: Row) -> bool:
-    """Whether the two have the same value in each pair."""
-    apart = found["difference"]
-    return bool(
-        found["paired"] and found["n"] > 1 and apart.value == 0.0 and not apart.has_interval
-    )
-
-
-def _is_open(found: Row) -> bool:
-    """Whether the interval of the mean shows a difference, and the corrected test does not."""
-    apart = found["difference"]
-    return bool(found["p_holm"] >= SIGNIFICANCE and apart.has_interval and not apart.contains(0.0))
-
-
-def _is_claimed(found: Row) -> bool:
-    """Whether a difference of the means may be claimed."""
-    is_open = found["difference"].contains(0.0) and _direction_of_ranks(found)
-    return bool(found["p_holm"] < SIGNIFICANCE and not is_open)
-
-
-def difference_claim(first: str, second: str, value: float, metric: Metric) -> str:
-    """Write which of two managers has more or less, the better one first; the value is first -
-    second.
-    """
-    if value * (metric.better or 1) < 0.0:
-        first, second, value = second, first, -value
-    phrase = metric.more if value > 0.0 else metric.less
-    if not phrase:
-        phrase = f"has {{}} {'more' if value > 0.0 else 'less'} {metric.title} than"
-    return f"{first} {phrase.format(metric.amount(abs(value)))} {second}"
-
-
-def overall_conclusion(
-    metric: Metric, differences: Sequence[Row], means: Mapping[str, float], groups: Sequence[str]
-) -> str:
-    """Write the conclusion for the first metric: which manager is best, by how much, and whether it
-    is significant.
-
-    It is about the groups named, of which `means` has those that are known; differences are of all
-    metrics and groups.
-    """
-    tested = [each for each in differences if each["test"]]
-    own = [
-        each
-        for each in tested
-        if each["metric"] == metric.name and {each["group"], each["other"]} <= set(groups)
-    ]
-    if len(groups) < 2:
-        return f"There is only {groups[0]}, so there is nothing to compare it with."
-    if not own or len(means) < 2:
-        return f"No two of them have a {metric.title} that could be compared."
-    if not metric.better:
-        return " ".join(each["conclusion"] for each in own[:_MOST_SENTENCES])
-    best = max(means, key=lambda name: metric.better * means[name])
-    against = [each for each in own if best in (each["group"], each["other"])]
-    claimed = [each for each in against if _is_claimed(each) and _favours(each, best, metric)]
-    alike = [_not_shown(each, best) for each in against if each["p_holm"] >= SIGNIFICANCE]
-    sentences = []
-    if claimed:
-        sentences.append(_claims(best, metric, claimed, alike, len(tested)))
-    elif alike:
-        has_best = "has" if list(means.values()).count(means[best]) == 1 else "has, with others,"
-        of_all = (
-            " of all its runs"
-            if any(_favours(each, _other(each, best), metric) for each in against)
-            else ""
-        )
-        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean{of_all},"
-        over = (
-            f", after Holm's correction over {number_of(len(tested), 'test')}"
-            if any(map(_is_open, against))
-            else ""
-        )
-        sentences.append(f"{is_shown} and {_and(alike)}{over}.")
-    others = [
-        each["conclusion"]
-        for each in against
-        if each["p_holm"] < SIGNIFICANCE and each not in claimed
-    ]
-    return " ".join([*sentences, *others])
-
-
-def _favours(found: Row, name: str, metric: Metric) -> bool:
-    """Whether a group is the better one in the runs that are compared, which need not be all that
-    have a mean.
-    """
-    return bool(
-        (1.0 if found["group"] == name else -1.0) * metric.better * found["difference"].value > 0.0
-    )
-
-
-def _not_shown(found: Row, best: str) -> str:
-    """Name the other one, and what speaks for a difference, or that there is none at all."""
-    if _is_equal(found):
-        return f"{_other(found, best)} (equal in all {number_of(found['n'], 'pair')})"
-    return f"{_other(found, best)} ({_OPEN})" if _is_open(found) else _other(found, best)
-
-
-def _claims(
-    best: str, metric: Metric, claimed: Sequence[Row], alike: Sequence[str], tests: int
-) -> str:
-    """Write by how much the best is better than those from which it differs, and from which it does
-    not.
-    """
-    _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
-    parts = [
-        f"{metric.amount(abs(each['difference'].value))}{words} {_other(each, best)}"
-        f" ({_interval(each, metric)}; {_basis(each)})"
-        for each in claimed
-    ]
-    largest = p_text(max(each["p_holm"] for each in claimed))
-    if len(claimed) > 1:
-        largest = f"all {largest}" if "<" in largest else f"largest {largest}"
-    over = f" after Holm's correction over {tests} tests" if tests > 1 else ""
-    rest = f"; no difference is shown to {_and(alike)}" if alike else ""
-    return f"{best} {metric.most}: {_and(parts)}; {largest}{over}{rest}."
-
-
-def _other(found: Row, name: str) -> str:
-    return str(found["other"] if found["group"] == name else found["group"])
-
-
-def _and(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def _interval(found: Row, metric: Metric) -> str:
-    """Write the interval of a difference's size, in the direction in which the sentence speaks."""
-    apart = found["difference"]
-    shown = -apart if apart.value < 0.0 and _is_claimed(found) else apart
-    text = shown.text(f".{metric.decimals}f", metric.scale)
-    return f"95% interval {text}" if text else "no interval"
-
-
-def _basis(found: Row) -> str:
-    return f"{number_of(found['n'], 'pair') if found['paired'] else 'not paired'}, {_SHORT[found['test']]}"
-
-
-def p_text(p: float) -> str:
-    """Write a p-value for a sentence."""
-    if p < 0.001:
-        return "p < 0.001"
-    return f"p = {p:.3f}" if p < 0.1 else f"p = {p:.2f}"
-
-
-def _direction_of_ranks(found: Row) -> float:
-    """Return the sign of the effect: above 0 if the first has the greater values, 0 if there is
-    none.
-    """
-    return (found["effect"] or 0.0) - (
-        0.5 if found["test"] == MANN_WHITNEY and found["effect"] is not None else 0.0
-    )
-
-
 def assisted_conclusion(row: Row, metric: Metric) -> str:
     """Write what an estimate shows, and whether the simulation helped."""
-    found, interval = estimate_in(row, "assisted"), metric.interval
+    found = estimate_in(row, "assisted")
     if row["other"] and found.has_interval and not found.contains(0.0):
         claim = difference_claim(row["group"], row["other"], found.value, metric)
         found = found if found.value > 0.0 else -found
     else:
         is_share = metric.name == FOUND and not row["other"]
         claim = f"{metric.title} of {_group_name(row)}: {(metric.number if is_share else metric.amount)(found.value)}"
-    claim += f" (95% interval {interval(found) or 'not known'})"
+    if row["other"]:
+        interval = found.text(f".{metric.interval_decimals}f", metric.scale)
+    else:
+        interval = metric.interval(found)
+    claim += f" (95% interval {interval or 'not known'})"
     claim += f" from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
     if not row["helps"]:
         return f"{claim}; the simulation does not help."

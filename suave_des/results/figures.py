@@ -25,21 +25,25 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, shown, unknown
-from suave_des.estimates import mean_of
+from suave_des.errors import InputError, number_of, shown, unknown
+from suave_des.estimates import Estimate, mean_of
 from suave_des.files import write_files
-from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS
+from suave_des.records.metrics import METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
 from suave_des.results.groups import (
     Group,
     Groups,
+    alike_by_source,
     check_swept,
     first_alike,
     grouped,
+    independent,
     least_and_greatest,
+    runs_sharing_draw,
 )
+from suave_des.results.horizon import FOUND_BY_HORIZON, horizons_s, to_horizon
 from suave_des.results.mission import Rules, draw_map, draw_timeline
 from suave_des.results.style import folded, key_words, value_words
 
@@ -67,13 +71,15 @@ def draw_distributions(drawn: Groups) -> style.Picture:
     legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
     for axes, metric, title in _metric_panels(figure):
-        end = max(1.0, max(float(group.frame[metric].max()) for group in groups) * 1.06)
+        ends = [float(_finite(group.frame[metric]).max()) for group in groups]
+        end = max(1.0, np.nanmax(ends) * 1.06)
         for number, group in _looks(groups):
-            values = np.sort(group.frame[metric].dropna())
-            shares = np.arange(1, len(values) + 1) / len(values)
+            values = np.sort(_finite(group.frame[metric]))
+            shares = np.arange(1, len(values) + 1) / group.frame[metric].count()
             look = style.line(number)
+            steps = [0.0, *shares, *shares[-1:]]
             axes.step(
-                [0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look
+                [0.0, *values, end][: len(steps)], steps, where="post", label=_label(group), **look
             )
             mark = {
                 "marker": style.marker(number),
@@ -82,10 +88,11 @@ def draw_distributions(drawn: Groups) -> style.Picture:
                 "mec": "white",
                 "mew": 0.5,
             }
-            axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
+            axes.plot(float(group.frame[metric].mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
     times = figure.axes[0]
-    if any((group.frame[FOUND] < 1.0).any() for group in groups):
+    is_any_lost = any((group.frame[FOUND_BY_HORIZON] < 1.0).any() for group in groups)
+    if is_any_lost and math.isfinite(drawn.time_limit_s):
         times.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
         note: dict[str, Any] = {
             "color": "#555555",
@@ -127,7 +134,7 @@ def draw_differences(drawn: Groups) -> style.Picture:
     for one, other in pairs:
         is_paired = one.has_runs and other.has_runs
         apart = [
-            (one.frame[metric] - other.frame[metric]).dropna()
+            _finite(one.frame[metric] - other.frame[metric])
             for metric in PAPER_METRICS
             if is_paired
         ]
@@ -228,8 +235,18 @@ def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
     return zip(style.looks([group.name for group in groups]), groups, strict=True)
 
 
+def _finite(values: pandas.Series[float]) -> pandas.Series[float]:
+    return values[np.isfinite(values)]
+
+
 def _label(group: Group) -> str:
-    return style.text(folded(f"{group.name} (n = {len(group.frame):,})"))
+    """Name a group with its number of missions, and of draws where several missions share one."""
+    frame = group.frame
+    text = f"n = {len(frame):,}"
+    if group.is_of_missions and group.has_runs and runs_sharing_draw(frame) > 1:
+        draws = len(set(zip(frame["seed"], first_alike(frame), strict=True)))
+        text = f"{text} in {number_of(draws, 'draw')}"
+    return style.text(folded(f"{group.name} ({text})"))
 
 
 def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
@@ -295,16 +312,15 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
         raise InputError(
             problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them"
         )
-    frame, columns = missions.frame, len(parameters)
-    names = _names(frame)
+    frame, columns = missions.frame.assign(curve=_names), len(parameters)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
-    height_in = 4.0 + 0.2 * math.ceil((names.nunique() + 1) / 3)
+    height_in = 4.0 + 0.2 * math.ceil((frame["curve"].nunique() + 1) / 3)
     figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
     panels = figure.subplots(len(PAPER_METRICS), columns, sharex="col", sharey="row", squeeze=False)
     counts: list[int] = []
     for row, metric in zip(panels, PAPER_METRICS, strict=True):
         for axes, parameter in zip(row, parameters, strict=True):
-            counts += _draw_panel(axes, frame, names, parameter, metric)
+            counts += _draw_panel(axes, frame, missions.swept, parameter, metric)
         row[0].set_ylabel(f"mean {METRICS[metric].heading}")
         row[0].set_ylim(bottom=0.0)
     for axes, parameter in zip(panels[-1], parameters, strict=True):
@@ -317,11 +333,12 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     if len(missions.swept) == columns > 1:
         _write_below(
             figure,
-            f"{_averaged(counts, ())}, each averaged over the parameters of the other panels",
+            f"{_averaged(frame, counts, ())}, each averaged over the parameters of the other panels",
         )
     else:
         _write_below(
-            figure, _averaged(counts, [name for name in missions.swept if name not in parameters])
+            figure,
+            _averaged(frame, counts, [name for name in missions.swept if name not in parameters]),
         )
     return figure
 
@@ -342,11 +359,17 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         problem = f"a heat map is of two swept parameters, and there are {len(parameters)}: {', '.join(parameters)}"
         raise InputError(problem, place="parameters", remedy="choose two with --parameters")
     across, up = parameters
-    frame = missions.frame
-    names = _names(frame)
-    managers = list(dict.fromkeys(names))
+    frame = missions.frame.assign(curve=_names)
+    managers = list(dict.fromkeys(frame["curve"]))
+    others = [name for name in missions.swept if name not in parameters]
+    brought = to_horizon(frame, horizons_s(frame, missions.swept, parameters))
+    cells = {
+        (curve, *values): rows
+        for curve, values, rows in _independent_at(brought, [up, across], others)
+    }
+    keys = pandas.MultiIndex.from_tuples(cells, names=["curve", up, across])
     means = {
-        metric: frame.groupby([names, up, across], sort=False)[metric].mean()
+        metric: pandas.Series([_mean(rows[metric]).value for rows in cells.values()], keys)
         for metric in PAPER_METRICS
     }
     columns, rows = (list(pandas.unique(frame[name])) for name in (across, up))
@@ -380,9 +403,8 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
                 range(len(values)), [_folded(style.text(value_words(each)), 14) for each in values]
             )
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
-    counts = frame.groupby([names, up, across])["run"].nunique().tolist()
-    others = [name for name in missions.swept if name not in parameters]
-    _write_below(figure, _averaged(counts, others))
+    counts = [len(rows) for rows in cells.values()]
+    _write_below(figure, _averaged(frame, counts, others))
     return figure
 
 
@@ -397,9 +419,14 @@ def _chosen(missions: Missions, parameters: Sequence[str]) -> list[str]:
     return parameters
 
 
-def _averaged(counts: Sequence[int], others: Sequence[str]) -> str:
+def _averaged(frame: pandas.DataFrame, counts: Sequence[int], others: Sequence[str]) -> str:
+    """Say of how many runs, or draws that runs share, means are, and over what each is averaged."""
     low, high = min(counts), max(counts)
-    of = f"means of n = {low if low == high else f'{low} to {high}'} run{'s' * (high > 1)}"
+    alike = max(alike_by_source(frame).values(), default=1)
+    what = "run" if alike == 1 else "draw"
+    of = f"means of n = {low if low == high else f'{low} to {high}'} {what}{'s' * (high > 1)}"
+    if alike > 1:
+        of += f" of {alike} runs"
     return f"{of}, each averaged over {', '.join(map(key_words, others))}" if others else of
 
 
@@ -414,20 +441,58 @@ def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
     )
 
 
+def _independent_at(
+    frame: pandas.DataFrame, keys: Sequence[str], averaged: Sequence[str]
+) -> Iterator[tuple[str, tuple[Any, ...], pandas.DataFrame]]:
+    """Yield each curve at each value of some columns, with what is independent there: runs averaged
+    over other parameters, or draws of several runs, that are complete.
+
+    Raises:
+        InputError: none is.
+    """
+    alike, is_empty = alike_by_source(frame), True
+    for _, source in frame.groupby("source", sort=False, observed=True):
+        for values, whole in source.groupby(list(keys), dropna=False, observed=True):
+            for curve, part in whole.groupby("curve", sort=False, observed=True):
+                rows = independent(part, whole, averaged, alike).rows
+                if len(rows):
+                    is_empty = False
+                    yield str(curve), values, rows
+    if is_empty:
+        problem = "no manager has a run with missions at all points of the sweep"
+        raise InputError(problem, place="parameters", remedy="resume the campaign")
+
+
+def _mean(values: pandas.Series[float]) -> Estimate:
+    """Estimate a mean; not known if one of the values is infinite."""
+    return Estimate() if np.isinf(values).any() else mean_of(values.dropna().tolist())
+
+
 def _draw_panel(
-    axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], parameter: str, metric: str
+    axes: Axes, frame: pandas.DataFrame, swept: Sequence[str], parameter: str, metric: str
 ) -> list[int]:
-    """Draw the means of each manager over a parameter, and return of how many runs they are."""
-    counts = []
+    """Draw the means of each curve over a parameter, and return of how many runs they are.
+
+    Very many places are drawn in bins of equally many, at their mean place.
+    """
     places, words = _places(frame[parameter])
+    bins = places
+    averaged = [name for name in swept if name != parameter]
+    if places.nunique() > _MOST_VALUES:
+        bins = pandas.qcut(places.rank(method="dense"), _BINS, labels=False)
+        averaged = list(swept)
+    brought = to_horizon(frame, horizons_s(frame, swept, [parameter]))
+    brought = brought.assign(place=places, bin=bins)
     apart = _APART * float(places.max() - places.min())
-    managers = list(dict.fromkeys(names))
-    for place, (number, manager) in enumerate(zip(style.looks(managers), managers, strict=True)):
-        own = names == manager
-        beside = (place - (len(managers) - 1) / 2) * apart
-        counts += _draw_means(
-            axes, frame[own].assign(place=places[own]), metric, beside, number, manager
-        )
+    curves: dict[str, list[tuple[float, Estimate]]] = {name: [] for name in frame["curve"]}
+    counts = []
+    middles = brought.groupby(["curve", "bin"])["place"].mean()
+    for curve, (place,), rows in _independent_at(brought, ["bin"], averaged):
+        curves[curve].append((float(middles[curve, place]), _mean(rows[metric])))
+        counts.append(int(rows[metric].count()))
+    for place, (number, curve) in enumerate(zip(style.looks(list(curves)), curves, strict=True)):
+        beside = (place - (len(curves) - 1) / 2) * apart
+        _draw_means(axes, curves[curve], beside, number, curve)
     if words:
         shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
         long = max(map(len, words)) > 6 and len(words) > 2
@@ -461,35 +526,21 @@ def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
 
 
 def _draw_means(
-    axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str
-) -> list[int]:
-    """Draw the mean at each place; of very many places, those of equally many missions at their
-    mean place.
-    """
-    key = frame["place"]
-    if key.nunique() > _MOST_VALUES:
-        key = pandas.qcut(key.rank(method="first"), _BINS, labels=False)
-    found, middles, counts = [], [], []
-    for _, part in frame.groupby(key):
-        has_runs = part["run"].notna().all()
-        by_run = (
-            part.groupby(["seed", first_alike(part)])[metric].mean() if has_runs else part[metric]
-        )
-        found.append(mean_of(by_run.dropna().tolist()))
-        counts.append(int(by_run.count()))
-        middles.append(float(part["place"].mean()) + beside)
-    means = np.array([each.value for each in found])
-    low, high = np.array([each.interval or (each.value, each.value) for each in found]).T
+    axes: Axes, means: Sequence[tuple[float, Estimate]], beside: float, number: int, label: str
+) -> None:
+    """Draw means, each at its place, with their intervals."""
+    middles = [place + beside for place, _ in means]
+    values = np.array([found.value for _, found in means])
+    ends = [found.interval or (found.value, found.value) for _, found in means]
+    low, high = np.array(ends).reshape(-1, 2).T
     look = style.line(number) | {
         "marker": style.marker(number),
         "ms": 3.2,
         "capsize": 2,
         "elinewidth": 0.8,
     }
-    axes.errorbar(
-        middles, means, yerr=(means - low, high - means), label=style.text(folded(label)), **look
-    )
-    return counts
+    errors = (values - low, high - values)
+    axes.errorbar(middles, values, yerr=errors, label=style.text(folded(label)), **look)
 
 
 def _folded(text: str, width: int = 26) -> str:

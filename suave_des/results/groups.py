@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas
@@ -20,6 +21,14 @@ from suave_des.records.metrics import (
     metric_of,
 )
 from suave_des.records.missions import SHARING, Missions
+from suave_des.results.horizon import (
+    ENDED,
+    FOUND_BY_HORIZON,
+    HORIZON,
+    SAME_LIMIT_S,
+    at_horizons,
+    to_horizon,
+)
 from suave_des.results.real import matched
 
 _USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
@@ -29,8 +38,6 @@ _MEMBER = "ensemble_member"
 _FEW = 20
 _PLACES = ("real missions", "assisted by", "population")
 """Of errors in real missions and those that assist them."""
-_SAME_LIMIT_S = 1.5
-"""Programs write limits that differ by a second for the same one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +48,19 @@ class Group:
         name: the manager's, with its source or its value of a sweep where several have the same.
         frame: a row for each independent value: for each mission, or, where points of a sweep are
             averaged, for each run, whose random numbers all points share; or for each draw that
-            several runs share. Where seed and run are known, they are its index.
+            several runs share. Where seed and run are known, they are its index. Times of search
+            and detection are brought to the horizon.
         is_of_missions: whether each row is one mission.
         point: the end of the name that tells the value of a sweep; empty if all values are in the
             group.
+        horizon_s: up to which times of search and detection count; infinite if it is not known.
     """
 
     name: str
     frame: pandas.DataFrame
     is_of_missions: bool = True
     point: str = ""
+    horizon_s: float = math.inf
 
     @property
     def has_runs(self) -> bool:
@@ -69,9 +79,8 @@ class Groups:
         notes: what a reader should know about the groups.
         counted: what the rows of groups are: "mission", "run", "draw", or "value" where they
             differ.
-        time_limit_s: whole seconds that missions of every group had; where all found the pipeline,
-            the longest search. Of real missions that simulated ones assist, the limit of all;
-            infinite if it is not known.
+        time_limit_s: the shortest horizon of a group. Of real missions that simulated ones assist,
+            the limit of all; infinite if it is not known.
         lost: by name of a group that did not find the pipeline in most of its missions, in how
             many.
         sides: real missions and those simulated under the same conditions, with the numbers of
@@ -116,9 +125,49 @@ def grouped(
             simulated missions lack a manager or a metric, have a number that is none or another
             time limit, or are of other conditions.
     """
-    frame = missions.frame.assign(source="") if simulated else missions.frame
-    known = list(dict.fromkeys(frame["manager"]))
     check_swept(missions, by, "by")
+    frame = _of_managers(missions, managers, simulated)
+    if simulated:
+        return _assisted(missions, frame, managers, metrics, simulated)
+    frame = at_horizons(frame, missions.swept, by)
+    averaged = [name for name in missions.swept if averages and name not in by]
+    alike = alike_by_source(frame) if averages else {}
+    groups, lacking = [], []
+    for part, name, point in _parts(frame, managers, by):
+        found = independent(part, _same_points(frame, part, by), averaged, alike)
+        if found.left_out:
+            runs = found.left_out + len(found.rows)
+            lacking.append(f"{name} {found.left_out} of {runs}")
+        horizon_s = float(part[HORIZON].iloc[0])
+        groups.append(Group(name, _by_run(found.rows), found.are_missions, point, horizon_s))
+    if lacking and not any(len(group.frame) for group in groups):
+        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
+        raise InputError(
+            "no manager has a run with missions at all points of the sweep", remedy=remedy
+        )
+    chosen = _chosen_metrics(metrics, groups)
+    notes = list(_notes(groups, averaged, frame, alike))
+    if lacking:
+        notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
+    if _are_at_other_points(frame, averaged):
+        notes.append(
+            f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
+        )
+    notes += _notes_on_metrics(groups, chosen)
+    limit_s = min(group.horizon_s for group in groups)
+    lost = dict(_mostly_lost(groups))
+    return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost)
+
+
+def _of_managers(
+    missions: Missions, managers: Sequence[str], simulated: Sequence[Missions]
+) -> pandas.DataFrame:
+    """Return the missions of the managers named, or of all.
+
+    Raises:
+        InputError: there is none of one of them, or of one that simulated missions are to assist.
+    """
+    known = list(dict.fromkeys(missions.frame["manager"]))
     for name in managers:
         if name not in known:
             raise unknown(f"there is no mission of {shown(name)}", name, known, "there are")
@@ -127,71 +176,89 @@ def grouped(
         for name in managers or known:
             if name not in theirs:
                 raise unknown(f"there is no mission of {name}", name, theirs, "there are", place)
-    if managers:
-        frame = frame[frame["manager"].isin(managers)]
+    is_wanted = missions.frame["manager"].isin(list(managers) or known)
+    return missions.frame.loc[is_wanted]
+
+
+def _parts(
+    frame: pandas.DataFrame, managers: Sequence[str], by: Sequence[str]
+) -> list[tuple[pandas.DataFrame, str, str]]:
+    """Return the missions of each group with the name of the group, and the end of it that tells
+    the values of a sweep.
+
+    Raises:
+        InputError: there are too many.
+    """
     found = list(frame.groupby(["manager", "source", *by], sort=False, dropna=False, observed=True))
     if managers:
         found.sort(key=lambda item: list(managers).index(str(item[0][0])))
     if len(found) > _MOST_GROUPS:
         problem = f"{len(found)} groups are too many to compare with each other"
         raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
-    averages = averages and not simulated
-    averaged = [name for name in missions.swept if averages and name not in by]
     names = _names([key for key, _ in found], by)
-    alike = _alike_by_source(frame) if averages else {}
-    points = {
-        repr(key): len(part[averaged].drop_duplicates()) if averaged else 1
-        for key, part in frame.groupby(["source", *by], dropna=False, observed=True)
-    }
-    groups, lacking = [], []
-    for (name, end), (key, part) in zip(names, found, strict=True):
-        source, number = str(key[1]), points[repr(key[1:])]
-        rows = _means(part, number) if number > 1 else part
-        if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
-            lacking.append(f"{name} {left} of {left + len(rows)}")
-        if (sharing := alike.get(source, 1)) > 1:
-            whole = frame[
-                frame["source"] == source
-            ]  # how many runs of a draw there are under any manager
-            draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)[
-                "run"
-            ].nunique()
-            rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
-        if rows["run"].notna().all() and (rows["seed"] != "").all():
-            rows = rows.set_axis(pandas.MultiIndex.from_frame(rows[["seed", "run"]]))
-        groups.append(Group(name, rows, number == sharing == 1, end))
-    if lacking and not any(len(group.frame) for group in groups):
-        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
-        raise InputError(
-            "no manager has a run with missions at all points of the sweep", remedy=remedy
-        )
-    chosen = _chosen_metrics(metrics or (PAPER_METRICS if simulated else ()), groups)
-    notes = list(_notes(groups, averaged, frame, alike))
-    if lacking:
-        notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
-    by_source = [
-        part[averaged].drop_duplicates()
+    return [(part, *name) for (_, part), name in zip(found, names, strict=True)]
+
+
+def _same_points(
+    frame: pandas.DataFrame, part: pandas.DataFrame, by: Sequence[str]
+) -> pandas.DataFrame:
+    """Return the missions of any manager from the source of a group, and at its values of a
+    sweep.
+    """
+    is_same = frame["source"] == part["source"].iloc[0]
+    for name in by:
+        value = part[name].iloc[0]
+        is_same &= frame[name].isna() if value != value else frame[name] == value
+    same: pandas.DataFrame = frame[is_same]
+    return same
+
+
+def _by_run(rows: pandas.DataFrame) -> pandas.DataFrame:
+    """Return rows with seed and run as their index, if these are known."""
+    if rows["run"].notna().all() and (rows["seed"] != "").all():
+        return rows.set_axis(pandas.MultiIndex.from_frame(rows[["seed", "run"]]))
+    return rows
+
+
+def _are_at_other_points(frame: pandas.DataFrame, averaged: Sequence[str]) -> bool:
+    """Return whether one source has other points of a sweep than another."""
+    if not averaged:
+        return False
+    of_sources = {
+        repr(sorted(map(repr, part[averaged].drop_duplicates().to_numpy().tolist())))
         for _, part in frame.groupby("source", observed=True)
-        if averaged
-    ]
-    if len({repr(sorted(map(repr, part.to_numpy().tolist()))) for part in by_source}) > 1:
-        notes.append(
-            f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
-        )
-    for metric in chosen:
-        notes += _never_found(groups) if metric.name == SEARCH_TIME else _left_out(groups, metric)
-    counted, lost = _counted(groups), dict(_mostly_lost(groups))
-    if not simulated:
-        return Groups(missions, groups, chosen, tuple(notes), counted, _time_limit_s(groups), lost)
+    }
+    return len(of_sources) > 1
+
+
+def _assisted(
+    missions: Missions,
+    frame: pandas.DataFrame,
+    managers: Sequence[str],
+    metrics: Sequence[str],
+    simulated: Sequence[Missions],
+) -> Groups:
+    """Group real missions by manager, with those that assist them."""
     same, population = simulated
-    notes = [*same.notes, *population.notes, *notes]
-    real = pandas.concat([group.frame for group in groups], ignore_index=True)
-    limit_s, drawn = (
-        _common_limit_s((real, same.frame, population.frame), chosen),
-        _with_draws(population),
-    )
-    sides = (*matched(real, same.frame, same.swept), drawn)
-    return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, sides)
+    frame = frame.assign(source="")
+    chosen = _chosen_metrics(metrics or PAPER_METRICS, [Group("", frame)])
+    limit_s = _common_limit_s((frame, same.frame, population.frame), chosen)
+    drawn, simulated_same = _with_draws(population), same.frame
+    if math.isfinite(limit_s):
+        frame, simulated_same, drawn = (
+            to_horizon(each, limit_s) for each in (frame, simulated_same, drawn)
+        )
+    else:
+        frame = at_horizons(frame, ())
+    sides = (*matched(frame, simulated_same, same.swept), drawn)
+    groups = [
+        Group(name, _by_run(part), horizon_s=limit_s)
+        for part, name, _ in _parts(frame, managers, ())
+    ]
+    notes = [*same.notes, *population.notes, *_notes(groups, (), frame, {})]
+    notes += _notes_on_metrics(groups, chosen)
+    lost = dict(_mostly_lost(groups))
+    return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost, sides)
 
 
 def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
@@ -275,18 +342,6 @@ def _counted(groups: Sequence[Group]) -> str:
     return "mission" if kinds == {True} else "value"
 
 
-def _time_limit_s(groups: Sequence[Group]) -> int:
-    lost = [group.frame.loc[group.frame[FOUND] == 0.0, SEARCH_TIME] for group in groups]
-    limits_s = [float(times.max()) for times in lost if times.notna().any()]
-    ends_s = [
-        float(times_s.max())
-        for group in groups
-        if (times_s := group.frame[SEARCH_TIME]).notna().any()
-    ]
-    limit_s = min(limits_s) if limits_s else max(ends_s, default=0.0)
-    return math.floor(limit_s) or math.ceil(limit_s)
-
-
 def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric]) -> float:
     """Check the numbers in real missions and those that assist them, and return the time limit of
     all.
@@ -303,7 +358,7 @@ def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric
         # pipeline.
         ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
         limit_s = float(ends_s.max())
-        if abs(limit_s - min(limits_s, default=limit_s)) > _SAME_LIMIT_S:
+        if abs(limit_s - min(limits_s, default=limit_s)) > SAME_LIMIT_S:
             problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
             raise InputError(problem, place=place, remedy="give missions with one time limit")
         limits_s += [] if math.isnan(limit_s) else [limit_s]
@@ -342,7 +397,7 @@ def _with_draws(population: Missions) -> pandas.DataFrame:
     return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 
-def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
+def alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
     """Return by source how many runs are averaged, because some share a draw; of sources without
     runs nothing is.
     """
@@ -350,6 +405,48 @@ def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
         (frame["run"].notna() & (frame["seed"] != "")).groupby(frame["source"], observed=True).all()
     )
     return dict.fromkeys(map(str, are_runs.index[are_runs]), runs_sharing_draw(frame))
+
+
+class Independent(NamedTuple):
+    """What of missions is independent of each other.
+
+    Attributes:
+        rows: missions, or their averages over points of a sweep, or runs of a draw.
+        are_missions: whether each row is one mission.
+        left_out: number of runs that lack a point.
+    """
+
+    rows: pandas.DataFrame
+    are_missions: bool
+    left_out: int
+
+
+def independent(
+    part: pandas.DataFrame,
+    whole: pandas.DataFrame,
+    averaged: Sequence[str],
+    alike: Mapping[str, int],
+) -> Independent:
+    """Average the missions of one manager and source to what is independent.
+
+    Args:
+        part: the missions.
+        whole: those of any manager from the same source: what they have is to be had by each run
+            and draw.
+        averaged: swept parameters, over whose points a run is averaged.
+        alike: by source how many runs in a row share their draws, and are averaged; 1 if a source
+            is not named.
+    """
+    points = len(whole[list(averaged)].drop_duplicates()) if averaged else 1
+    sharing = alike.get(str(part["source"].iloc[0]), 1)
+    rows, left_out = part, 0
+    if points > 1:
+        rows = _means(part, points)
+        left_out = part.groupby(["seed", "run"], observed=True).ngroups - len(rows)
+    if sharing > 1:
+        draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)["run"].nunique()
+        rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
+    return Independent(rows, points == sharing == 1, left_out)
 
 
 def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.DataFrame:
@@ -413,7 +510,7 @@ def _mostly_lost(groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
     many.
     """
     for group in groups:
-        lost = 1.0 - group.frame[FOUND].dropna()
+        lost = 1.0 - group.frame[FOUND_BY_HORIZON].dropna()
         if len(lost) and lost.mean() > 0.5:
             share = (
                 f"{lost.sum():.0f} of {len(lost)}"
@@ -423,28 +520,68 @@ def _mostly_lost(groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
             yield group.name, f"{share} missions"
 
 
+def _notes_on_metrics(groups: Sequence[Group], metrics: Sequence[Metric]) -> Iterator[str]:
+    for metric in metrics:
+        if metric.name == SEARCH_TIME:
+            yield from _never_found(groups)
+            yield from _ended_early(groups)
+            yield from _other_limits(groups)
+        else:
+            yield from _left_out(groups, metric)
+
+
 def _never_found(groups: Sequence[Group]) -> Iterator[str]:
-    counts, ends = [], []
+    """Say which missions have no search time of their own, and what they count with."""
+    counts = []
     for group in groups:
-        is_lost = group.frame[FOUND] < 1.0
+        is_lost = group.frame[FOUND_BY_HORIZON] < 1.0
         if is_lost.any() and group.is_of_missions:
-            times_s = group.frame.loc[is_lost, SEARCH_TIME]
-            counts.append(f"{group.name} {len(times_s)} of {len(is_lost)}")
-            ends.append((group.name, times_s.min(), times_s.max()))
+            counts.append(f"{group.name} {is_lost.sum()} of {len(is_lost)}")
         elif is_lost.any():
-            counts.append(f"{group.name} {1.0 - group.frame[FOUND].mean():.1%}")
-    ended = f"the search time of missions that never found the pipeline ({listed(counts)}) is the time at which they"
-    if ends and max(high for *_, high in ends) - min(low for _, low, _ in ends) > _SAME_LIMIT_S:
-        times = [
-            f"{name} after {low:.0f}{f' to {high:.0f}' if high > low else ''} s"
-            for name, low, high in ends
-        ]
+            counts.append(f"{group.name} {1.0 - group.frame[FOUND_BY_HORIZON].mean():.1%}")
+    if not counts:
+        return
+    horizons_s = {group.horizon_s for group in groups}
+    if math.inf in horizons_s:
         yield (
-            f"{ended} ended, which differs ({listed(times)}): a mission that ends early counts as a short search, and"
-            " means, differences and tests of the search time do not compare it; compare the share that found it"
+            f"missions that did not find the pipeline ({listed(counts)}) ended before others found it, and no time limit"
+            " is known: by ranks they count as later than all that found it, and their mean search time is not known"
         )
-    elif counts:
-        yield f"{ended} ended: a mean search time is the mean up to that limit, and would be longer without it"
+        return
+    horizon = f"{horizons_s.pop():g} s" if len(horizons_s) == 1 else "the time limit"
+    yield (
+        f"missions that had not found the pipeline by {horizon} ({listed(counts)}) count with {horizon}: a mean search"
+        " time is the mean up to that limit, and would be longer without it"
+    )
+
+
+def _ended_early(groups: Sequence[Group]) -> Iterator[str]:
+    """Say which missions ended without the pipeline long before the horizon."""
+    times = []
+    for group in groups:
+        ended_s = group.frame[ENDED] if group.is_of_missions else pandas.Series(dtype=float)
+        ended_s = ended_s[ended_s < group.horizon_s - SAME_LIMIT_S]
+        if len(ended_s):
+            low, high = ended_s.min(), ended_s.max()
+            until = f" to {high:.0f}" if high > low else ""
+            times.append(f"{group.name} after {low:.0f}{until} s")
+    if times:
+        yield f"some missions ended earlier without it ({listed(times)}), which is no short search"
+
+
+def _other_limits(groups: Sequence[Group]) -> Iterator[str]:
+    """Say that some missions had more time to find the pipeline than others."""
+    longer = []
+    for group in groups:
+        ended_later = group.frame[ENDED] > group.horizon_s + SAME_LIMIT_S
+        found_later = group.frame[FOUND] > group.frame[FOUND_BY_HORIZON]
+        if ended_later.any() or found_later.any():
+            longer.append(group.name)
+    if longer:
+        yield (
+            f"time limits differ ({listed(longer)} had more time): search times count up to the shortest limit, other"
+            " metrics and the share that found the pipeline are of whole missions"
+        )
 
 
 def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:

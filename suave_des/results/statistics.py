@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError
-from suave_des.estimates import CONFIDENCE, Estimate, mean_of, t_quantile
+from suave_des.estimates import CONFIDENCE, STUDENT, Estimate, mean_of, t_quantile
 
 Sample = NDArray[np.float64]
 
@@ -27,9 +27,14 @@ SIGNIFICANCE = 0.05
 WELCH, NEWCOMBE, BONETT_PRICE = "Welch's t", "Newcombe", "Bonett and Price"
 WILCOXON, MANN_WHITNEY = "Wilcoxon signed-rank", "Mann-Whitney"
 MCNEMAR, FISHER = "McNemar, exact", "Fisher, exact"
+PERMUTATION = "permutation"
 RANK_BISERIAL, A12 = "rank-biserial", "A12"
 RESAMPLES = 9_999
 PERMUTATIONS, SUBSAMPLES = 999, 2_000
+MOST_EXACT = 50
+"""Pairs that differ up to which p of signed ranks is exact, as in scipy.stats.wilcoxon without
+ties.
+"""
 _MOST_RUNS = 10_000_000
 _ROUNDING = 1e-9
 """A share left of one half is often a little more after rounding."""
@@ -85,6 +90,49 @@ def difference_interval(first: Sample, second: Sample) -> Estimate:
     with _quiet():
         welch = ttest_ind(first, second, equal_var=False).confidence_interval(CONFIDENCE)
     return _with_interval(difference, welch.low, welch.high, WELCH)
+
+
+def means_test(first: Sample, second: Sample, *, is_paired: bool) -> tuple[str, float]:
+    """Return the test of a difference of means and its two-sided p: of pairs Student's t, else
+    Welch's.
+
+    Where nothing has a spread, and so no t, it is the permutation test: p is the share of signs, or
+    of ways to divide the values, that give a difference as great. It is nan where a sample has too
+    few values to know its spread.
+    """
+    from scipy.stats import ttest_ind, ttest_rel
+
+    if is_paired:
+        difference = first - second
+        if np.ptp(difference) > 0.0:
+            return STUDENT, float(ttest_rel(first, second).pvalue)
+        return PERMUTATION, 0.5 ** (len(difference) - 1) if difference[0] else 1.0
+    if np.ptp(first) == np.ptp(second) == 0.0:
+        ways = math.comb(len(first) + len(second), len(first))
+        return PERMUTATION, min(1.0, 2.0 / ways) if first[0] != second[0] else 1.0
+    with _quiet():
+        return WELCH, float(ttest_ind(first, second, equal_var=False).pvalue)
+
+
+def with_finite_ranks(first: Sample, second: Sample) -> tuple[Sample, Sample]:
+    """Return samples of the same ranks, with infinite values just above the greatest finite one."""
+    pooled = np.concatenate([first, second])
+    above = float(pooled[np.isfinite(pooled)].max(initial=0.0)) + 1.0
+    return np.minimum(first, above), np.minimum(second, above)
+
+
+def shares_of_comparisons(first: Sample, second: Sample, *, is_paired: bool) -> tuple[float, float]:
+    """Return in which share of pairs, or of comparisons of each value with each, the first is
+    greater, and in which it is less.
+    """
+    if is_paired:
+        apart = differences_of_pairs(first, second)
+        return float(np.mean(apart > 0.0)), float(np.mean(apart < 0.0))
+    ordered = np.sort(second)
+    comparisons = len(first) * len(second)
+    greater = int(np.searchsorted(ordered, first, side="left").sum())
+    not_less = int(np.searchsorted(ordered, first, side="right").sum())
+    return greater / comparisons, (comparisons - not_less) / comparisons
 
 
 def _with_interval(value: float, low: float, high: float, method: str) -> Estimate:
@@ -217,24 +265,60 @@ def _test(name: str, ps: Sequence[float], effect: Estimate) -> Test:
 
 
 def signed_rank_test(first: Sample, second: Sample) -> Test:
-    """Test paired samples by Wilcoxon's signed ranks, as scipy.stats.wilcoxon does by default.
+    """Test paired samples by Wilcoxon's signed ranks.
 
-    The effect is the matched-pairs rank-biserial correlation (Kerby 2014): 1 if the first is
-    greater in all pairs, -1 if it is less in all. Pairs without a difference do not count.
+    Pairs without a difference do not count; ties have midranks. Up to MOST_EXACT pairs p is exact,
+    with ties, too; of more it is scipy.stats.wilcoxon's normal approximation. The effect is the
+    matched-pairs rank-biserial correlation (Kerby 2014): 1 if the first is greater in all pairs, -1
+    if it is less in all.
     """
-    from scipy.stats import wilcoxon
+    from scipy.stats import rankdata, wilcoxon
 
-    scale = max(float(np.abs([first, second]).max()), math.ulp(0.0))
-    difference = np.round(
-        (first - second) / scale, 9
-    )  # means that are equal but for rounding errors are ties
-    differing = int(np.count_nonzero(difference))
-    if differing == 0:
+    difference = differences_of_pairs(first, second)
+    difference = difference[difference != 0.0]
+    if not len(difference):
         return _test(WILCOXON, _PS_OF_EQUAL, Estimate(0.0, method=RANK_BISERIAL))
+    ranks = rankdata(np.abs(difference))
+    effect = 2.0 * float(ranks[difference > 0.0].sum()) / float(ranks.sum()) - 1.0
+    if len(difference) <= MOST_EXACT:
+        ps = _exact_ps(ranks, difference > 0.0)
+    else:
+        found = (
+            wilcoxon(difference, alternative=each, method="asymptotic") for each in _ALTERNATIVES
+        )
+        ps = [float(each.pvalue) for each in found]
+    return _test(WILCOXON, ps, Estimate(effect, method=RANK_BISERIAL))
+
+
+def differences_of_pairs(first: Sample, second: Sample) -> Sample:
+    """Return the differences of pairs in units of the greatest value.
+
+    Means that are equal but for rounding errors have a difference of 0, and differences that are
+    equal but for these are ties. Infinite values differ by more than all others from finite ones,
+    and not from each other.
+    """
+    pooled = np.abs([first, second])
+    scale = max(float(pooled[np.isfinite(pooled)].max(initial=0.0)), math.ulp(0.0))
     with _quiet():
-        found = [wilcoxon(difference, alternative=each) for each in _ALTERNATIVES]
-    effect = 4.0 * float(found[-1].statistic) / (differing * (differing + 1)) - 1.0
-    return _test(WILCOXON, [each.pvalue for each in found], Estimate(effect, method=RANK_BISERIAL))
+        difference = np.nan_to_num((first - second) / scale, nan=0.0, posinf=3.0, neginf=-3.0)
+    return np.round(difference, 9)
+
+
+def _exact_ps(ranks: Sample, is_positive: NDArray[np.bool_]) -> list[float]:
+    """Return p of each of _ALTERNATIVES from the exact distribution of the sum of positive ranks.
+
+    Each sign is as likely as the other, so that the distribution is the convolution of those of
+    single ranks. Midranks are multiples of a half, and therefore doubled.
+    """
+    doubled = np.round(2.0 * ranks).astype(int)
+    ways = np.zeros(int(doubled.sum()) + 1)  # integers up to 2**50, which floats have exactly
+    ways[0] = 1.0
+    for rank in doubled:
+        ways[rank:] = ways[rank:] + ways[: len(ways) - rank]
+    share = ways / ways.sum()
+    seen = int(doubled[is_positive].sum())
+    less, greater = float(share[: seen + 1].sum()), float(share[seen:].sum())
+    return [min(1.0, 2.0 * min(less, greater)), min(1.0, less), min(1.0, greater)]
 
 
 def mann_whitney(

@@ -54,6 +54,24 @@ def test_summary_follows_from_runs(folder):
             assert float(line[f"{metric}_ci95_high"]) == pytest.approx(mean + half, abs=1e-3)
 
 
+def test_intervals_are_over_draws_of_consecutive_runs(tmp_path):
+    drawn = {"start.y_m": {"distribution": "uniform", "minimum": 0.5, "maximum": 4.5}}
+    out = tmp_path / "out"
+    run_campaign("seams2023", ["none"], 10, 1, out=out, runs_per_draw=5, perturbations=drawn)
+    values = [float(row["search_time_s"]) for row in rows_of(out / "runs.csv")]
+    means = sum(values[:5]) / 5, sum(values[5:]) / 5
+    (summary,) = rows_of(out / "summary.csv")
+    # Two draws: Student's t with one degree of freedom, 97.5%: 12.7062; the standard error of two
+    # means is half their distance.
+    half = 12.7062 * abs(means[0] - means[1]) / 2
+    assert float(summary["search_time_s_ci95_low"]) == pytest.approx(
+        sum(means) / 2 - half, rel=1e-4
+    )
+    assert float(summary["search_time_s_ci95_high"]) == pytest.approx(
+        sum(means) / 2 + half, rel=1e-4
+    )
+
+
 class TestSuaveFormat:
     def test_revision_2023(self, tmp_path):
         scenario = tmp_path / "short.yaml"

@@ -152,7 +152,7 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit():
     found = compared(real=real, same=same)
     times_s = real["search_time_s"].clip(upper=300.0)[real["manager"] == "a"]
     assert found.estimates["alone"][0] == pytest.approx(times_s.mean())
-    assert any("never found the pipeline (a 1 of 12" in note for note in found.notes)
+    assert any("had not found the pipeline by 300 s (a 1 of 12" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(

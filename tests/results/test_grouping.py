@@ -136,8 +136,12 @@ def test_missions_that_end_early_are_not_said_to_have_reached_the_limit():
     frame.loc[lost, "search_time_s"] = 300.0
     assert any("mean up to that limit" in note for note in compare_frame(frame).notes)
     frame.loc[lost, "search_time_s"] = 190.0 + frame["run"]  # the battery was empty
-    (note,) = (note for note in compare_frame(frame).notes if "never found" in note)
-    assert "b after 191 to 200 s" in note and "mean up to that limit" not in note
+    notes = compare_frame(frame).notes
+    assert any("by 200 s (b 10 of 40) count with 200 s" in note for note in notes)
+    assert (
+        "some missions ended earlier without it (b after 191 to 198 s), which is no short search"
+        in notes
+    )
 
 
 def test_managers_that_lack_different_points_are_not_compared_over_these():

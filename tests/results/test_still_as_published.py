@@ -157,12 +157,12 @@ def test_metres_inspected_for_each_second_after_the_detection(manager, tolerance
         if each.distance_inspected_m > 10.0
     ]
     published = published_speeds_m_per_s(manager)
+    assert len(speeds) > 100 and len(published) > 10
     assert statistics.quantiles(speeds)[2] == pytest.approx(
         statistics.quantiles(published)[2], rel=tolerance
     )
-    slow, published_slow = (
-        sum(speed < 0.26 for speed in each) / len(each) for each in (speeds, published)
-    )
-    assert manager == "none" or slow == pytest.approx(
-        published_slow, abs=0.21
-    )  # half the interval of 7 of 20
+    if manager == "metacontrol":
+        slow, published_slow = (
+            sum(speed < 0.26 for speed in each) / len(each) for each in (speeds, published)
+        )
+        assert slow == pytest.approx(published_slow, abs=0.21)  # half the interval of 7 of 20

@@ -1,0 +1,99 @@
+"""Intervals, limits and units of assisted estimates, by hand."""
+
+import math
+
+import numpy as np
+import pandas
+import pytest
+from scipy import stats
+
+from suave_des.records.missions import missions_in
+from suave_des.results.compare import assisted_mean, compare_assisted
+from suave_des.results.comparison import AssistedComparison
+from suave_des.results.groups import grouped
+
+
+def test_an_estimated_weight_takes_a_degree_of_freedom():
+    # PPI++, arXiv:2311.01453: var(real - weight same) / n + weight**2 var(population) / draws.
+    real = np.array([52.0, 118, 83, 61, 97, 130, 75, 88, 143, 69, 110, 92])
+    same = real + np.array([3.0, 3, -3, -4, 4, -3, 4, 5, -7, -3, 3, 7])
+    many = np.linspace(50.0, 140.0, 20)
+    found, weight = assisted_mean(real, same, many)
+    variance = np.var(real - weight * same, ddof=1) / 12 + weight**2 * np.var(many, ddof=1) / 20
+    half = stats.t.ppf(0.975, 10) * math.sqrt(variance)
+    assert 0.0 < weight < 1.0
+    assert found.high - found.low == pytest.approx(2.0 * half)
+
+
+def found_in(
+    shares: dict[str, list[int]], missions: int, seed: int, shift: int
+) -> pandas.DataFrame:
+    """Missions of managers under conditions, of which so many found the pipeline in each."""
+    rows = [
+        (manager, float(condition), run, run <= count)
+        for manager, counts in shares.items()
+        for condition, count in enumerate(counts)
+        for run in range(1, missions + 1)
+    ]
+    frame = pandas.DataFrame(rows, columns=["manager", "start.y_m", "run", "pipeline_found"])
+    times_s = (100.0 + frame["start.y_m"]).where(frame["pipeline_found"], 300.0 + shift)
+    return frame.assign(scenario="s", seed=seed, search_time_s=times_s, distance_inspected_m=1.0)
+
+
+def assisted(metric: str, shift: int = 0) -> AssistedComparison:
+    """Real missions of a, which always finds the pipeline, and of b, which does in some conditions;
+    their limit is written with a shift of so many seconds."""
+    shares = {"a": [4, 4, 4, 4], "b": [0, 4, 1, 3]}
+    real = found_in(shares, 4, 1, shift).drop(columns=["run", "seed"])
+    same = found_in({"a": [3, 4, 4, 4], "b": [1, 3, 1, 3]}, 4, 2, 0)
+    many = found_in({"a": [1] * 9 + [0], "b": [1, 0] * 5}, 1, 3, 0)
+    many = many.assign(run=many["start.y_m"].astype(int) + 1).drop(columns="start.y_m")
+    groups = grouped(
+        missions_in(real), metrics=[metric], simulated=[missions_in(same), missions_in(many)]
+    )
+    return compare_assisted(groups)
+
+
+def test_intervals_of_shares_are_cut_at_all_and_none_and_those_of_differences_at_both_signs():
+    found = assisted("pipeline_found").estimates.set_index(["group", "other"])
+    share, difference = found.loc[("b", "")], found.loc[("a", "b")]
+    assert share["alone"] == 0.5
+    assert (share["alone_ci95_low"], share["alone_ci95_high"]) == (0.0, 1.0)
+    # Differences in conditions: 1, 0, 3/4, 1/4; Student's t with 3 degrees of freedom.
+    half = stats.t.ppf(0.975, 3) * np.std([1.0, 0.0, 0.75, 0.25], ddof=1) / 2.0
+    assert difference["alone"] == 0.5
+    assert half > 0.5
+    assert difference["alone_ci95_low"] == pytest.approx(0.5 - half)
+    assert difference["alone_ci95_high"] == 1.0
+
+
+def test_a_difference_of_shares_is_in_percentage_points_with_its_interval():
+    estimates = assisted("pipeline_found")
+    (sentence,) = (each for each in estimates.estimates["conclusion"] if "a - b" in each)
+    assert "percentage points (95% interval -" in sentence and "% from" not in sentence
+    (row,) = (
+        row
+        for section in estimates.sections()
+        for row in section.tables[0].rows
+        if row[0] == "a - b"
+    )
+    assert row[2].endswith(" points") and row[3].endswith(" points")
+
+
+@pytest.mark.parametrize("shift", [0, 1])
+def test_missions_that_are_lost_count_with_the_shorter_of_two_limits(shift):
+    found = assisted("search_time_s", shift).estimates.set_index(["group", "other"])
+    in_conditions = [300.0, 101.0, (102.0 + 3 * 300.0) / 4, (3 * 103.0 + 300.0) / 4]
+    assert found.loc[("b", ""), "alone"] == pytest.approx(np.mean(in_conditions))
+
+
+def test_real_missions_that_ended_early_count_with_the_limit():
+    real = found_in({"a": [4, 0, 2]}, 4, 1, 0).drop(columns=["run", "seed"])
+    real.loc[4, "search_time_s"] = 20.0  # the battery was empty
+    same = found_in({"a": [4, 1, 2]}, 4, 2, 0)
+    many = found_in({"a": [1] * 9 + [0]}, 1, 3, 0)
+    many = many.assign(run=many["start.y_m"].astype(int) + 1).drop(columns="start.y_m")
+    groups = grouped(missions_in(real), simulated=[missions_in(same), missions_in(many)])
+    found = compare_assisted(groups).estimates.set_index(["metric", "group"])
+    in_conditions = [100.0, 300.0, (102.0 + 300.0) / 2]
+    assert found.loc[("search_time_s", "a"), "alone"] == pytest.approx(np.mean(in_conditions))
