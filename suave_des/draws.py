@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable, Mapping
 from operator import attrgetter
 
-from suave_des.scenario.models import Distribution, Drawn, Scenario, draw
+from suave_des.scenario.models import Distribution, Scenario, draw
 
 
 class Streams:
@@ -40,8 +40,8 @@ class Draws(Streams):
     Args:
         seed: the campaign's.
         run: number of the run, from 1.
-        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path
-            is not in it.
+        runs_per_draw: how many runs in a row share the values of a stream, by its name, see
+            stream_name; one, if it is not in it.
         numbers: keeps the plain numbers by key path, for other runs of the same scenario.
 
     Attributes:
@@ -87,13 +87,12 @@ class Draws(Streams):
             if isinstance(found, float):
                 value = self._numbers[key] = max(least, found)
             else:
-                shared_by = self._runs_per_draw.get(key, 1)
+                name = stream_name(key, found.shared)
+                shared_by = self._runs_per_draw.get(name, 1)
                 first = (
                     self._run - 1
                 ) // shared_by * shared_by + 1  # of the runs that share the value
-                value = max(
-                    least, found.draw(Streams(self._seed, first).stream(_stream_name(key, found)))
-                )
+                value = max(least, found.draw(Streams(self._seed, first).stream(name)))
         self.drawn[key] = value
         return value
 
@@ -101,7 +100,7 @@ class Draws(Streams):
         """Make a function that draws a new value at each call."""
         if isinstance(distribution, float):
             return lambda: distribution
-        stream = self.stream(_stream_name(key, distribution))
+        stream = self.stream(stream_name(key, distribution.shared))
         return lambda: draw(distribution, stream)
 
     def phase(self, timer: str, period_s: float) -> float:
@@ -111,8 +110,8 @@ class Draws(Streams):
         return self.stream(f"phase/{timer}").random() * period_s
 
 
-def _stream_name(key: str, distribution: Drawn) -> str:
+def stream_name(key: str, shared: str | None) -> str:
     """Name the stream that a key's values are drawn from: its own, or that of a draw that several
     keys share.
     """
-    return key if distribution.shared is None else f"shared/{distribution.shared}"
+    return key if shared is None else f"shared/{shared}"

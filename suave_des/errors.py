@@ -77,6 +77,19 @@ class MissionError(SuaveDesError):
         return f"manager {self.manager}, run {self.run}, mission time {self.time_s:.2f} s: {self.cause}"
 
 
+class PassingError(SuaveDesError):
+    """Base of errors that may not happen again, such as of a machine that is busy."""
+
+
+def may_pass(error: BaseException | None) -> bool:
+    """Return whether an error may not happen again, because of what caused it."""
+    while error is not None:
+        if isinstance(error, PassingError):
+            return True
+        error = error.__cause__
+    return False
+
+
 class MissionTimeOut(BaseException):
     """A mission took too long; not an Exception, so that a manager that catches those does not
     catch this.

@@ -7,18 +7,25 @@ from __future__ import annotations
 import ctypes
 import signal
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import count, product
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
 
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, check_range
 from suave_des.campaign.variation import Variation, cell_of, short_mission
-from suave_des.errors import MissionError, MissionTimeOut, SuaveDesError
+from suave_des.errors import (
+    MissionError,
+    MissionTimeOut,
+    PassingError,
+    SuaveDesError,
+    may_pass,
+)
 from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
 from suave_des.records.metrics import Row, further_of, row_of
@@ -45,6 +52,12 @@ state
 """
 _REPEAT_S = 1.0
 """A mission that swallowed the interruption is interrupted again after this time."""
+_TICKS = 20
+"""Parts into which a time limit is divided: of one in which the process was stopped (Ctrl-Z) no
+more than that part counts.
+"""
+_LEAST_SHARE = 0.5
+"""With less of the time limit as CPU time, a manager that never waits was kept waiting."""
 
 
 class Remark(NamedTuple):
@@ -227,18 +240,25 @@ class MissionRunner:
         )
         values, member = variation.sweep.values(key.point), variation.member(key.run)
         simulator = self._simulator(key.point, member)
+        began_s = time.process_time()
         try:
             with _time_limit(spec.time_out_s):
                 result = simulator.run(manager, key.run, spec.seed, record=spec.record_knowledge)
         except MissionError as error:
+            lasting = not may_pass(error)
             return MissionFailure(
-                error.manager, error.run, error.time_s, error.cause, point=key.point
+                error.manager, error.run, error.time_s, error.cause, lasting, key.point
             ), []
+        except PassingError as error:  # before the mission has begun
+            return self.campaign.failed(key, str(error))[1], []
         except MissionTimeOut as error:
-            place = place_of(error)
-            cause = f"{self.campaign.too_long}{place and f', in {place}'}"
-            _, failure = self.campaign.failed(key, cause, error.time_s)
-            return failure, []
+            cause = self.campaign.too_long
+            if place := place_of(error):
+                cause += f", in {place}"
+            used_s = time.process_time() - began_s
+            if is_built_in(manager) and used_s < _LEAST_SHARE * spec.time_out_s:
+                cause += "; the machine was busy with other work"
+            return self.campaign.failed(key, cause, error.time_s)[1], []
         drawn = (result.drawn[path] for path in variation.drawn)
         members = () if member is None else (member,)
         row = (
@@ -277,19 +297,30 @@ def _time_limit(seconds: float) -> Iterator[None]:
     """Raise MissionTimeOut in the block when it takes longer, and again while it swallows that.
 
     The alarm signal reaches the main thread in whatever it waits for; other threads when they
-    return to Python.
+    return to Python. Alarms that come while the process is stopped are one when it continues.
     """
+    tick_s = seconds / _TICKS
     if threading.current_thread() is threading.main_thread():
-        with handled([signal.SIGALRM], _raise), alarm(seconds, _REPEAT_S):
+        ticks = count(1)
+
+        def tick(number: int, frame: FrameType | None) -> None:
+            if next(ticks) < _TICKS:
+                return
+            signal.setitimer(signal.ITIMER_REAL, _REPEAT_S, _REPEAT_S)
+            raise MissionTimeOut
+
+        with handled([signal.SIGALRM], tick), alarm(tick_s, tick_s):
             yield
         return
     thread, over = ctypes.c_ulong(threading.get_ident()), threading.Event()
 
     def watch() -> None:
-        wait_s = seconds
-        while not over.wait(wait_s):
-            wait_s = _REPEAT_S
+        if any(over.wait(tick_s) for _ in range(_TICKS)):
+            return
+        is_over = False
+        while not is_over:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, ctypes.py_object(MissionTimeOut))
+            is_over = over.wait(_REPEAT_S)
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
@@ -299,7 +330,3 @@ def _time_limit(seconds: float) -> Iterator[None]:
         over.set()
         watcher.join()
         ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, None)  # of one that comes too late
-
-
-def _raise(number: int, frame: FrameType | None) -> None:
-    raise MissionTimeOut

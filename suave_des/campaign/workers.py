@@ -9,22 +9,29 @@ import signal
 import sys
 import time
 import traceback
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from itertools import islice, repeat
+from itertools import islice
 from math import inf
 from multiprocessing import Pipe, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from types import ModuleType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
-from suave_des.campaign.missions import Campaign, Chunk, Finished, MissionRunner, WorkerError
+from suave_des.campaign.missions import (
+    Campaign,
+    Chunk,
+    Finished,
+    MissionRunner,
+    Remark,
+    WorkerError,
+)
 from suave_des.errors import SuaveDesError
 from suave_des.interrupts import INTERRUPTS, signals_deferred
-from suave_des.records.store import MissionKey
+from suave_des.records.store import MissionFailure, MissionKey
 from suave_des.registry import is_built_in
 
 _LARGEST_CHUNK = 10
@@ -37,6 +44,14 @@ _ATTEMPTS = 3
 """How many times a worker may die with a mission before the mission has failed."""
 _IN_A_ROW = 8
 """Workers that may end one after the other without an outcome in between."""
+_STUCK_IN_A_ROW = 3
+"""Missions of a manager, one after the other, after which a stuck reasoner is no reason for a new
+worker.
+"""
+_LOOK_S = 5.0
+"""Longest wait for workers: one that took twice as long was one in which this process was
+stopped.
+"""
 _MARGIN_S = 60.0
 """Added to the time that a chunk's missions may take, such as for starting Java, before its worker
 is killed.
@@ -52,8 +67,17 @@ _Task = tuple[Chunk, int]
 def in_process(
     campaign: Campaign, missions: Iterable[MissionKey], total: int
 ) -> Iterator[list[Finished]]:
-    """Run missions one after the other in this process; an Executor."""
-    return ([each] for each in MissionRunner(campaign).each(missions))
+    """Run missions one after the other in this process; an Executor.
+
+    A reasoner that does not come back cannot be stopped: the rest then runs in a worker process.
+    """
+    runner, remaining = MissionRunner(campaign), iter(missions)
+    for key in remaining:
+        for each in runner.each((key,)):
+            yield [each]
+        if _reasoner_is_stuck():
+            with LocalWorkers(campaign.spec.managers, 1) as workers:
+                yield from workers.outcomes(campaign, remaining, total)
 
 
 class LocalWorkers:
@@ -63,7 +87,8 @@ class LocalWorkers:
     Workers are spawned, never forked: a forked child would hang on its parent's Java virtual
     machine. One that dies before its work is done (killed, out of memory, a crash of Java) is
     replaced, and the missions that it was running are run again one by one. A mission during which
-    that happens _ATTEMPTS times has failed; so has one that its own time-out does not end.
+    that happens _ATTEMPTS times has failed; so has one that its own time-out does not end. One
+    whose reasoner does not come back is replaced, too, as Java cannot be stopped from outside.
 
     Each worker has a pipe of its own. A ProcessPoolExecutor has one for all, and waits for ever
     when a worker is killed while it writes into it; it does not say either which chunk a worker
@@ -72,12 +97,11 @@ class LocalWorkers:
 
     def __init__(self, managers: Sequence[str], workers: int) -> None:
         self._may_be_killed = all(map(is_built_in, managers))
-        self._size, self._workers, self._is_done, self._in_a_row = (
-            workers,
-            list[_Worker](),
-            False,
-            0,
-        )
+        self._size = workers
+        self._workers: list[_Worker] = []
+        self._is_done = False
+        self._ended_in_a_row = 0
+        self._stuck_in_a_row = Counter[int]()  # by manager
         self._again = deque[_Task]()
 
     def __enter__(self) -> Self:
@@ -104,44 +128,29 @@ class LocalWorkers:
         """Yield outcomes chunk by chunk; see Executor."""
         size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
         remaining, content = iter(missions), packed(campaign)
-        tasks = zip(iter(lambda: tuple(islice(remaining, size)), ()), repeat(0))
+        chunks = iter(lambda: tuple(islice(remaining, size)), ())
         for worker in self._workers:
             worker.send(content)
         while busy := [worker for worker in self._workers if worker.due_s < inf]:
-            wait_s = min(worker.due_s for worker in busy) - time.monotonic()
-            ready = wait([worker.connection for worker in busy], max(0.0, wait_s))
-            for worker in busy:
-                if worker.connection not in ready:
-                    if time.monotonic() >= worker.due_s:
-                        worker.is_overdue = True
-                        worker.process.kill()  # its pipe then ends
-                    continue
-                try:
-                    found = worker.connection.recv()
-                except (EOFError, OSError):  # also in the middle of a message
-                    yield from self._ended(worker, campaign)
+            for worker in _ready(busy):
+                answer = worker.receive()
+                if answer is None:
+                    yield from self._lost(worker, campaign)
                     self._start().send(content)
                     continue
-                if isinstance(found, BaseException):
-                    raise found
-                if found is not None:
+                if answer.is_of_chunk:
                     worker.tasks.popleft()
-                    self._in_a_row = 0
-                room = range(_AHEAD - len(worker.tasks))
-                for task in filter(
-                    None,
-                    (self._again.popleft() if self._again else next(tasks, None) for _ in room),
-                ):
-                    worker.tasks.append(task)
-                    worker.send(task[0])
-                limit_s = (
-                    campaign.spec.time_out_s * len(worker.tasks[0][0]) + _MARGIN_S
-                    if worker.tasks
-                    else inf
-                )
-                worker.due_s = time.monotonic() + limit_s
-                if found is not None:
-                    yield found
+                    self._ended_in_a_row = 0
+                if answer.left:
+                    self._again.append((answer.left, 0))
+                if self._is_to_be_replaced(answer):
+                    self._again.extend(worker.tasks)
+                    self._remove(worker)
+                    self._start().send(content)
+                else:
+                    self._give_tasks(worker, chunks, campaign.spec.time_out_s)
+                if answer.is_of_chunk:
+                    yield answer.outcomes
         self._is_done = True
 
     def _start(self) -> _Worker:
@@ -160,16 +169,52 @@ class LocalWorkers:
                 f"{problem} (raise the limit, see ulimit -a, or give --workers 1)"
             ) from None
 
-    def _ended(self, worker: _Worker, campaign: Campaign) -> Iterator[list[Finished]]:
+    def _give_tasks(self, worker: _Worker, chunks: Iterator[Chunk], time_out_s: float) -> None:
+        """Give a worker tasks until it has _AHEAD, while there are any; and time for the first."""
+        while len(worker.tasks) < _AHEAD:
+            if self._again:
+                task = self._again.popleft()
+            elif (chunk := next(chunks, None)) is not None:
+                task = (chunk, 0)
+            else:
+                break
+            worker.tasks.append(task)
+            worker.send(task[0])
+        if worker.tasks:
+            limit_s = time_out_s * len(worker.tasks[0][0]) + _MARGIN_S
+            worker.due_s = time.monotonic() + limit_s
+        else:
+            worker.due_s = inf
+
+    def _is_to_be_replaced(self, answer: Answer) -> bool:
+        """Whether the reasoner of a worker does not come back, and another worker may do better.
+
+        None does where all missions of a manager lead to that, which are then given up as others
+        that take too long.
+        """
+        for key, outcome in answer.outcomes:
+            if not isinstance(outcome, MissionFailure | Remark):
+                self._stuck_in_a_row[key.manager] = 0
+        if not answer.is_stuck or not answer.outcomes:
+            return False
+        key, _ = answer.outcomes[-1]
+        self._stuck_in_a_row[key.manager] += 1
+        return self._stuck_in_a_row[key.manager] < _STUCK_IN_A_ROW
+
+    def _remove(self, worker: _Worker) -> int | None:
+        """End a worker, and return its exit status."""
+        worker.process.kill()
+        worker.connection.close()
+        self._workers.remove(worker)
+        return worker.join()
+
+    def _lost(self, worker: _Worker, campaign: Campaign) -> Iterator[list[Finished]]:
         """Have what a worker was running when it ended run again, one by one; or yield that it has
         failed.
         """
-        worker.process.kill()
-        worker.connection.close()
-        status = worker.join()
-        self._workers.remove(worker)
-        self._in_a_row += 1
-        if self._in_a_row >= _IN_A_ROW:
+        status = self._remove(worker)
+        self._ended_in_a_row += 1
+        if self._ended_in_a_row >= _IN_A_ROW:
             what = f"{_IN_A_ROW} worker processes in a row ended before a mission was done"
             raise WorkerError(f"{what}, the last with status {status} (killed, or out of memory?)")
         (suspects, died), *others = worker.tasks or [((), 0)]
@@ -204,6 +249,19 @@ class _Worker:
         with suppress(OSError):
             self.connection.send(message)
 
+    def receive(self) -> Answer | None:
+        """Receive an answer, None of a process that has ended; an error of the campaign is raised
+        here.
+        """
+        try:
+            found = self.connection.recv()
+        except (EOFError, OSError):  # also in the middle of a message
+            return None
+        if isinstance(found, BaseException):
+            raise found
+        assert isinstance(found, Answer)
+        return found
+
     def join(self) -> int | None:
         """Wait for the process to end, and return its exit status; it is killed if that takes
         long.
@@ -212,6 +270,24 @@ class _Worker:
         self.process.kill()
         self.process.join()
         return self.process.exitcode
+
+
+def _ready(busy: Sequence[_Worker]) -> list[_Worker]:
+    """Wait until some workers have answered or ended, and return them; kill those that are overdue.
+
+    Time in which this process was stopped (Ctrl-Z), as its workers mostly were, does not count.
+    """
+    began_s = time.monotonic()
+    wait_s = max(0.0, min(_LOOK_S, min(worker.due_s for worker in busy) - began_s))
+    ready = wait([worker.connection for worker in busy], wait_s)
+    stopped_s = time.monotonic() - began_s - wait_s
+    for worker in busy:
+        if stopped_s > _LOOK_S:
+            worker.due_s += stopped_s
+        if worker.connection not in ready and time.monotonic() >= worker.due_s:
+            worker.is_overdue = True
+            worker.process.kill()  # its pipe then ends
+    return [worker for worker in busy if worker.connection in ready]
 
 
 @contextmanager
@@ -274,6 +350,39 @@ def finished(runner: MissionRunner, chunk: Chunk) -> list[Finished]:
         os._exit(errno.ENOMEM)
 
 
+class Answer(NamedTuple):
+    """What a worker answers.
+
+    Attributes:
+        outcomes: of a chunk's missions.
+        left: those that it has not run, because its reasoner does not come back.
+        is_stuck: whether that is so.
+        is_of_chunk: whether it is about a chunk, and not the first answer, which says that it is
+            ready.
+    """
+
+    outcomes: list[Finished]
+    left: Chunk = ()
+    is_stuck: bool = False
+    is_of_chunk: bool = True
+
+
+def _reasoner_is_stuck() -> bool:
+    """Whether work that a reasoner of this process has taken too long for still goes on."""
+    pellet = sys.modules.get("suave_des.knowledge.pellet")  # it is not, where it was not imported
+    return pellet is not None and bool(pellet.is_stuck())
+
+
+def _answer_of(runner: MissionRunner, chunk: Chunk) -> Answer:
+    """Run missions, until the reasoner is stuck."""
+    outcomes: list[Finished] = []
+    for number, key in enumerate(chunk, start=1):
+        outcomes += finished(runner, (key,))
+        if _reasoner_is_stuck():
+            return Answer(outcomes, chunk[number:], is_stuck=True)
+    return Answer(outcomes)
+
+
 def work(connection: Connection[Any, Any]) -> None:
     """Receive a campaign, then chunks of its missions, and send back their outcomes, until the
     other end is closed.
@@ -286,12 +395,13 @@ def work(connection: Connection[Any, Any]) -> None:
         runner = None
         while True:
             message = connection.recv()
-            answer: object = None
+            answer: Answer | Exception
             try:
                 if runner is None:
                     runner = MissionRunner(unpacked(message))
+                    answer = Answer([], is_of_chunk=False)
                 else:
-                    answer = finished(runner, message)
+                    answer = _answer_of(runner, message)
             except SuaveDesError as error:
                 answer = error
             except Exception:

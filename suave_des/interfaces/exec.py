@@ -1,9 +1,9 @@
 """Managers in other processes and languages: `exec:COMMAND` exchanges JSON lines with a program by
 stdin and stdout.
 
-Each message is a line, and gets a line as its answer; mission time stands still until then. The
-program is started once in each process that runs missions, and serves one mission after the other.
-The messages: docs/guides/other-programs.md.
+Each message is a line, and gets a line as its answer; mission time stands still until then. A
+program serves one mission after the other; as many are started in a process as it has missions
+under way at a time, mostly one. The messages: docs/guides/other-programs.md.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar, Final
+from weakref import WeakSet, finalize
 
 from suave_des.domain import Task
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, PassingError, did_you_mean, shown
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
@@ -36,6 +38,9 @@ LINE_LIMIT_BYTES: Final = 1_000_000
 TIME_OUT_S: Final = 10.0
 """So long a program may take for an answer; the setting `time_out_s` changes it."""
 _END_S: Final = 1.0
+_LOOK_S: Final = 1.0
+"""Longest wait for a program: one that took twice as long was one in which this process was stopped.
+"""
 _READ_BYTES: Final = 65536
 _KILLS_AT_END_OF_INPUT: Final = 'read -r _; sleep 1; kill -s KILL -- "-$1"'
 KINDS: Final = {
@@ -53,8 +58,14 @@ class ProgramError(Exception):
     """A program that exits, does not answer, or violates the protocol."""
 
 
+class ProgramTimeoutError(ProgramError, PassingError):
+    """A program that does not answer in time, or was killed: neither need happen again."""
+
+
 class _Program:
     """A running program."""
+
+    has_ended = False
 
     def __init__(self, command: tuple[str, ...]) -> None:
         try:
@@ -86,6 +97,8 @@ class _Program:
 
     def ask(self, message: Mapping[str, Any], time_out_s: float) -> dict[str, Any]:
         """Send a message, and return its answer."""
+        if self.has_ended:
+            raise ProgramError("was ended after an error")
         line = (
             json.dumps(message, separators=(",", ":"), default=dict).encode() + b"\n"
         )  # of mappings of other types
@@ -110,9 +123,9 @@ class _Program:
         while b"\n" not in self._rest:
             if len(self._rest) > LINE_LIMIT_BYTES:
                 raise ProgramError(f"answered with a line of more than {LINE_LIMIT_BYTES:,} bytes")
-            if not self._poll.poll(max(0.0, due_s - time.monotonic()) * 1e3):
+            if not self._has_more(due_s):
                 half = " but half a line" if self._rest else ""
-                raise ProgramError(f"gave no answer{half} within {time_out_s:g} s")
+                raise ProgramTimeoutError(f"gave no answer{half} within {time_out_s:g} s")
             if not (part := os.read(self._out, _READ_BYTES)):
                 raise self._ended()
             self._rest += part
@@ -121,15 +134,34 @@ class _Program:
             raise ProgramError("answered with more than one line")
         return line
 
+    def _has_more(self, due_s: float) -> bool:
+        """Wait until the program has written something, or a time has come.
+
+        One at which this process was stopped (Ctrl-Z), and the program perhaps, too, is put off.
+        """
+        while (wait_s := due_s - time.monotonic()) > 0.0:
+            part_s = min(wait_s, _LOOK_S)
+            if self._poll.poll(part_s * 1e3):
+                return True
+            stopped_s = time.monotonic() - (due_s - wait_s) - part_s
+            if stopped_s > _LOOK_S:
+                due_s += stopped_s
+        return bool(self._poll.poll(0))
+
     def _ended(self) -> ProgramError:
         with suppress(subprocess.TimeoutExpired):
-            return ProgramError(f"ended with status {self._process.wait(_END_S)}")
+            status = self._process.wait(_END_S)
+            kind = ProgramTimeoutError if status == -signal.SIGKILL else ProgramError
+            return kind(f"ended with status {status}")
         return ProgramError("closed its output")
 
     def end(self) -> None:
         """End the program: it sees the end of its input; then whatever is left of it and its
         children is killed.
         """
+        if self.has_ended:
+            return
+        self.has_ended = True
         for stream in (self._process.stdin, self._process.stdout):
             assert stream is not None
             stream.close()
@@ -144,15 +176,34 @@ class _Program:
         self._watcher.communicate()
 
 
-_programs: dict[tuple[str, ...], _Program] = {}
-"""The programs of this process, by their commands."""
+_idle: dict[tuple[str, ...], list[_Program]] = {}
+"""The programs of this process that are in no mission, by their commands."""
+_in_missions: WeakSet[_Program] = WeakSet()
+"""The programs of this process that are in a mission."""
+
+
+def _take(command: tuple[str, ...]) -> _Program:
+    """Return a program for a mission: one that is idle, or a new one."""
+    idle = _idle.setdefault(command, [])
+    program = idle.pop() if idle else _Program(command)
+    _in_missions.add(program)
+    return program
+
+
+def _give_back(command: tuple[str, ...], program: _Program) -> None:
+    """Keep the program of a mission that is over for the next one."""
+    _in_missions.discard(program)
+    if not program.has_ended:
+        _idle.setdefault(command, []).append(program)
 
 
 @atexit.register
 def end_programs() -> None:
     """End all programs that this process has started."""
-    while _programs:
-        _programs.popitem()[1].end()
+    for program in (*_in_missions, *chain.from_iterable(_idle.values())):
+        program.end()
+    _in_missions.clear()
+    _idle.clear()
 
 
 class ExecManager(ManagingSubsystem):
@@ -172,6 +223,8 @@ class ExecManager(ManagingSubsystem):
         self._time_out_s = float(system.settings.get("time_out_s", TIME_OUT_S))
         self._depends_on: Dependencies | None = None
         self._begin: dict[str, Any] = {}
+        self._program: _Program | None = None
+        self._give_back: Callable[[], object] = lambda: None
 
     def _located(self, word: str) -> str:
         """Return where the file is that a word of the command names, or the word if it names
@@ -226,8 +279,9 @@ class ExecManager(ManagingSubsystem):
         self._carry_out(self._begin)
 
     def mission_ended(self, metrics: MissionMetrics) -> None:
-        """Send the program the metrics."""
+        """Send the program the metrics, and leave it to another mission."""
         self._ask("mission_ended", metrics=asdict(metrics))
+        self._give_back()
 
     def task_requested(self, task: Task) -> None:
         """Send the program a task that begins."""
@@ -254,16 +308,18 @@ class ExecManager(ManagingSubsystem):
         )
 
     def _ask(self, kind: str, /, **content: Any) -> dict[str, Any]:
-        if (program := _programs.get(self._command)) is None:
-            program = _programs[self._command] = _Program(self._command)
+        if self._program is None:
+            self._program = program = _take(self._command)
+            # A mission that does not end leaves it to another one when nobody refers to it any more.
+            self._give_back = finalize(self, _give_back, self._command, program)
         try:
-            answer = program.ask(
+            answer = self._program.ask(
                 {"type": kind, "time_s": self.system.now_s, **content}, self._time_out_s
             )
         except BaseException as error:  # a time-out of the mission, too, leaves an answer under way
-            _programs.pop(self._command).end()
+            self._program.end()
             if isinstance(error, ProgramError):
-                raise self._error(str(error)) from None
+                raise type(error)(f"the program {error}") from None
             raise
         known = _FIRST_ANSWER if kind == "mission_started" else _ANSWER
         if unknown := [key for key in answer if key not in known]:

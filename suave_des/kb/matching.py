@@ -19,7 +19,7 @@ from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable
-from suave_des.knowledge.state import ContradictionError, Value
+from suave_des.knowledge.state import ContradictionError, Value, value_text
 
 #: Begins the IRIs of what is added to a knowledge base to question it.
 PROBE: Final = "urn:suave-des:probe"
@@ -84,7 +84,7 @@ def shown_bindings(binding: Binding, names: Names) -> Bound:
 
 def with_bindings(bindings: Bound) -> str:
     """Write the values of variables after something that holds with them."""
-    words = ", ".join(f"?{name} = {value}" for name, value in bindings)
+    words = ", ".join(f"?{name} = {value_text(value)}" for name, value in bindings)
     return f" with {words}" if words else ""
 
 

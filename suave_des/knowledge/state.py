@@ -122,7 +122,7 @@ class KnowledgeState:
                 for each in self.objectives
             ),
             *(
-                f"{name} = {value}"
+                f"{name} = {value_text(value)}"
                 for name, value in (*self.groundings, *self.components, *self.measurements)
             ),
         ]
@@ -151,8 +151,10 @@ class Fact:
 
 
 def value_text(value: Value) -> str:
-    """Write a value as rules and facts do: true, 2.25, IN_ERROR_NFR."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    """Write a value as rules and facts do: true, 2.25, IN_ERROR_NFR; no text is two quotes."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value) or '""'
 
 
 @dataclass(frozen=True)

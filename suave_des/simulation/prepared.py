@@ -15,11 +15,11 @@ import numpy as np
 from suave_des.arguments import plain_arguments
 from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
-from suave_des.draws import Draws
+from suave_des.draws import Draws, stream_name
 from suave_des.learned import read_learned
 from suave_des.managed.follow import InspectionPath
 from suave_des.registry import custom_functions, declared_files, manager_class
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.loader import LoadedScenario, value_at
 from suave_des.scenario.models import Calibration, CurrentWaveDescription, VehicleDescription
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
@@ -52,7 +52,10 @@ class PreparedScenario:
         runs_per_draw: Mapping[str, int] = MappingProxyType({}),
         training: dict[str, dict[str, Any]] | None = None,
     ) -> None:
-        self.loaded, self.runs_per_draw, self.training = loaded, dict(runs_per_draw), training
+        self.loaded, self.training = loaded, training
+        self.runs_per_draw = {
+            _stream_of(loaded, path): runs for path, runs in runs_per_draw.items()
+        }
         scenario = loaded.scenario
         self.points = sample_points(
             scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece
@@ -147,6 +150,15 @@ class PreparedScenario:
     def give_back(self, track: Array) -> None:
         """Keep the memory of a mission that is no longer needed for the next one."""
         self._spare_tracks.append(track)
+
+
+def _stream_of(loaded: LoadedScenario, path: str) -> str:
+    """Return the stream of what is drawn at a key path: that of other keys, if they share a
+    draw.
+    """
+    found = value_at(loaded, path.partition("/")[0])
+    shared = found.get("shared") if isinstance(found, Mapping) else None
+    return stream_name(path, shared)
 
 
 @lru_cache(maxsize=64)

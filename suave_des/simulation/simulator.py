@@ -13,8 +13,8 @@ class Simulator(PreparedScenario):
 
     Args:
         loaded: the scenario with its files.
-        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path
-            is not in it.
+        runs_per_draw: how many runs in a row share the value drawn for a key path, and for those
+            with which it shares a draw; one, if the path is not in it.
         training: what each manager has learned, by its name, kept from mission to mission; None:
             missions are no training.
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.variation import Sweep
+from suave_des.campaign.variation import Sweep, vary
 from suave_des.errors import InputError
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.scenario.loader import load_scenario, with_values
@@ -101,6 +101,23 @@ def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path):
     assert list(shared["initial_y_m"]) == list(
         single["initial_y_m"]
     )  # drawn by the scenario, each run its own
+
+
+def test_keys_that_share_a_draw_with_one_that_runs_share_share_it_too():
+    """A scenario's second event comes 25 s after the first, whose time is perturbed."""
+    drawn = {"distribution": "uniform", "shared": "shift"}
+    first, second = ({**drawn, "minimum": low, "maximum": low + 20} for low in (30, 55))
+    events = [
+        {"thruster": number, "event": "failure", "time_s": time_s}
+        for number, time_s in ((1, 40.0), (2, second))
+    ]
+    loaded = with_values(load_scenario("seams2023"), {"thruster_events": events})
+    loaded, variation = vary(loaded, {}, {"thruster_events.0.time_s": first}, 3)
+    simulator = Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
+    for run in (1, 2, 3):
+        times_s = simulator.run("none", run, 5).drawn
+        between_s = times_s["thruster_events.1.time_s"] - times_s["thruster_events.0.time_s"]
+        assert between_s == pytest.approx(25.0, abs=1e-9)
 
 
 @settings(max_examples=5, deadline=None)

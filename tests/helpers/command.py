@@ -131,3 +131,28 @@ def ends_within(seconds: int) -> Iterator[None]:
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
+
+
+def stopped_for(seconds: float, program: str, *also: str) -> subprocess.CompletedProcess[str]:
+    """Run a Python program, and stop it for a while, as Ctrl-Z does, from its first line of output
+    on.
+
+    With it the processes are stopped whose numbers that line has.
+    """
+    path = os.pathsep.join(filter(None, [_PACKAGE_PARENT, os.environ.get("PYTHONPATH")]))
+    with subprocess.Popen(
+        [sys.executable, "-c", program, *also],
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        others = [int(word) for word in process.stdout.readline().split() if word.isdigit()]
+        for number in (process.pid, *others):
+            os.kill(number, signal.SIGSTOP)
+        time.sleep(seconds)
+        for number in (process.pid, *others):
+            os.kill(number, signal.SIGCONT)
+        out, err = process.communicate(timeout=120.0)
+    return subprocess.CompletedProcess(process.args, process.returncode, out, err)

@@ -1,5 +1,6 @@
 """Managers that are programs of their own, in whatever language."""
 
+import gc
 import json
 import re
 import signal
@@ -9,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from suave_des import InputError, run_campaign, run_mission
+from suave_des import InputError, Mission, Simulator, load_scenario, run_campaign, run_mission
+from suave_des.campaign import campaign
 from suave_des.interfaces import exec as programs
-from tests.helpers.command import EXAMPLES, example_program, wait_until
+from tests.helpers.command import EXAMPLES, example_program, stopped_for, wait_until
 
 HEAD = "import json, os, sys, time\nfor number, line in enumerate(sys.stdin):\n    message = json.loads(line)\n"
 
@@ -211,3 +213,76 @@ def test_a_command_that_cannot_be_run_is_bad_input(name, words):
 def test_the_programs_files_are_hashed(tmp_path):
     run_campaign("seams2023", [program(EVERY_PERIOD)], runs=1, out=tmp_path / "out")
     assert '"program.py"' in (tmp_path / "out" / "manifest.json").read_text()
+
+
+NOTES_ITS_RUN = """
+seeds = globals().setdefault("seeds", [])
+if message["type"] == "mission_started":
+    seeds.append(message["seed"])
+with open("heard", "a") as heard:
+    heard.write(json.dumps([os.getpid(), len(seeds), message["type"], seeds[-1]]) + "\\n")
+print("{}", flush=True)
+"""
+
+
+def heard() -> list[tuple[int, int, str, int]]:
+    """What programs have heard: process, number of missions begun in it, message, seed."""
+    return [tuple(json.loads(line)) for line in Path("heard").read_text().splitlines()]
+
+
+def test_missions_under_way_at_a_time_have_a_program_each():
+    manager = program(NOTES_ITS_RUN)
+    one, other = (Mission("seams2023", manager, run=run) for run in (1, 2))
+    for until_s in (10.0, 20.0):
+        one.advance(until_s)
+        other.advance(until_s)
+    assert {begun for _, begun, _, _ in heard()} == {1}
+
+
+def test_missions_one_after_the_other_have_the_same_program():
+    run_campaign("seams2023", [program(NOTES_ITS_RUN)], runs=2)
+    assert len({process for process, _, _, _ in heard()}) == 1
+
+
+def test_a_mission_that_is_left_leaves_its_program_to_the_next():
+    simulator, manager = Simulator(load_scenario("seams2023")), program(NOTES_ITS_RUN)
+    for run in (1, 2):
+        mission = Mission(simulator, manager, run=run)
+        mission.advance(10.0)
+        mission.close()
+        del mission
+        gc.collect()
+    assert len({process for process, _, _, _ in heard()}) == 1
+
+
+ONCE_LATE = """
+if not os.path.exists("late"):
+    open("late", "w").close()
+    time.sleep(60)
+"""
+
+
+def test_a_mission_whose_program_was_late_is_run_again_when_the_campaign_is_resumed(tmp_path):
+    manager = program(ONCE_LATE + EVERY_PERIOD)
+    options = {"manager_options": {manager: {"time_out_s": 3.0}}}
+    first = campaign.run_campaign("seams2023", [manager], 1, 1, out=tmp_path / "out", **options)
+    assert [each.lasting for each in first.failures] == [False]
+    assert campaign.resume_campaign(tmp_path / "out").done == 1
+
+
+def test_a_program_that_is_stopped_with_the_campaign_is_waited_for():
+    Path("program.py").write_text(HEAD + "    time.sleep(0.2); print('{}', flush=True)\n")
+    done = stopped_for(
+        3.0,
+        """
+import sys
+from suave_des.interfaces.exec import _Program
+
+program = _Program((sys.executable, "program.py"))
+program.ask({}, 60.0)
+print(program._process.pid, flush=True)
+program.ask({}, 2.0)
+program.end()
+""",
+    )
+    assert (done.returncode, done.stderr) == (0, "")

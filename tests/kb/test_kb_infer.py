@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import threading
+import time
 from concurrent.futures import Future
 
 import pytest
@@ -15,7 +16,7 @@ from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoner import Reasoner
-from suave_des.knowledge.state import ObjectiveState
+from suave_des.knowledge.state import ContradictionError, ObjectiveState
 from tests.helpers.command import python
 
 HIGH = {
@@ -106,6 +107,24 @@ def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
     ] == ["f_maintain_motion"]
 
 
+def test_a_component_without_a_status_is_shown_with_no_text(knowledge):
+    state = knowledge.state(components={"c_thruster_1": ""})
+    assert str(state).endswith('c_thruster_1 = ""')
+
+
+def test_a_contradiction_shows_no_text_as_such(tmp_path):
+    # Pellet itself writes "()".
+    rules = tmp_path / "empty.swrl"
+    rules.write_text('empty: c_status(?c, ?s) ^ equal(?s, "") -> o_status(o_maintain_motion, ?s)\n')
+    knowledge = KnowledgeBase.load(rules=rules, reasoner="pellet")
+    with pytest.raises(
+        ContradictionError, match=r'literal value ""\^\^string .* c_status\(c_thruster_1, ""\)'
+    ):
+        knowledge.infer(
+            knowledge.state(objectives="f_generate_search_path", components={"c_thruster_1": ""})
+        )
+
+
 class TestTimeLimit:
     def test_names_the_state_that_takes_too_long_and_refuses_more(self, knowledge, monkeypatch):
         monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
@@ -116,9 +135,9 @@ class TestTimeLimit:
         )
         limit = TimeLimit()
         reasoner = Reasoner(knowledge.base, "pellet", limit)
-        limit.seconds = 0.2
+        limit.seconds = 0.05
         with pytest.raises(
-            KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.2 s"
+            KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after "
         ):
             reasoner.analyze(knowledge.state(**HIGH))
         with pytest.raises(KnowledgeError, match="still reasoning"):
@@ -152,9 +171,9 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
             raise KeyboardInterrupt
 
         monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
-        monkeypatch.setattr("suave_des.knowledge.pellet.Future.result", interrupted)
+        monkeypatch.setattr("suave_des.knowledge.pellet.wait", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            TimeLimit().run(lambda: None, "reasoning")
+            TimeLimit().run(lambda: time.sleep(0.5), "reasoning")
         assert times_abandoned() == 1
 
     @pytest.mark.parametrize("given_up_on", [False, True])
@@ -165,6 +184,7 @@ from suave_des.errors import KnowledgeError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
+from suave_des.knowledge.state import ContradictionError
 knowledge = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
 state = knowledge.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
 assert knowledge.infer(state).plan.decisions

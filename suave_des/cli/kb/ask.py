@@ -41,6 +41,8 @@ def infer(options: ReasonerOptions, at: At = None) -> None:
 
 
 def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
+    from suave_des.knowledge.state import value_text
+
     state, decisions = reasoning.inference.state, reasoning.plan.decisions
     yield "state"
     for objective in state.objectives:
@@ -52,7 +54,7 @@ def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
         "measured": state.measurements,
     }
     for kind, pairs in parts.items():
-        yield from (f"  {kind:<10}  {name} = {value}" for name, value in pairs)
+        yield from (f"  {kind:<10}  {name} = {value_text(value)}" for name, value in pairs)
     yield "inferred"
     yield from (f"  {fact}" for fact in sorted(map(str, reasoning.inference.facts)) or ["nothing"])
     yield "plan"

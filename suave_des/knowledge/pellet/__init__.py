@@ -11,10 +11,12 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
-from suave_des.errors import KnowledgeError
+from suave_des.errors import KnowledgeError, PassingError
 from suave_des.knowledge.state import KnowledgeState
 
 #: What a reasoner may take for one state by default, in s.
@@ -26,7 +28,12 @@ LOADING: Final = "loading the ontologies"
 _Result = TypeVar("_Result")
 #: How long the end of the process waits for reasoners to leave Java, in s.
 _LEAVE_JAVA_S: Final = 0.5
+#: Work may wait this many times its limit, where the machine is busy with other work.
+_PATIENCE: Final = 10
+#: So many times its limit the next work waits for what was abandoned.
+_AGAIN: Final = 3
 _abandoned: Final[list[str]] = []
+_stuck: Final[set[Future[Any]]] = set()
 
 
 def times_abandoned() -> int:
@@ -36,14 +43,25 @@ def times_abandoned() -> int:
     return len(_abandoned)
 
 
-class ReasonerTimeoutError(KnowledgeError):
+def is_stuck() -> bool:
+    """Return whether a reasoner of this process works on what was waited for in vain."""
+    return bool(_stuck)
+
+
+class ReasonerTimeoutError(KnowledgeError, PassingError):
     """A reasoner that takes too long, or still works on what took too long before."""
 
 
 class TimeLimit:
     """Runs work in a separate thread, and stops waiting for it after a time limit.
 
-    Java code cannot be stopped from outside: the thread continues until the process ends.
+    What counts is the CPU time of this process: on a busy machine, or while the process is stopped
+    (Ctrl-Z), the clock on the wall goes on, and Java does not. It is that of the whole process,
+    because Java collects garbage in a thread of its own, which takes two thirds of the time of a
+    rule that never ends; and as work may wait for that of another limit, which never ends.
+
+    Java code cannot be stopped from outside: the thread continues until the work is done, or the
+    process ends. The next work waits for that, for a while; then any is refused until it is done.
 
     Args:
         seconds: the limit of each piece of work.
@@ -58,7 +76,7 @@ class TimeLimit:
         self._option = option
         self._thread: _ReasonerThread | None = None
         self._process = 0
-        self._stuck: str | None = None
+        self._abandoned: _Abandoned | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
         """Do a piece of work and return its result; what it is doing is for the message: "reasoning
@@ -67,38 +85,86 @@ class TimeLimit:
         Raises:
             ReasonerTimeoutError: it took longer, or an earlier one still has not ended.
         """
-        if self._stuck is not None:
-            remedy = "restart the program with different rules"
-            raise ReasonerTimeoutError(f"the reasoner is still {self._stuck}", remedy=remedy)
         if (
             self._thread is None or self._process != os.getpid()
         ):  # a process that was forked has none of the threads
             self._thread, self._process = _ReasonerThread(), os.getpid()
             self._thread.start()
+            self._abandoned = None
+        self._wait_for_abandoned()
         future: Future[_Result] = Future()
         self._thread.jobs.put((future, work))
         try:
-            return future.result(self.seconds)
-        except BaseException as error:
-            if future.done():
-                raise
-            if not _abandoned:
-                atexit.register(
-                    _end_all
-                )  # comes before the end of Java, which was registered earlier
-            _abandoned.append(doing)
-            if not isinstance(
-                error, TimeoutError
-            ):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
-                raise
-            self._stuck = doing
-            raise self.exceeded(doing) from None
+            self._wait(future, doing, self.seconds)
+        except BaseException:
+            # After Ctrl-C, too: Java crashes if the process ends as usual meanwhile.
+            if not future.done():
+                self._abandoned = _Abandoned(future, doing)
+                _note_abandoned(doing)
+            raise
+        return future.result()
+
+    def _wait_for_abandoned(self) -> None:
+        """Wait for earlier work, if it was abandoned; but only once."""
+        earlier = self._abandoned
+        if earlier is None:
+            return
+        if not earlier.was_waited_for:
+            earlier.was_waited_for = True
+            with suppress(ReasonerTimeoutError):
+                self._wait(earlier.future, earlier.doing, _AGAIN * self.seconds)
+        if not earlier.future.done():
+            _stuck.add(earlier.future)
+            earlier.future.add_done_callback(_stuck.discard)
+            remedy = "try again in another process, or with different rules"
+            raise ReasonerTimeoutError(f"the reasoner is still {earlier.doing}", remedy=remedy)
+        self._abandoned = None
+
+    def _wait(self, future: Future[Any], doing: str, limit_s: float) -> None:
+        """Wait until work is done; a ReasonerTimeoutError after the limit.
+
+        Each wait counts as long as it was to be, however long the process was stopped in it.
+        """
+        began_s, used_s, waited_s = time.process_time(), 0.0, 0.0
+        while True:
+            wait_s = max(limit_s - used_s, 0.01 * limit_s)
+            if wait((future,), wait_s).done:
+                return
+            waited_s += wait_s
+            used_s = time.process_time() - began_s
+            if used_s >= limit_s:
+                raise self.exceeded(doing)
+            if waited_s >= _PATIENCE * limit_s:
+                raise self.was_starved(doing, waited_s)
 
     def exceeded(self, doing: str) -> ReasonerTimeoutError:
         """Make the error for work that took too long."""
         remedy = "look for a rule that matches too many combinations, or computes ever new values from its own"
         remedy += f", or allow more with {self._option}" if self._option else ""
-        return ReasonerTimeoutError(f"{doing}: not done after {self.seconds:g} s", remedy=remedy)
+        problem = f"{doing}: not done after {self.seconds:g} s of CPU time"
+        return ReasonerTimeoutError(problem, remedy=remedy)
+
+    def was_starved(self, doing: str, waited_s: float) -> ReasonerTimeoutError:
+        """Make the error for work to which the machine gave too little time."""
+        problem = f"{doing}: not done after {waited_s:g} s, most of which the machine was busy with other work"
+        remedy = "try again when it is less busy"
+        remedy += f", or allow more with {self._option}" if self._option else ""
+        return ReasonerTimeoutError(problem, remedy=remedy)
+
+
+@dataclass
+class _Abandoned:
+    """Work that took too long, and whether later work has waited for it."""
+
+    future: Future[Any]
+    doing: str
+    was_waited_for: bool = False
+
+
+def _note_abandoned(doing: str) -> None:
+    if not _abandoned:
+        atexit.register(_end_all)  # comes before the end of Java, which was registered earlier
+    _abandoned.append(doing)
 
 
 class _ReasonerThread(threading.Thread):

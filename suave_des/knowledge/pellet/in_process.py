@@ -441,9 +441,8 @@ def trace_contradiction(text: str) -> tuple[str, list[str]]:
 
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
     """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
-    reason, axioms = trace_contradiction(
-        ontology.content.n_triples() + "".join(map(n_triple, assertions))
-    )
+    text = ontology.content.n_triples() + "".join(map(n_triple, assertions))
+    reason, axioms = trace_contradiction(text)
     numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
     involved = [ontology.rules[number] for number in numbers]
     rules = sorted(
@@ -456,6 +455,8 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
         if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
         for fact in facts_of([triple], ontology.names)
     ]
+    if '"()"' not in text:
+        reason = reason.replace('"()"', '""')  # as Pellet shows no text
     problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), reason)
     if rules:
         problem += f", by the rule{'s' if len(rules) > 1 else ''} {', '.join(rules)}"
