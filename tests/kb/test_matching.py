@@ -4,7 +4,7 @@ import pytest
 
 from suave_des.kb import matching
 from suave_des.knowledge.rdf import RDF_TYPE, SWRLB, XSD, Lit
-from suave_des.knowledge.rules import DIFFERENT, Atom, Named, Rule, Variable
+from suave_des.knowledge.rules import DIFFERENT, Atom, Rule, Variable
 
 NS = "http://example.org/matching#"
 X, Y, Z, V, W = map(Variable, "xyzvw")

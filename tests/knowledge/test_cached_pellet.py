@@ -319,7 +319,7 @@ def test_two_values_between_the_same_numbers_are_told_apart_by_their_order(kb, t
 
 
 def test_what_is_inferred_in_one_order_of_two_values_is_not_returned_for_the_other():
-    kb, pellet, cached = loaded("relative order")
+    _, pellet, cached = loaded("relative order")
     below, above = measuring("0.8", "0.9"), measuring("0.9", "0.8")
     found = [cached.analyze(each).facts for each in (below, above)]
     assert found == [pellet.analyze(each).facts for each in (below, above)]
