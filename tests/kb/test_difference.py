@@ -133,6 +133,16 @@ def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_mis
     assert (found.metrics[2][2].value, found.metrics[2][3]) == (0.5, 2)
 
 
+def test_what_is_unknown_with_both_knowledge_bases_does_not_differ():
+    before = pandas.DataFrame(
+        {**{name: [1.0] * 4 for name in METRICS}, "mean_reaction_time_s": [nan, 2.0, nan, 2.0]},
+        index=[1, 2, 3, 4],
+    )
+    after = before.assign(mean_reaction_time_s=[nan, nan, 2.0, 2.0])
+    found = paired(before, after)
+    assert found.changed == (2, 3)
+
+
 @pytest.mark.parametrize("change", ["inconsistent", "none left", "other statuses"])
 def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_design_differ(
     small, change
@@ -162,6 +172,31 @@ def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_desig
     is_decided = change != "other statuses"
     assert (found.states, found.reported) == ((1, 0) if is_decided else (0, 1))
     assert list(found.cells["state"]) == [changed] * is_decided
+
+
+def test_a_state_counts_once_for_each_component_that_could_report_in_it(small):
+    """Any of six thrusters can fail or recover; a state in which two kinds differ stands for six of
+    each kind.
+    """
+    states = States.of(small.base, small.settings, 1, small.space)
+    changed = [
+        next(each for each in states if dict(each.components) == {"c_thruster_1": status})
+        for status in ("FALSE", "RECOVERED")
+    ]
+    unchanged = small.outcome(Situation(states.tasks[0]))
+
+    def other(situation):
+        if situation.state not in changed:
+            return unchanged
+        objective = f"o_{situation.state.objectives[0].function[2:]}"
+        facts = unchanged.reasoning.inference.facts | {Fact(objective, "o_updatable", True)}
+        inference = replace(unchanged.reasoning.inference, facts=facts, state=situation.state)
+        return Outcome(replace(unchanged.reasoning, inference=inference))
+
+    found = compare_decisions(states, lambda _: unchanged, other, ())
+    assert (found.states, found.reported) == (0, 12)
+    # 8 ranges, 13 reports, 4 search and 3 motion groundings, or 2 follow groundings in its place
+    assert found.compared == 8 * 13 * (3 * 4 + 3 * 2)
 
 
 def rules_file(tmp_path: Path, text: str) -> Path:

@@ -4,12 +4,13 @@ import itertools
 import textwrap
 from decimal import Decimal
 from functools import partial
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.kb.rule_tests import TestFile, run_test, shipped_tests
+from suave_des.kb.rule_tests import TestFile, mission_states, run_test, shipped_tests
 from suave_des.kb.space import Scale, is_in, measurements_in, parse_region
 from tests.helpers.owl_text import individual, iri
 
@@ -239,3 +240,14 @@ def test_ends_of_a_region_divide_the_kinds_of_values(knowledge):
     assert found == [
         f"water_visibility {each}" for each in ("3 < . < 3.25", "3.25", "3.25 < . < 3.5")
     ]
+
+
+def test_of_each_kind_of_state_of_a_mission_the_first_one_is_told_in_their_order(knowledge):
+    def record(t_s, visibility_m):
+        state = knowledge.state(measurements={"water_visibility": visibility_m})
+        return SimpleNamespace(t_s=t_s, state=state)
+
+    values = [(1.0, 2.0), (2.0, 2.1), (3.0, 3.0), (4.0, 2.2), (5.0, 2.25), (6.0, 2.6)]
+    mission = SimpleNamespace(records=[record(*each) for each in values])
+    times_s = [t_s for t_s, _ in mission_states(mission, knowledge.base)]
+    assert times_s == [1.0, 3.0, 5.0]  # below 2.25, between that and 3.25, and equal to it

@@ -279,6 +279,11 @@ def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge):
     assert [str(each) for each in mutants_of(Ontology.load())] == [str(each) for each in found]
 
 
+def test_a_sample_is_spread_over_all_mutants():
+    assert sample("abcdefghijk", 3) == ("a", "d", "h")
+    assert sample("abc", 3) == sample("abc", None) == ("a", "b", "c")
+
+
 @pytest.mark.parametrize(
     "operator", [each for each in adequacy.OPERATORS if each != "threshold moved"]
 )

@@ -13,9 +13,11 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.policy import Policy, function_table
+from suave_des.kb.policy import Policy, _spans, function_table
 from suave_des.kb.space import PolicySpace, Scale, Situation, States, component_reports, kind_of
 from suave_des.kb.states import ManagingSettings
+from tests.helpers.knowledge_states import FEWER_NUMBERS
+from tests.helpers.owl_text import SUAVE, TOMASYS, individual
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 
@@ -293,3 +295,67 @@ def test_all_states_of_the_extended_mission_are_decided_in_a_minute():
     )
     assert len(policy.cases) > 90_000
     assert counts[0][0] == 0 < counts[0][1] < len(policy.cases) / 10
+
+
+LEVEL = f'<owl:DatatypeProperty rdf:about="{SUAVE}level">{{}}</owl:DatatypeProperty>'
+HAS_VALUE = f'rdf:resource="{TOMASYS}hasValue"'
+
+
+@pytest.mark.parametrize(
+    "axioms",
+    [
+        LEVEL.format(f"<owl:equivalentProperty {HAS_VALUE}/>"),
+        LEVEL.format("") + f'<rdf:Description rdf:about="{TOMASYS}hasValue"><rdfs:subPropertyOf'
+        f' rdf:resource="{SUAVE}level"/></rdf:Description>',
+    ],
+    ids=["said of the other property", "said of hasValue"],
+)
+def test_a_measured_value_has_an_effect_by_a_property_that_means_the_same(
+    suave_copy, tmp_path, axioms
+):
+    file = rules_file(
+        tmp_path,
+        "own: level(?q, ?v) ^ lessThan(?v, 0.2) -> fd_realisability(fd_spiral_high, false)",
+    )
+    knowledge = KnowledgeBase.load(suave_copy(axioms), rules=file)
+    settings = ManagingSettings(measured=("battery_level",))
+
+    def chosen(battery_level):
+        state = knowledge.state(measurements={"battery_level": battery_level})
+        return knowledge.infer(state).changes[SEARCH]
+
+    assert (chosen(0.1), chosen(0.3)) == ("fd_spiral_medium", "fd_spiral_high")  # as Pellet infers
+    assert PolicySpace.of(knowledge.base, settings).attributes == ("battery_level",)
+
+
+def test_attributes_that_are_the_same_by_a_functional_property_do_not_count_apart(suave_copy):
+    """A value of two types makes the types one, as isQAtype is functional: so the battery level is
+    compared with what designs expect of visibility.
+    """
+    both = ("isQAtype", ":water_visibility"), ("isQAtype", ":battery_level")
+    added = individual("qa_both", "QAvalue", *both)
+    added += individual(
+        "qa_battery", "QAvalue", ("isQAtype", ":battery_level"), ("hasValue", "0.25")
+    )
+    added += individual("fd_spiral_high", "FunctionDesign", ("hasQAestimation", ":qa_battery"))
+    knowledge = KnowledgeBase.load(suave_copy(added), values=FEWER_NUMBERS)
+
+    def state(battery_level):
+        return knowledge.state(
+            groundings={SEARCH: "fd_spiral_high"},
+            measurements={"water_visibility": 10, "battery_level": battery_level},
+        )
+
+    one, other = state(3), state(4)
+    statuses = [set(knowledge.infer(each).inference.statuses) for each in (one, other)]
+    assert statuses[0] != statuses[1]  # as Pellet infers
+    space = PolicySpace.of(
+        knowledge.base, ManagingSettings(measured=("battery_level", "water_visibility"))
+    )
+    kind = kind_of(knowledge.base, space)
+    assert kind(one) != kind(other)
+
+
+def test_a_value_that_is_not_measured_is_no_part_of_a_range():
+    cells = {(0,): "stays", (1,): "stays", (2,): "stays", (3,): "none left"}
+    assert _spans(0, 4, [cells]) == [(0, 0), (1, 2), (3, 3)]

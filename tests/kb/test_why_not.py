@@ -14,7 +14,7 @@ from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
 from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
-from tests.helpers.owl_text import SUAVE, XSD
+from tests.helpers.owl_text import SUAVE, XSD, individual, rule
 
 SEARCH = "f_generate_search_path"
 HIGH = {"groundings": {SEARCH: "fd_spiral_high"}}
@@ -287,8 +287,6 @@ def test_a_rule_fires_and_is_explained_where_it_fires_in_owlready2(name, suave_c
 
 
 def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(knowledge, suave_copy):
-    from tests.helpers.owl_text import rule
-
     broken = rule(
         "broken",
         "QAvalue(?q) ^ hasValue(?q, ?v) ^ lessThn(?v, 3.0) -> fd_realisability(:fd_spiral_high, false)",
@@ -315,3 +313,52 @@ def test_the_command_takes_states_by_name_by_file_and_from_a_mission(command, tm
     status, _, said = command("why-not", "S1a", "--at", "water_visibilty=3.4")
     assert status == 2
     assert "did you mean 'water_visibility'" in said
+
+
+def rules_on_top(tmp_path, text, *ontologies):
+    (tmp_path / "own.swrl").write_text(text + "\n", encoding="utf-8")
+    return KnowledgeBase.load(list(ontologies), rules=tmp_path / "own.swrl")
+
+
+def test_of_two_rules_of_a_name_the_one_that_fires_is_told(tmp_path, suave_copy):
+    in_owl = [
+        rule("twice", f'c_status(?c, "{status}") -> fd_realisability(:fd_spiral_high, false)')
+        for status in ("A", "B", "C")
+    ]
+    knowledge = KnowledgeBase.load(suave_copy("".join(in_owl)))
+    for status in "ABC":
+        state = knowledge.state(components={"c_thruster_2": status})
+        found = RuleQuestions(knowledge.base).why_not("twice", state)
+        assert found.fires and "?c = c_thruster_2" in found.answer
+    found = RuleQuestions(knowledge.base).why_not("twice", knowledge.state())
+    assert str(found).startswith('twice: c_status(?c, "A") does not hold')
+
+
+NFR = individual("nfr", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.5")) + individual(
+    "o_generate_search_path", "Objective", ("hasNFR", ":nfr")
+)
+
+
+@pytest.mark.parametrize(
+    ("atom", "is_fixed"),
+    [
+        ("requiredBy(?c, fd_spiral_high)", True),  # which the ontology says, or not
+        ("hasNFR(o_generate_search_path, ?n)", False),  # states with the objective have it
+        ("fd_realisability(fd_spiral_low, false)", False),  # other rules conclude it
+        ("typeFD(?g, fd_spiral_low)", False),  # states with the grounding have it
+        ("hasValue(?q, ?v) ^ lessThan(?v, 0.1)", False),  # a comparison
+    ],
+)
+def test_what_neither_a_state_nor_a_rule_can_change_is_told_first(
+    tmp_path, suave_copy, atom, is_fixed
+):
+    knowledge = rules_on_top(
+        tmp_path,
+        f'r: c_status(?c, "ODD") ^ {atom} -> fd_realisability(fd_spiral_high, false)',
+        suave_copy(NFR),
+    )
+    state = KnowledgeState()
+    found = RuleQuestions(knowledge.base).why_not("r", state)
+    first = atom.split(" ^ ")[0] if is_fixed else 'c_status(?c, "ODD")'
+    assert str(found).startswith(f"r: {first} does not hold")
+    assert "(1 more atom fails)" in found.answer

@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import reasoner as module
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import Ontology, Terms
+from suave_des.knowledge.rdf import RDF
 from suave_des.knowledge.reasoner import Reasoner, Regions, cache_digest, regions_of
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, exact
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
-from tests.helpers.owl_text import individual
+from tests.helpers.owl_text import SWRL, TOMASYS, XSD, individual
 
 MORE_DESIGNS = "".join(
     individual(
@@ -299,3 +300,71 @@ def test_a_value_on_a_threshold_is_not_one_beside_it(order, tmp_path):
         assert ("Binding(obs_water_visibility)" in map(str, inference.facts)) == (
             value == "3.25"
         ), value
+
+
+def measuring(visibility: str, battery: str) -> KnowledgeState:
+    return KnowledgeState.of(
+        [], measurements={"water_visibility": visibility, "battery_level": battery}
+    )
+
+
+def test_two_values_between_the_same_numbers_are_told_apart_by_their_order(kb, tmp_path):
+    """Rules may compare them with one another; values that no rule can tell apart are one case."""
+    one, other, moved = (measuring(*each) for each in (("2", "1.5"), ("1.5", "2"), ("2", "0.4")))
+    regions, cached = regions_of(kb), Reasoner(kb, folder=tmp_path)
+    assert regions.key(one) != regions.key(other)
+    assert cached.distinguished((2.0, 1.5)) != cached.distinguished((1.5, 2.0))
+    assert regions.key(moved) == regions.key(measuring("1.3", "0.3"))
+    assert cached.distinguished((2.0, 0.4)) == cached.distinguished((1.3, 0.3))
+
+
+def test_what_is_inferred_in_one_order_of_two_values_is_not_returned_for_the_other():
+    _, pellet, cached = loaded("relative order")
+    below, above = measuring("0.8", "0.9"), measuring("0.9", "0.8")
+    found = [cached.analyze(each).facts for each in (below, above)]
+    assert found == [pellet.analyze(each).facts for each in (below, above)]
+    assert [{str(each) for each in facts} for facts in found] == [
+        {"Role(obs_battery_level)"},
+        set(),
+    ]
+
+
+def test_what_is_cached_of_some_terms_is_not_returned_where_others_are_asked(tmp_path):
+    (tmp_path / "two.swrl").write_text(
+        "one: isQAtype(?q, water_visibility) ^ hasValue(?q, 2.0) -> Role(?q)\n"
+        "two: isQAtype(?q, water_visibility) ^ hasValue(?q, 2.0) -> Binding(?q)\n"
+    )
+    kb, state = Ontology.load(rules=[tmp_path / "two.swrl"]), searching("fd_spiral_low", "2.0")
+    asked = [Terms((), (TOMASYS + name,)) for name in ("Role", "Binding")]
+    found = [Reasoner(kb, "cached", None, terms, tmp_path).analyze(state).facts for terms in asked]
+    assert [list(map(str, facts)) for facts in found] == [
+        ["Role(obs_water_visibility)"],
+        ["Binding(obs_water_visibility)"],
+    ]
+    every = Reasoner(kb, "cached", None, None, tmp_path).analyze(state).facts
+    assert every == Reasoner(kb, "pellet").analyze(state).facts == found[0] | found[1]
+
+
+EXPRESSION = f"""
+<rdf:Description rdf:about="urn:swrl:var#q"><rdf:type rdf:resource="{SWRL}Variable"/></rdf:Description>
+<swrl:Imp xmlns:swrl="{SWRL}" xmlns:rdf="{RDF}"><rdfs:label>deep</rdfs:label>
+<swrl:body><swrl:AtomList><rdf:rest rdf:resource="{RDF}nil"/><rdf:first><swrl:ClassAtom><swrl:classPredicate>
+<owl:Restriction><owl:onProperty rdf:resource="{TOMASYS}hasValue"/>
+<owl:hasValue rdf:datatype="{XSD}decimal">2.5</owl:hasValue></owl:Restriction></swrl:classPredicate>
+<swrl:argument1 rdf:resource="urn:swrl:var#q"/></swrl:ClassAtom></rdf:first></swrl:AtomList></swrl:body>
+<swrl:head><swrl:AtomList><rdf:rest rdf:resource="{RDF}nil"/><rdf:first><swrl:ClassAtom>
+<swrl:classPredicate rdf:resource="{TOMASYS}Role"/><swrl:argument1 rdf:resource="urn:swrl:var#q"/></swrl:ClassAtom>
+</rdf:first></swrl:AtomList></swrl:head></swrl:Imp>
+"""
+
+
+def test_a_rule_on_a_class_expression_needs_exact_values(suave_copy, tmp_path):
+    kb = Ontology.load([suave_copy(EXPRESSION)])
+    assert regions_of(kb).reasons == ("rule deep asks for a datatype or a class expression",)
+    cached, pellet = Reasoner(kb, folder=tmp_path), Reasoner(kb, "pellet")
+    for value in ("2.4", "2.5", "2.6"):
+        state = searching("fd_spiral_low", value)
+        assert cached.analyze(state) == pellet.analyze(state)
+        assert ("Role(obs_water_visibility)" in map(str, pellet.analyze(state).facts)) == (
+            value == "2.5"
+        )

@@ -283,3 +283,16 @@ def test_a_status_outside_its_range_is_an_error(rule, column, consequence, tmp_p
     assert error.column == column
     assert error.message.endswith(consequence)
     assert error.remedy == "did you mean IN_ERROR_NFR?"
+
+
+def test_a_rule_that_another_file_switches_off_is_reported(tmp_path):
+    same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
+    text = f'disabled {same} -> o_status(?o, "IN_ERROR_COMPONENT")'
+    finding = only(found(tmp_path, text), "replaces the rule of this name in")
+    assert (finding.level, finding.rule) == (Level.WARN, "S1a")
+
+
+def test_a_component_status_that_is_no_text_is_not_taken_for_a_misspelt_one(tmp_path):
+    rules = "A: c_status(?c, ?s) ^ equal(?s, false) -> Role(?c)"
+    findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
+    assert not [one for one in findings if "reports c_status" in one.message]

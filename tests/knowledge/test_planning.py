@@ -259,3 +259,26 @@ def test_what_monitors_report_beyond_the_model_has_no_effect(pellet):
         [ObjectiveState(SEARCH)], components={"c_sonar": "FALSE"}, measurements={"salinity": 35.0}
     )
     assert pellet.analyze(state).facts == frozenset()
+
+
+def test_of_several_values_the_best_performance_counts_and_the_least_of_what_is_expected(
+    suave_copy,
+):
+    """As the exemplar's loop takes the highest performance among the estimations of a design."""
+    path = suave_copy(
+        individual("qa_p", "QAvalue", ("isQAtype", ":mros:performance"), ("hasValue", "0.9"))
+        + individual("qa_v", "QAvalue", ("isQAtype", ":water_visibility"), ("hasValue", "4.5"))
+        + individual("qa_none", "QAvalue", ("isQAtype", ":water_visibility"))
+        + individual(
+            "fd_spiral_low",
+            "FunctionDesign",
+            *(("hasQAestimation", f":{name}") for name in ("qa_p", "qa_v", "qa_none")),
+        )
+    )
+    base = Ontology.load([path])
+    assert base.expected("fd_spiral_low")["water_visibility"] == Decimal("1.25")
+    decision = decide(Reasoner(base, "pellet"), searching(None, 9, status="UNGROUNDED"))[SEARCH]
+    assert decision.design == "fd_spiral_high"  # 1.0, and 0.9 for the low one
+    without = Ontology.load([path], values={"qa_performance_high": Decimal("0.8")})
+    state = searching(None, 9, status="UNGROUNDED")
+    assert decide(Reasoner(without, "pellet"), state)[SEARCH].design == "fd_spiral_low"

@@ -25,6 +25,7 @@ from suave_des.knowledge.rules import (
 )
 from suave_des.knowledge.rules.files import fatal_problems, looked_up
 from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
+from suave_des.knowledge.state import KnowledgeState
 from tests.helpers.owl_text import rule as rule_in_owl
 
 RULE = "LowBattery: QAvalue(?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)\n"
@@ -381,3 +382,14 @@ def test_what_java_throws_is_an_error_for_the_user(suave_copy):
         KnowledgeError, match=r"Pellet cannot use the ontologies: .*literal as an individual"
     ):
         Reasoner(Ontology.load([suave_copy(odd)]), "pellet")
+
+
+def test_a_rule_that_asks_for_what_is_the_same_binds_both(suave_copy, tmp_path):
+    same = (
+        '<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_thruster_1">'
+        '<owl:sameAs rdf:resource="http://www.metacontrol.org/suave#c_thruster_2"/></rdf:Description>'
+    )
+    (tmp_path / "mine.swrl").write_text("A: sameAs(?x, ?y) -> hasNFR(?x, ?y)\n", encoding="utf-8")
+    base = Ontology.load([suave_copy(same)], rules=[tmp_path / "mine.swrl"])
+    found = set(map(str, Reasoner(base, "pellet").analyze(KnowledgeState()).facts))
+    assert "hasNFR(c_thruster_1, c_thruster_2)" in found

@@ -2,6 +2,7 @@
 not hold.
 """
 
+import re
 from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import OWL, RDF, RDFS, SWRL, SWRLA
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
@@ -244,3 +246,36 @@ def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy):
     assert "hinders(c_thruster_2, o_generate_search_path)" in found
     assert "Broken(c_thruster_2)" in found
     assert Reasoner(base, "owlready2").analyze(state).facts ^ inference.facts == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("mark", "fires"),
+    [("true", True), ("1", True), ("false", False), ("0", False), (" False\n", False)],
+)
+def test_a_rule_runs_unless_its_mark_says_false_in_any_form(suave_copy, mark, fires):
+    old = '#boolean">true</swrla:isRuleEnabled>'
+    path = suave_copy(replace={old: f'#boolean">{mark}</swrla:isRuleEnabled>'})
+    inference = with_files(path).analyze(searching("fd_spiral_high", 1.0))
+    assert inference.grounding_status(SEARCH) == ("IN_ERROR_NFR" if fires else None)
+
+
+def test_a_rule_without_a_mark_runs(suave_copy):
+    text = rule("own", 'FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_FR")')
+    path = suave_copy(re.sub("<swrla:isRuleEnabled.*?</swrla:isRuleEnabled>", "", text))
+    inference = with_files(path).analyze(searching("fd_spiral_low"))
+    assert inference.grounding_status(SEARCH) == "IN_ERROR_FR"
+
+
+def test_rules_of_a_given_mros_ontology_take_the_place_of_the_shipped_copy(shipped, tmp_path):
+    own = rule("mros_S4", "Component(?c) -> Role(?c)")
+    path = tmp_path / "mros.owl"
+    path.write_text(
+        f'<rdf:RDF xmlns:rdf="{RDF}" xmlns:rdfs="{RDFS}" xmlns:owl="{OWL}" xmlns:swrl="{SWRL}" '
+        f'xmlns:swrla="{SWRLA}"><owl:Ontology rdf:about="http://ros/mros"/>{own}</rdf:RDF>',
+        encoding="utf-8",
+    )
+    base = Ontology.load([shipped / "suave.owl", path])
+    texts = [rule.text for rule in base.rules if rule.name == "mros_S4"]
+    assert texts == ["Component(?c) -> Role(?c)"]
+    others = {rule.name for rule in Ontology.load().rules}
+    assert {rule.name for rule in base.rules} == others
