@@ -57,7 +57,7 @@ def chromium() -> Iterator[Any]:
     with ExitStack() as stack:
         try:
             started = stack.enter_context(playwright.sync_playwright())
-        except playwright.Error as error:  # its driver is a program, which needs shared libraries
+        except Exception as error:  # its driver is a program, which needs shared libraries
             missing(f"playwright's driver does not start ({error}): it needs libatomic1")
         system = next(filter(None, map(shutil.which, _NAMES)), None)
         if system is None and not Path(started.chromium.executable_path).exists():
