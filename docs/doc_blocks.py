@@ -6,7 +6,8 @@ What a block is follows from its language and the words after it, which readers 
 - `console`: commands after `$ `, each followed by what it prints. `head=N` and `tail=N` keep the
   first and last lines of each output; `status=2` says how the last command ends; `test="--runs 4"`
   gives an option another value in quick tests; `picture=NAME` says that the block draws
-  docs/images/NAME. `console setup` is not run. Commands of `console background` go on while the
+  docs/images/NAME; `needs=curl` says which program README does not ask for. `console setup` is not
+  run. Commands of `console background` go on while the
   rest of the page runs, at a free port in place of 8786; they show nothing.
 - `python`: a script; the `text` block after it is what it prints.
 - A block that is `long` is left out by quick tests and run by refresh_outputs.py; what it shows has
@@ -31,7 +32,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,8 +97,16 @@ def blocks_of(page: Path) -> Iterator[Block]:
         number = end + 1
 
 
-def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, str]]:
+def run_page(
+    page: Path, folder: Path, *, quick: bool, absent: Collection[str] = ()
+) -> Iterator[tuple[Block, str]]:
     """Run the blocks of a page in an empty folder, and give each with what it shows.
+
+    Args:
+        page: the file.
+        folder: where to run them.
+        quick: whether to run short forms, and to leave out what is `long`.
+        absent: programs that this machine lacks: blocks that need one are left as they stand.
 
     Raises:
         RuntimeError: a command ended with another status than the page says, or a block cannot be
@@ -111,7 +120,7 @@ def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, 
     with _inside(folder), contextlib.ExitStack() as background:
         for block in blocks_of(page):
             shown = block.text
-            if quick and "long" in block.marks:
+            if (quick and "long" in block.marks) or block.marks.get("needs") in absent:
                 yield block, shown
                 continue
             if "title" in block.marks:

@@ -5,8 +5,15 @@ notice. Importing the package starts nothing: no Java, no pandas, no matplotlib 
 needed.
 """
 
+import os as _os
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
+
+if _os.name == "nt":
+    raise ImportError(
+        "suave-des runs on Linux and macOS: on Windows use it in WSL, or in the container of its "
+        "Containerfile"
+    )
 
 if _TYPE_CHECKING:
     from suave_des.api import RecordedMission, resume_campaign, run_campaign, run_mission

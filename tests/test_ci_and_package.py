@@ -3,28 +3,71 @@ silence.
 """
 
 import re
+import sys
+import tomllib
+from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import pytest
 import yaml
 from hatchling.builders.wheel import WheelBuilder
 
 from tests.helpers.browser import chromium
+from tests.helpers.needed import PROGRAMS, need
 
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize(
+def playwright(driver_starts: bool, browser: Path) -> ModuleType:
+    """A stand-in for playwright on a machine without a browser or without a library."""
+    module = ModuleType("playwright.sync_api")
+
+    @contextmanager
+    def sync_playwright():
+        if not driver_starts:
+            raise Exception("Connection closed while reading from the driver")
+        yield SimpleNamespace(chromium=SimpleNamespace(executable_path=str(browser)))
+
+    module.sync_playwright = sync_playwright
+    return module
+
+
+in_ci_and_elsewhere = pytest.mark.parametrize(
     ("ci", "outcome"), [("true", pytest.fail.Exception), (None, pytest.skip.Exception)]
 )
+
+
+@pytest.fixture
+def environment(monkeypatch, ci):
+    monkeypatch.setenv("CI", ci) if ci else monkeypatch.delenv("CI", raising=False)
+
+
+@in_ci_and_elsewhere
+@pytest.mark.parametrize(
+    ("driver_starts", "told"),
+    [(True, "no Chromium"), (False, "Connection closed while reading from the driver")],
+)
 def test_without_a_browser_tests_of_pages_fail_in_ci_and_are_skipped_elsewhere(
-    monkeypatch, tmp_path, ci, outcome
+    monkeypatch, tmp_path, environment, outcome, driver_starts, told
 ):
     monkeypatch.setattr("shutil.which", lambda name: None)
-    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
-    monkeypatch.setenv("CI", ci) if ci else monkeypatch.delenv("CI", raising=False)
-    with pytest.raises(outcome, match="no Chromium"), chromium():
+    stand_in = playwright(driver_starts, tmp_path / "gone")
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", stand_in)
+    with pytest.raises(outcome, match=told), chromium():
         pass
+
+
+@in_ci_and_elsewhere
+@pytest.mark.parametrize(
+    "command", [("no-such-program", "--version"), (sys.executable, "-c", "import no_such_module")]
+)
+def test_without_a_program_its_tests_fail_in_ci_and_are_skipped_elsewhere(
+    monkeypatch, environment, outcome, command
+):
+    monkeypatch.setitem(PROGRAMS, "that one", command)
+    with pytest.raises(outcome, match="there is no that one"):
+        need("that one")
 
 
 def test_ci_says_that_it_is_and_runs_the_slow_tests():
@@ -37,6 +80,21 @@ def test_versions_are_tried_on_rooms_that_exist():
     rooms = re.findall(r"tests/\w+", (ROOT / ".ci" / "versions").read_text(encoding="utf-8"))
     assert len(rooms) >= 5
     assert all((ROOT / room).is_dir() for room in rooms)
+
+
+def test_readme_classifiers_and_ci_name_the_same_pythons():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = [
+        int(each.rpartition(".")[2])
+        for each in project["classifiers"]
+        if each.startswith("Programming Language :: Python :: 3.")
+    ]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    lowest, highest = re.search(r"Python 3\.(\d+) to 3\.(\d+)", readme).groups()
+    assert declared == list(range(int(lowest), int(highest) + 1))
+    versions = (ROOT / ".ci" / "versions").read_text(encoding="utf-8")
+    tried = re.search(r"^for python in (.*); do$", versions, flags=re.MULTILINE)[1].split()
+    assert tried == [f"python3.{minor}" for minor in declared]
 
 
 def test_hooks_before_a_commit_are_what_ci_checks():

@@ -136,3 +136,10 @@ def test_no_modules_import_each_other_in_a_circle():
     assert not [
         circle for circle in shown if not any(set(circle) <= known for known in KNOWN_CIRCLES)
     ]
+
+
+def test_on_windows_it_says_where_it_runs():
+    done = python("-c", "import os; os.name = 'nt'; import suave_des")
+    assert done.returncode == 1
+    told = done.stderr.splitlines()[-1]
+    assert told.startswith("ImportError: suave-des runs on Linux and macOS") and "WSL" in told

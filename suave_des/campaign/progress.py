@@ -12,9 +12,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from itertools import chain, repeat
+from pathlib import Path
+
+from suave_des.caches import private_cache
 
 _UPDATE_PERIOD_S = 0.25
 _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
+_FIRST_RUN = "the first run compiles the mission code: 20 to 60 s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,7 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
         time.monotonic(),
         list[tuple[float, Progress]](),
     )
+    why = "" if _is_compiled() else f" ({_FIRST_RUN})"
     waits_s: Iterable[float] = (
         repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
     )
@@ -60,7 +65,8 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
         told[1:] = [(time.monotonic(), progress)]  # beside the first one
 
     def draw(*, end: str = "") -> None:
-        text = f"{label}: {_text(told, time.monotonic() - began_s)}"
+        age_s = time.monotonic() - began_s
+        text = f"{label}: {_text(told) if told else f'starting, {_time(age_s)}{why}'}"
         width = shutil.get_terminal_size().columns - 1
         line = f"\r{text[:width]:<{width}}{end}" if live else f"suave-des: {text}\n"
         with suppress(OSError):  # nobody reads it any more
@@ -86,15 +92,19 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
             draw()
 
 
-def _text(told: Sequence[tuple[float, Progress]], age_s: float) -> str:
+def _is_compiled() -> bool:
+    """Whether machine code of an earlier run is kept."""
+    folder = os.environ.get("NUMBA_CACHE_DIR") or private_cache("numba")
+    return folder is not None and any(Path(folder).rglob("*.nbc"))
+
+
+def _text(told: Sequence[tuple[float, Progress]]) -> str:
     """Return missions that are done and failed, their rate, and the time left, from the first and
     the last progress.
 
     Missions that were done at first are not counted in the rate: those of a campaign that is
     resumed.
     """
-    if not told:
-        return f"starting, {_time(age_s)} (the first run compiles the mission code: 20 to 60 s)"
     (first_s, first), (last_s, progress) = told[0], told[-1]
     parts = [f"{progress.done} of {progress.total} missions"]
     if progress.failed:

@@ -187,8 +187,7 @@ def _set(loaded: LoadedScenario, values: Mapping[str, Any], option: str) -> Load
         try:
             loaded = with_values(loaded, {path: value})
         except InputError as error:
-            _, _, key_path = (error.place or "").partition(", ")
-            problem = f"{key_path}: {error.problem}" if key_path else error.problem
+            problem = f"{error.place}: {error.problem}" if error.place else error.problem
             raise InputError(problem, place=option, remedy=error.remedy) from None
     return loaded
 
@@ -214,11 +213,16 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
         holder, key = holder_of(data, path)
         holder[key] = value
     layer = Layer(data, {(): Location(0, 1, loaded.path)})
-    scenario = validated(layer, Scenario)
-    if _named_files(scenario) != _named_files(loaded.scenario):
-        remedy = "write a scenario for each, with `base` and the files that differ"
-        raise InputError("files were read with the scenario and stay as they are", remedy=remedy)
-    loaded.modes.check(scenario, layer)
+    try:
+        scenario = validated(layer, Scenario)
+        if _named_files(scenario) != _named_files(loaded.scenario):
+            remedy = "write a scenario for each, with `base` and the files that differ"
+            problem = "files were read with the scenario and stay as they are"
+            raise InputError(problem, remedy=remedy)
+        loaded.modes.check(scenario, layer)
+    except InputError as error:  # the value is not in the scenario's file, nor in a line of it
+        key_path = (error.place or "").removeprefix("line 1").removeprefix(", ")
+        raise InputError(error.problem, place=key_path or None, remedy=error.remedy) from None
     return replace(loaded, scenario=scenario)
 
 

@@ -264,6 +264,28 @@ def test_in_a_notebook_too(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> N
     assert shown_on(screen).startswith("\rseams2023: 40 of 80 missions, 1 failed")
 
 
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [([], r"starting, [\d:]+ \(the first run compiles .*\)"), (["a/b.nbc"], r"starting, [\d:]+")],
+)
+def test_that_the_first_run_compiles_is_said_where_no_machine_code_is_kept(
+    kept: list[str],
+    told: str,
+    screen: Screen,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in kept:
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("COLUMNS", "120")
+    screen.is_terminal = True
+    with redirect_stderr(screen), display.shown("seams2023"):
+        pass
+    assert re.fullmatch(rf"\rseams2023: {told} *\n", screen.getvalue())
+
+
 class TestLines:
     @pytest.mark.parametrize("is_dumb", [False, True])
     def test_a_long_one_has_some_and_a_last_one(

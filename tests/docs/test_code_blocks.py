@@ -16,6 +16,7 @@ from mkdocs_hooks import notebook_markdown
 from refresh_notebooks import NOTEBOOKS, executed, shown
 
 from tests.helpers.command import python
+from tests.helpers.needed import is_there, missing
 
 REFRESH = "if the new output is right, run python docs/refresh_outputs.py, of a notebook docs/refresh_notebooks.py"
 RUN_ALL = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/suave-des reproduce"
@@ -27,19 +28,30 @@ def name(page):
     return str(page.relative_to(ROOT))
 
 
-def outdated(page, folder, *, quick):
-    return [
+def blocks_show_what_they_print(page, folder, *, quick):
+    needed = {block.marks["needs"] for block in blocks_of(page) if "needs" in block.marks}
+    absent = sorted(program for program in needed if not is_there(program))
+    wrong = [
         f"{block.place}\n"
         + "".join(unified_diff(block.text.splitlines(True), real.splitlines(True), "page", "real"))
-        for block, real in run_page(page, folder, quick=quick)
+        for block, real in run_page(page, folder, quick=quick, absent=absent)
         if differs(block, real, quick=quick)
     ]
+    assert not wrong, "\n".join([*wrong, REFRESH])
+    if absent:
+        missing(f"there is no {' and no '.join(absent)}: only the other blocks were run")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_blocks_show_what_they_print(page, tmp_path):
-    wrong = outdated(page, tmp_path, quick=True)
-    assert not wrong, "\n".join([*wrong, REFRESH])
+    blocks_show_what_they_print(page, tmp_path, quick=True)
+
+
+def test_a_block_whose_program_is_absent_is_left_and_the_others_are_run(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```console needs=curl\n$ curl\nwas\n```\n```console\n$ echo is\nwas\n```\n")
+    done = run_page(page, tmp_path, quick=True, absent=["curl"])
+    assert [shown for _, shown in done] == ["$ curl\nwas\n", "$ echo is\nis\n"]
 
 
 @pytest.mark.slow
@@ -53,8 +65,7 @@ def test_blocks_show_what_they_print(page, tmp_path):
     ids=name,
 )
 def test_blocks_that_are_shortened_elsewhere_show_what_they_print(page, tmp_path):
-    wrong = outdated(page, tmp_path, quick=False)
-    assert not wrong, "\n".join([*wrong, REFRESH])
+    blocks_show_what_they_print(page, tmp_path, quick=False)
 
 
 def test_blocks_of_other_pages_are_of_kinds_that_need_no_run():

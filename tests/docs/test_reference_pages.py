@@ -1,6 +1,4 @@
-"""What reference pages and README say of files, names and links is so, and the site is built of
-them.
-"""
+"""What reference pages and README say of files, names and links is so."""
 
 import re
 import tomllib
@@ -17,7 +15,6 @@ from suave_des.records.metrics import COLUMNS, METRICS
 from suave_des.records.mission_folder import EVENT_COLUMNS, TRAJECTORY_COLUMNS
 from suave_des.records.runs import suave_pieces
 from suave_des.scenario.models import FURTHER_METRICS
-from tests.helpers.command import python
 
 PAGES = [
     ROOT / "README.md",
@@ -211,39 +208,3 @@ def test_dependencies_are_explained():
     ]
     names = {re.match(r"[\w-]+", requirement)[0] for requirement in required} - {"suave-des"}
     assert set(re.findall(r"^- (\w[\w-]*) \(", page, flags=re.MULTILINE)) == names
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("site")
-    words = ("-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder)
-    done = python(*words, cwd=ROOT, NO_MKDOCS_2_WARNING="1")
-    assert done.returncode == 0, done.stderr
-    return folder
-
-
-def test_every_page_is_there(site):
-    for page in (ROOT / "docs").rglob("*.md"):
-        assert (site / page.relative_to(ROOT / "docs").with_suffix("") / "index.html").is_file()
-    assert "Write a rule" in (site / "index.html").read_text(encoding="utf-8")
-
-
-def test_nothing_is_loaded_from_elsewhere(site):
-    for page in site.rglob("*.html"):
-        text = page.read_text(encoding="utf-8")
-        loaded = re.findall(r'<(?:script|img|iframe|link)\b[^>]*?(?:src|href)="?([^" >]+)', text)
-        assert not [
-            address for address in loaded if "://" in address or address.startswith("//")
-        ], page
-
-
-def test_the_public_api_is_documented(site):
-    for page, name in (
-        ("missions", "suave_des.run_campaign"),
-        ("managers", "suave_des.managing.base.ManagingSubsystem.adapt"),
-        ("interfaces", "suave_des.Mission.advance"),
-        ("interfaces", "suave_des.PipelineInspection.step"),
-        ("knowledge", "suave_des.kb.knowledge_base.KnowledgeBase.infer"),
-    ):
-        text = (site / "reference" / "api" / page / "index.html").read_text(encoding="utf-8")
-        assert f'id="{name}"' in text

@@ -4,17 +4,16 @@ installed.
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import pytest
+from tests.helpers.needed import missing
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 DESKTOP, PHONE = (1280, 800), (390, 844)
@@ -50,25 +49,24 @@ class Opened:
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """Start the browser; where there is none, skip the test, or fail it where the environment says
-    CI=true.
-    """
-    missing = pytest.fail if os.environ.get("CI") == "true" else pytest.skip
+    """Start the browser; where it cannot be, skip the test, or fail it in CI."""
     try:
         playwright = import_module("playwright.sync_api")
     except ImportError:
         missing("playwright is not installed")
-    system = next(filter(None, map(shutil.which, _NAMES)), None)
-    with playwright.sync_playwright() as started:
+    with ExitStack() as stack:
+        try:
+            started = stack.enter_context(playwright.sync_playwright())
+        except Exception as error:  # its driver is a program, which needs shared libraries
+            missing(f"playwright's driver does not start ({error}): it needs libatomic1")
+        system = next(filter(None, map(shutil.which, _NAMES)), None)
         if system is None and not Path(started.chromium.executable_path).exists():
             missing("no Chromium: install the system's, or run `playwright install chromium`")
         browser = started.chromium.launch(
             executable_path=system, args=["--no-sandbox", "--disable-dev-shm-usage"]
         )
-        try:
-            yield browser
-        finally:
-            browser.close()
+        stack.callback(browser.close)
+        yield browser
 
 
 @contextmanager

@@ -6,7 +6,6 @@ import contextlib
 import io
 import os
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +18,7 @@ import pytest
 
 import suave_des
 from suave_des.cli.main import main
+from tests.helpers.needed import need
 
 _PACKAGE_PARENT = str(Path(suave_des.__file__).resolve().parents[1])
 
@@ -33,12 +33,11 @@ def example_program(language: str) -> str:
     """
     folder = Path(__file__).resolve().parents[2] / "docs" / "examples" / "exec"
     needed, command = {
-        "perl": ("perl", f"perl {shlex.quote(str(folder / 'manager.pl'))}"),
+        "perl": ("perl with JSON::PP", f"perl {shlex.quote(str(folder / 'manager.pl'))}"),
         "node": ("node", f"node {shlex.quote(str(folder / 'manager.js'))}"),
         "c": ("gcc", "./manager"),
     }[language]
-    if shutil.which(needed) is None:
-        pytest.skip(f"there is no {needed}")
+    need(needed)
     if language == "c":
         subprocess.run(["gcc", "-O2", "-o", "manager", folder / "manager.c"], check=True)
     return command

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario.models import Calibration, Normal, TableSignal, ThrusterEvent
@@ -285,3 +286,21 @@ def test_kb_check_warns(tmp_path):
     done = command_here("kb", "check", "--set", "thruster_events=['(1,failure,10)']", cwd=tmp_path)
     assert done.returncode == 0
     assert f"WARN   shipped/scenarios/seams2023.yaml: {EARLY}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        (
+            "signals.water_visibility.period_s",
+            "x",
+            "signals.water_visibility.period_s: 'x' should be a number",
+        ),
+        ("default_modes", {"f_dock": "fd_dock"}, "default_modes.f_dock: there is no function"),
+    ],
+)
+def test_a_value_given_in_python_is_not_blamed_on_the_scenario_s_file(path, value, told):
+    with pytest.raises(InputError) as wrong:
+        with_values(load_scenario("seams2023"), {path: value})
+    assert wrong.value.file is None
+    assert str(wrong.value).startswith(told)
