@@ -19,7 +19,6 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-import suave_des
 from suave_des.caches import keep_latest, private_cache
 from suave_des.imports import hidden
 
@@ -123,7 +122,6 @@ class _CodeCache(caching._Cache):
 
 
 _SETTING = (
-    suave_des.__version__,
     platform.python_version(),
     *(version(name) for name in ("numba", "llvmlite", "numpy")),
     sorted(

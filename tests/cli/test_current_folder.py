@@ -83,7 +83,9 @@ def test_a_manager_that_is_named_is_found_with_what_it_imports_and_libraries_are
         "    def mission_started(self):\n        import late\n\n        open('ran-hook', 'w')\n"
     )
     (folder / "helping").mkdir()
-    (folder / "helping" / "__init__.py").write_text(f"import beside_helping\n{MINE}Helping = Mine\n")
+    (folder / "helping" / "__init__.py").write_text(
+        f"import beside_helping\n{MINE}Helping = Mine\n"
+    )
     for name in ("extra", "late", "beside_helping"):
         (folder / f"{name}.py").write_text("")
     command = ["campaign", "seams2023", "--managers", "none,mine:Mine", "--runs", "2", "--quiet"]
