@@ -71,6 +71,13 @@ def _private(folder: Path) -> Path:
     return folder
 
 
+def keep_latest(folder: Path, pattern: str, most: int) -> None:
+    """Remove the least recently used files of a pattern in a folder, so that `most` stay."""
+    files = sorted(folder.glob(pattern), key=lambda path: path.stat().st_mtime)
+    for path in files[:-most]:
+        path.unlink(missing_ok=True)
+
+
 class SharedEntries:
     """Values by key, in a file that several processes extend without locks.
 
@@ -119,11 +126,7 @@ class SharedEntries:
             finally:
                 os.close(handle)
             if size == 0:
-                files = sorted(
-                    self._path.parent.glob("*.jsonl"), key=lambda path: path.stat().st_mtime
-                )
-                for path in files[:-MAX_FILES]:
-                    path.unlink(missing_ok=True)
+                keep_latest(self._path.parent, "*.jsonl", MAX_FILES)
 
     def _checksum(self, text: bytes) -> bytes:
         return hashlib.sha256(self._salt + text).hexdigest()[:24].encode()

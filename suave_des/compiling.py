@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import pickle
-from collections.abc import Callable
+import platform
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from enum import Enum
+from hashlib import sha256
+from importlib.metadata import version
+from inspect import CO_VARARGS, CO_VARKEYWORDS, isfunction, ismodule
 from pathlib import Path
+from types import CodeType
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
-from numba.core import caching
 from numpy.typing import NDArray
 
-from suave_des.caches import private_cache
+from suave_des.caches import keep_latest, private_cache
 from suave_des.imports import hidden
+
+with warnings.catch_warnings(), hidden("yaml", even_if_loaded=True):
+    # numba would take settings from a file in the current folder, such as modules to import.
+    warnings.simplefilter("ignore")
+    import numba
+    from numba.core import caching, compiler, serialize
+numba.core.config._config_fname = os.devnull
 
 # What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg,
 # which takes 0.2 s and is used by no inner loop. There is one, as scipy is installed; what uses it
@@ -28,7 +39,11 @@ arraymath._HAVE_BLAS = True
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_DIGEST_BYTES = hashlib.sha256().digest_size
+_FOLDER = "NUMBA_CACHE_DIR"
+_LIBRARIES = ("builtins", "math", "numba", "numpy")
+"""What is in them is known by its name, as their versions are."""
+_DIGEST_BYTES = sha256().digest_size
+_MOST_FILES = 256
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
@@ -37,73 +52,138 @@ def compiled(function: _F) -> _F:
     nan, as in numpy).
     """
     dispatcher: Any = numba.njit(error_model="numpy")(function)
-    with suppress(
-        RuntimeError
-    ):  # no folder to keep machine code in: it is compiled in each process
-        dispatcher._cache = _CodeCache(function)
+    dispatcher._cache = _CodeCache(dispatcher)
     return cast(_F, dispatcher)
 
 
-# The cache, by private interfaces of numba: its own stops a process at a damaged file or a full
-# disk, runs damaged machine code, and is beside the sources, which others may own.
+class _CodeCache(caching._Cache):
+    """Keeps machine code in the user's cache folder, by private interfaces of numba.
 
-
-class _CodeCache(caching.FunctionCache):
-    """Keeps machine code in the user's cache folder; what is damaged there, or cannot be kept, is
-    compiled again.
+    numba's own cache stops a process at a damaged file or a full disk, runs damaged machine code,
+    and takes a file whose index says so for the code of another version of the function. Here each
+    file has a checksum that covers all that its code was made from; what is damaged, of something
+    else, or cannot be kept is compiled again.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        if not os.environ.get("NUMBA_CACHE_DIR"):
-            folder = private_cache("numba")
-            if folder is None:
-                raise RuntimeError("there is no cache folder")
-            config: Any = numba.config
-            config.CACHE_DIR = str(folder)
-        super().__init__(function)
-        plain = self._cache_file
-        self._cache_file = _CheckedFile(
-            self._cache_path, self._impl.filename_base, plain._source_stamp
-        )
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher = dispatcher
+
+    @property
+    def cache_path(self) -> str:
+        """The folder; empty if there is none."""
+        return os.environ.get(_FOLDER) or str(private_cache("numba") or "")
+
+    def enable(self) -> None:
+        """Do nothing: it always is."""
+
+    disable = flush = enable
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Load the machine code for a signature; None if there is none, or none that can be
-        used.
-        """
-        try:
-            return super().load_overload(signature, target_context)
-        except Exception:  # whatever a file that another version of numba has written leads to
-            return None
+        """Load the machine code for a signature; None if there is none that can be used."""
+        with suppress(Exception):  # there is no end to what a file leads to
+            target_context.refresh()
+            path, made_from = self._place(signature, target_context.codegen())
+            content = path.read_bytes()
+            digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+            if sha256(made_from + content).digest() == digest:
+                path.touch()
+                parts = pickle.loads(content)
+                return compiler.CompileResult._rebuild(target_context, *parts)
+        return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
         """Keep the machine code for a signature, if possible."""
         with suppress(Exception):  # such as a full disk
-            super().save_overload(signature, data)
+            if data.lifted or data.library.has_dynamic_globals:  # it has addresses in it
+                return
+            path, made_from = self._place(signature, data.codegen)
+            content = serialize.dumps(data._reduce())
+            part = path.with_suffix(f".{os.getpid()}.part")
+            try:
+                part.write_bytes(sha256(made_from + content).digest() + content)
+                part.replace(path)
+            finally:
+                part.unlink(missing_ok=True)
+            keep_latest(path.parent, f"*{path.suffix}", _MOST_FILES)
+
+    def _place(self, signature: Any, codegen: Any) -> tuple[Path, bytes]:
+        """Return the file of the machine code for a signature, and what that is made from.
+
+        Raises:
+            ValueError: it cannot be told what it is made from, or there is no cache folder.
+        """
+        if not (folder := self.cache_path):
+            raise ValueError("no cache folder")
+        function = self._dispatcher.py_func
+        made_from = repr((*_SETTING, signature, codegen.magic_tuple())).encode()
+        made_from += "\n".join(_ingredients(self._dispatcher, (), [])).encode()
+        name = f"{function.__name__}-{sha256(made_from).hexdigest()[:40]}.nbc"
+        return Path(folder) / name, made_from
 
 
-class _CheckedFile(caching.IndexDataCacheFile):
-    """Index and data files of numba's cache, each with a checksum."""
+_SETTING = (
+    platform.python_version(),
+    *(version(name) for name in ("numba", "llvmlite", "numpy")),
+    sorted(
+        (name, value)
+        for name, value in os.environ.items()
+        if name.startswith("NUMBA_") and name != _FOLDER
+    ),
+)
 
-    def _load_index(self) -> dict[Any, Any]:
-        version, stamp, overloads = self._read(self._index_path) or ("", None, {})
-        return dict(overloads) if (version, stamp) == (self._version, self._source_stamp) else {}
 
-    def _save_index(self, overloads: dict[Any, Any]) -> None:
-        self._write(self._index_path, (self._version, self._source_stamp, overloads))
+def _ingredients(value: Any, names: Sequence[str], seen: list[Any]) -> Iterator[str]:
+    """Yield what goes into machine code that uses a value: of a function, its code and all that its
+    names stand for, as that is frozen; of a module, the values of the names that are used.
 
-    def _load_data(self, name: str) -> Any:
-        return self._read(self._data_path(name))
+    Args:
+        names: that the code which uses the value has.
+        seen: functions whose ingredients were yielded; it grows.
 
-    def _save_data(self, name: str, data: Any) -> None:
-        self._write(self._data_path(name), data)
+    Raises:
+        ValueError: it is something of which that cannot be told.
+    """
+    if isinstance(value, numba.core.dispatcher.Dispatcher):
+        yield f"compiled with {sorted(value.targetoptions.items())}"
+        value = value.py_func
+    if str(getattr(value, "__module__", "")).partition(".")[0] in _LIBRARIES:
+        yield f"{value.__module__}.{value.__name__}"
+    elif isfunction(value):
+        if value not in seen:
+            seen.append(value)
+            yield from _of_function(value, seen)
+    elif ismodule(value):
+        yield value.__name__
+        for name in names:
+            if hasattr(value, name):
+                yield name
+                yield from _ingredients(getattr(value, name), names, seen)
+    elif isinstance(value, tuple):
+        yield f"{type(value).__name__} of {len(value)}"
+        for each in value:
+            yield from _ingredients(each, names, seen)
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape} {value.strides} {value.tobytes().hex()}"
+    elif value is None or isinstance(value, bool | int | float | complex | str | np.generic | Enum):
+        yield f"{type(value).__name__} {value!r}"
+    else:
+        raise ValueError(f"unknown: {value!r}")
 
-    def _write(self, path: str, data: Any) -> None:
-        with self._open_for_write(path) as file:
-            content = self._dump(data)
-            file.write(hashlib.sha256(content).digest() + content)
 
-    def _read(self, path: str) -> Any:
-        """Read a file; None if it is not there, or damaged."""
-        content = Path(path).read_bytes() if Path(path).is_file() else b""
-        digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-        return pickle.loads(content) if hashlib.sha256(content).digest() == digest else None
+def _of_function(function: Any, seen: list[Any]) -> Iterator[str]:
+    """Yield the ingredients of a function, and of the functions in it."""
+    closed_over = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    values = {**function.__globals__, **{name: cell.cell_contents for name, cell in closed_over}}
+    defaults = function.__defaults__, tuple((function.__kwdefaults__ or {}).items())
+    yield from _ingredients(defaults, (), seen)
+    codes = [function.__code__]
+    for code in codes:  # it grows
+        codes += [each for each in code.co_consts if isinstance(each, CodeType)]
+        constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
+        arguments = code.co_flags & (CO_VARARGS | CO_VARKEYWORDS), code.co_argcount
+        yield f"{code.co_code.hex()} {code.co_exceptiontable.hex()} {arguments} {constants}"
+        yield f"{code.co_names} {code.co_varnames} {code.co_freevars}"
+        for name in (*code.co_names, *code.co_freevars):
+            if name in values:
+                yield name
+                yield from _ingredients(values[name], code.co_names, seen)

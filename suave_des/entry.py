@@ -13,6 +13,9 @@ def main() -> None:
     """Run the command `suave-des`."""
     for number in not_ignored():
         signal.signal(number, end_interrupted)
+    from suave_des.imports import leave_current_folder
+
+    leave_current_folder()
     from suave_des.cli.main import main as run
 
     run()

@@ -1,27 +1,110 @@
-"""Imports of a library without the parts that are not used here."""
+"""What is imported from where: libraries without the parts that are not used here, and users' own
+modules from the current folder, which nothing else is looked for in.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType, ModuleType
 from typing import Final
 
 _one_at_a_time: Final = threading.RLock()
 
 
 @contextmanager
-def hidden(module: str) -> Iterator[None]:
-    """Hide a module from imports in the block, as if it were not installed, unless it is loaded
-    already.
+def hidden(module: str, *, even_if_loaded: bool = False) -> Iterator[None]:
+    """Hide a module from imports in the block, as if it were not installed; one that is loaded
+    already only `even_if_loaded`.
     """
     with _one_at_a_time:
-        if module in sys.modules:
+        loaded = sys.modules.get(module)
+        if loaded is not None and not even_if_loaded:
             yield
             return
         sys.modules[module] = None  # type: ignore[assignment]
         try:
             yield
         finally:
-            del sys.modules[module]
+            if loaded is None:
+                del sys.modules[module]
+            else:
+                sys.modules[module] = loaded
+
+
+def leave_current_folder() -> None:
+    """Take the current folder from the import path of a command, or each library would find files
+    of the user's in it that happen to be named like modules.
+
+    It is there under `python -m`, and where PYTHONPATH has an empty part, as after
+    `export PYTHONPATH=$PYTHONPATH:more`. It stays if PYTHONPATH names it, or if it has this very
+    package.
+    """
+    here = Path.cwd()
+    named = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
+    if here not in (Path(__file__).parents[1], *map(Path.absolute, map(Path, named))):
+        sys.path[:] = [place for place in sys.path if place and Path(place) != here]
+
+
+class _Beside:
+    """Finds modules in a folder that is not on the import path: those with one of some names, and
+    what these import. (A class derived from importlib.abc would load much at each start.)
+    """
+
+    def __init__(self, folder: str) -> None:
+        self.folder, self.names = folder, set[str]()
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Find a module; those in packages are found by these."""
+        if path is not None or not ({name, _importer()} & self.names):
+            return None
+        return self.find(name)
+
+    def find(self, name: str) -> ModuleSpec | None:
+        """Find a module, which then can be imported, and so can what it imports."""
+        spec = PathFinder.find_spec(name, [self.folder])
+        if spec is not None:
+            self.names.add(name)
+        return spec
+
+
+def _importer() -> str:
+    """Return the name of the module, or of the package that it is in, whose code imports something
+    now; empty if there is none.
+    """
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        name = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if name != "importlib" and frame.f_globals is not globals():
+            return name
+        frame = frame.f_back
+    return ""
+
+
+_finders: Final = dict[str, _Beside]()
+
+
+def find_here(name: str) -> ModuleSpec | None:
+    """Find a module that a user has named, on the import path or else in the current folder; None
+    if there is none.
+
+    One of the folder can be imported from then on, and so can what it imports and lies beside it.
+
+    Raises:
+        ValueError: it is loaded, and not from a file.
+    """
+    if name in sys.modules or find_spec(name) is not None:
+        return find_spec(name)
+    here = str(Path.cwd())
+    finder = _finders.setdefault(here, _Beside(here))
+    if finder not in sys.meta_path:
+        sys.meta_path.append(finder)
+    return finder.find(name)

@@ -26,6 +26,7 @@ from weakref import WeakSet
 
 from suave_des import domain
 from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
+from suave_des.imports import find_here
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Kind
 from suave_des.scenario.loader import LoadedScenario
@@ -227,6 +228,15 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
             if isinstance(each, type) and issubclass(each, base)
         }
         problem = f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}"
+        here, imported = (
+            Path(f"{module_name.replace('.', '/')}.py"),
+            getattr(module, "__file__", ""),
+        )
+        if here.is_file() and not (imported and here.samefile(imported)):
+            raise InputError(
+                f"{problem}: it is {imported or 'a part of Python'}, not {here} in this folder",
+                remedy="rename your file, as installed modules come first",
+            )
         raise InputError(
             problem,
             remedy=nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}",
@@ -250,10 +260,8 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
 def _imported(what: str, module: str) -> ModuleType:
     """Import a module of a user's; `what` names what it is imported for."""
     try:
-        if module not in sys.modules and (here := str(Path.cwd())) not in sys.path:
-            sys.path.append(
-                here
-            )  # where `python` would find it, but an installed command would not
+        if (top := module.partition(".")[0]) not in sys.modules:
+            find_here(top)  # in the current folder, too, which is not on the import path
         return importlib.import_module(module)
     except SyntaxError as error:
         raise InputError(

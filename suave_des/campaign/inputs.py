@@ -32,6 +32,7 @@ from suave_des.campaign.spec import CampaignFile, CampaignSpec
 from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_ensemble
 from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, shown
 from suave_des.files import LIMIT_BYTES, sha256_of
+from suave_des.imports import find_here
 from suave_des.learned import read_file
 from suave_des.records.mission_folder import versions
 from suave_des.registry import (
@@ -345,7 +346,9 @@ def user_modules(managers: Iterable[str], functions: Iterable[type]) -> dict[str
 def _spec(name: str) -> ModuleSpec | None:
     loaded = sys.modules.get(name)
     try:
-        return importlib.util.find_spec(name) if loaded is None else loaded.__spec__
+        if loaded is not None:
+            return loaded.__spec__
+        return importlib.util.find_spec(name) if "." in name else find_here(name)
     except (ImportError, AttributeError, ValueError):  # a name in a module rather than a module
         return None
 

@@ -99,7 +99,7 @@ class TestCacheFolder:
 
         assert result() == "55.0\n"
         files = list((cache / "numba").rglob("*.nb*"))
-        assert {path.suffix for path in files} == {".nbi", ".nbc"}
+        assert {path.suffix for path in files} == {".nbc"}
         whole = {path: path.read_bytes() for path in files}
         for path, content in whole.items():
             middle = len(content) // 2
