@@ -1172,7 +1172,8 @@ class Scenario(Strict):
     modes_file: FileName = "suave_modes.yaml"
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
-    """Mode that the manager none sets, by function."""
+    """Mode of a function that a manager sets where it does not choose one: `none` always, others
+    but metacontrol of functions that they do not adapt."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
     """User-defined functions, by their name in the modes file."""
     knowledge: KnowledgeSettings = KnowledgeSettings()
@@ -1204,7 +1205,7 @@ class Scenario(Strict):
         return {**_DEFAULT_MODES, **value}
 
     def default_mode(self, function: str) -> str | None:
-        """The mode that the manager none sets for a function."""
+        """The mode of a function under a manager that does not choose one; None: there is none."""
         return self.default_modes.get(
             function, domain.SURFACE_MODE if function == SURFACE else None
         )
