@@ -1101,8 +1101,8 @@ class Requirement(Strict):
     """A requirement that may be partially satisfied, as in RELAX (Whittle et al., Requirements
     Engineering 15, 2010).
 
-    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required,
-    and falls linearly to 0 when it is off by the tolerance.
+    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required.
+    Where it is off by d, it is 1 - d / tolerance, at least 0, or exp(-d / tolerance).
     """
 
     metric: Metric | None = None
@@ -1114,7 +1114,9 @@ class Requirement(Strict):
     value: Number
     """The required value."""
     tolerance: NotNegative = 0.0
-    """Tolerated deviation from it."""
+    """Tolerated deviation from it; 0: none."""
+    decay: Literal["linear", "exponential"] = "linear"
+    """Satisfaction falls in a line to 0 at the tolerance, or exponentially, to 0.37 there."""
 
     @model_validator(mode="after")
     def _is_about_one_thing(self) -> Self:
@@ -1130,7 +1132,11 @@ class Requirement(Strict):
         gap = {"at_least": -off, "at_most": off, "close_to": abs(off)}[self.relation]
         if gap <= 0.0:
             return 1.0
-        return max(0.0, 1.0 - gap / self.tolerance) if self.tolerance > 0.0 else 0.0
+        if self.tolerance == 0.0:
+            return 0.0
+        if self.decay == "exponential":
+            return math.exp(-gap / self.tolerance)
+        return max(0.0, 1.0 - gap / self.tolerance)
 
 
 _DEFAULT_MODES = {GENERATE_SEARCH_PATH: "fd_spiral_low", FOLLOW_PIPELINE: "fd_follow_pipeline"}
@@ -1186,8 +1192,8 @@ class Scenario(Strict):
     """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
     """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements
-    Engineering 15, 2010). The column requirement_NAME falls from 1 to 0 where the value is off by
-    the tolerance."""
+    Engineering 15, 2010). The column requirement_NAME falls from 1 towards 0 where the value is
+    off."""
 
     @field_validator("signals", mode="after")
     @classmethod
