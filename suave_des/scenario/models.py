@@ -119,13 +119,16 @@ class Within:
         """Bounds of a plain number; JSON Schema does not apply them to mappings."""
         return {**handler(schema), "minimum": self.ge, "maximum": self.le}
 
+    def _least(self, key: str) -> float:
+        """Least value that a distribution may state under a key; an empty one is a plain number's."""
+        # A normal distribution that is cut at the floor may have its mean below.
+        may_be_below = self.draws_are_cut or (self.is_floor and key == "mean")
+        return -self.le if key != "" and may_be_below else self.ge
+
     def _check(self, value: AnyDistribution) -> AnyDistribution:
         low, high = self.ge, self.le
         for key, part in _stated(value):
-            # A normal distribution that is cut at the floor may have its mean below.
-            least = (
-                -high if key and (self.draws_are_cut or (self.is_floor and key == "mean")) else low
-            )
+            least = self._least(key)
             if not least <= part <= high:
                 raise wrong(
                     f"{part:.12g} is out of range",
@@ -1267,17 +1270,20 @@ class Scenario(Strict):
         return (*self.metrics, *(f"requirement_{name}" for name in self.requirements))
 
     @model_validator(mode="after")
-    def _parts_fit(self) -> Self:
+    def _metrics_have_what_they_are_of(self) -> Self:
         for index, metric in enumerate(self.metrics):
             if metric in self.metrics[:index]:
                 raise wrong(f"{metric} is given twice", "name each metric once", "metrics")
         needed = {*self.metrics, *(each.metric for each in self.requirements.values())}
         if self.leak is None and "surfacing_time_s" in needed:
             raise wrong("surfacing_time_s needs a leak", "add leak: {time_s: 100}", "metrics")
-        if self.battery is None and (
-            missing := [each for each in (BATTERY_LEVEL, "recharges") if each in needed]
-        ):
-            raise wrong(f"{missing[0]} needs a battery", "add battery: {}", "metrics")
+        for of_battery in (BATTERY_LEVEL, "recharges"):
+            if self.battery is None and of_battery in needed:
+                raise wrong(f"{of_battery} needs a battery", "add battery: {}", "metrics")
+        return self
+
+    @model_validator(mode="after")
+    def _attributes_are_measured_once(self) -> Self:
         measured = {*self.signals, *((BATTERY_LEVEL,) if self.battery is not None else ())}
         for name, each in self.requirements.items():
             if each.attribute is not None and each.attribute not in measured:
