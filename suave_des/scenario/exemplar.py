@@ -314,8 +314,10 @@ def _content(document: Layer, entry: str) -> dict[str, Any]:
     if given is None or isinstance(given, dict):
         return given or {}
     words = f"{document.path.name} {' '.join(document.data)}"
-    if batch := next((each for each in _BATCHES if each in words), None):
-        problem = f"describes several experiments, for the exemplar's {batch}"
+    batches = [each for each in _BATCHES if each in words]
+    if batches or "experiments" in document.data:
+        programs = " or ".join(batches or _BATCHES)
+        problem = f"describes several experiments, for the exemplar's {programs}"
         remedy = (
             "give the mission and runner files that they use, those of one experiment at a time"
         )

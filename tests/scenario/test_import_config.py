@@ -766,8 +766,8 @@ class TestBadInput:
 
     @pytest.mark.parametrize(
         "text",
-        ["run_batch:\n  - {manager: none}\n", "experiments: 3\nsuave_cli: {a: 1}\n"],
-        ids=["run_batch", "suave_cli"],
+        ["run_batch:\n  - {manager: none}\n", "suave_cli: {a: 1}\n", "experiments: [{a: 1}]\n"],
+        ids=["run_batch", "suave_cli", "run_batch or suave_cli"],
     )
     def test_files_of_several_experiments_are_told_by_what_they_are(self, imported, text, request):
         program = request.node.callspec.id

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario.models import Calibration, Normal, TableSignal, ThrusterEvent
@@ -285,3 +286,9 @@ def test_kb_check_warns(tmp_path):
     done = command_here("kb", "check", "--set", "thruster_events=['(1,failure,10)']", cwd=tmp_path)
     assert done.returncode == 0
     assert f"WARN   shipped/scenarios/seams2023.yaml: {EARLY}" in done.stdout
+
+
+@pytest.mark.parametrize("entry", ["1", "first", "-1", "\u0661", "1" * 5000])
+def test_an_entry_that_a_list_does_not_have_is_refused(entry):
+    with pytest.raises(InputError, match="entries are 0 to 0"):
+        with_values(load_scenario("seams2023"), {f"thruster_events.{entry}.time_s": 3.0})
