@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from suave_des.scenario.exemplar import KEYS, NEWEST, OLDEST
+from suave_des.scenario.exemplar_keys import KEYS, NEWEST, OLDEST
 from suave_des.scenario.models import (
     FURTHER_METRICS,
     Choice,
@@ -87,8 +87,9 @@ def exemplar_page() -> str:
         "",
         "`import-config` reads these keys, and `export-config` writes them ([guide](../guides/import.md)). In brackets",
         "are the revisions that have a key, and its default; where that is a whole number, ROS 2 takes whole numbers",
-        "only. Then comes the key here; `campaign.` is a campaign file. All other keys are about files, windows and",
-        "processes, and have no meaning here. Source: kas-lab/suave.",
+        "only. Then comes the key here; `campaign.` is a campaign file. HEAD is the main branch in summer 2026, whose",
+        "files are read as those of 1.5; its keys are only imported, in either spelling. All other keys are about",
+        "files, windows and processes, and have no meaning here. Source: kas-lab/suave.",
     ]
     for node, entries_of_node in sections.items():
         lines += ["", f"## {node}", "", *entries_of_node]

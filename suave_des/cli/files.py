@@ -120,7 +120,7 @@ def export_config(
     import-config gives the same scenario again. What the exemplar cannot express is reported.
     """
     from suave_des.campaign.spec import CampaignSettings, read_campaign_file
-    from suave_des.scenario.exemplar import export_config as exported
+    from suave_des.scenario.exemplar_export import export_config as exported
     from suave_des.scenario.loader import load_scenario
 
     file = read_campaign_file(scenario)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from suave_des.domain import (
     BATTERY_LEVEL,
@@ -90,8 +91,18 @@ class Behaviour:
 
 class BehaviourTree(RemembersFailures):
     """bt: recover a failed thruster; search as high as the visibility allows; follow once the
-    pipeline is detected.
+    pipeline is detected. Other functions get their default mode while they are needed.
+
+    Attributes:
+        decides_on: functions that get no default mode.
     """
+
+    decides_on: ClassVar[tuple[str, ...]] = (
+        MAINTAIN_MOTION,
+        GENERATE_SEARCH_PATH,
+        SURFACE,
+        FOLLOW_PIPELINE,
+    )
 
     def __init__(self, system: System) -> None:
         super().__init__(system)
@@ -136,7 +147,16 @@ class BehaviourTree(RemembersFailures):
             self._search(),
             *((surface,) if self.system.scenario.leak is not None else ()),
             follow,
+            *self._others(),
         )
+
+    def _others(self) -> Iterator[Behaviour]:
+        """Make a branch for each further function that has a default mode."""
+        scenario = self.system.scenario
+        for function in scenario.needed_functions():
+            mode = scenario.default_mode(function)
+            if function not in self.decides_on and mode is not None:
+                yield self._while_needed(function, self._set(function, mode))
 
     def _motion(self) -> Behaviour:
         failed = Behaviour("", "a thruster has failed", act=lambda: bool(self.failed))
@@ -185,6 +205,8 @@ class ExtendedBehaviourTree(BehaviourTree):
     """bt_extended: the same, but with a low battery the vehicle goes to recharge; the way there
     then stays active.
     """
+
+    decides_on = (*BehaviourTree.decides_on, GENERATE_RECHARGE_PATH)
 
     @property
     def depends_on(self) -> Dependencies:

@@ -7,13 +7,12 @@ Source of none and random: nodes task_bridge and task_bridge_random of kas-lab/s
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, ClassVar
 
 from suave_des.clock import until
 from suave_des.domain import (
-    FOLLOW_PIPELINE,
     GENERATE_SEARCH_PATH,
     MAINTAIN_MOTION,
     UNGROUND_MODE,
@@ -27,20 +26,37 @@ from suave_des.scenario.modes import grounding_modes
 
 if TYPE_CHECKING:
     from suave_des.scenario.loader import LoadedScenario
+    from suave_des.scenario.models import Scenario
 
 _LOOK_PERIOD_S = 0.05
 """The vehicle's time step: a mode requested between two steps takes effect no earlier."""
 
 
+def _default_modes(scenario: Scenario, functions: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield each of these functions that has a default mode, with that mode."""
+    for function in functions:
+        mode = scenario.default_mode(function)
+        if mode is not None:
+            yield function, mode
+
+
 class NoManager(ManagingSubsystem):
-    """none: each function gets its fixed default mode when its task begins; it never adapts."""
+    """none: each function gets its fixed default mode when its task begins, or the mission if the
+    whole of it needs the function; it never adapts.
+    """
+
+    def mission_started(self) -> None:
+        """Set the modes of the functions that the whole mission needs."""
+        self.set_modes(self.system.functions)
 
     def task_requested(self, task: Task) -> None:
-        """Set the default modes of the task's functions."""
-        for function in task.functions:
-            mode = self.system.scenario.default_mode(function)
-            if mode is not None:
-                self.system.change_mode(function, mode)
+        """Set the modes of the task's functions."""
+        self.set_modes(task.functions)
+
+    def set_modes(self, functions: Sequence[str]) -> None:
+        """Set the default modes of some functions."""
+        for function, mode in _default_modes(self.system.scenario, functions):
+            self.system.change_mode(function, mode)
 
 
 class FixedMode(NoManager):
@@ -64,16 +80,12 @@ class FixedMode(NoManager):
                 f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy
             )
 
-    def task_requested(self, task: Task) -> None:
-        """Set the modes of the task's functions."""
-        fixed = [
-            each for each in task.functions if self.mode in self.system.modes.available_modes(each)
-        ]
+    def set_modes(self, functions: Sequence[str]) -> None:
+        """Set the mode of the functions that have it, and the default modes of the others."""
+        fixed = [each for each in functions if self.mode in self.system.modes.available_modes(each)]
         for function in fixed:
             self.system.change_mode(function, self.mode)
-        super().task_requested(
-            Task(task.name, tuple(each for each in task.functions if each not in fixed))
-        )
+        super().set_modes([each for each in functions if each not in fixed])
 
 
 @cache
@@ -88,7 +100,8 @@ class RandomManager(ManagingSubsystem):
 
     maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023
     picks only on its timer, and sets the search to fd_unground as soon as the pipeline is detected;
-    revision 1.5 picks at each task request too.
+    revision 1.5 picks at each task request too. Other functions that the whole mission needs get
+    their default mode at the start.
     """
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.DETECTION,)
@@ -100,6 +113,12 @@ class RandomManager(ManagingSubsystem):
         self.starts_s = system.first_tick_s("random_manager", self.period_s)
         self._stream = system.stream("random_manager/picks")
         self._functions: tuple[str, ...] = ()
+
+    def mission_started(self) -> None:
+        """Set the default modes of the functions that the whole mission needs."""
+        needed = [name for name in self.system.functions if name != MAINTAIN_MOTION]
+        for function, mode in _default_modes(self.system.scenario, needed):
+            self.system.change_mode(function, mode)
 
     def task_requested(self, task: Task) -> None:
         """Remember the task's functions."""
@@ -186,7 +205,7 @@ class Threshold(RemembersFailures):
 
     def wanted(self, visibility_m: float | None) -> Iterator[tuple[str, str]]:
         """Choose the mode that fits, for each function; a visibility that is not known yet counts
-        as good.
+        as good. Functions that do not depend on it get their default mode, if they have one.
         """
         for function in self.system.functions:
             if function == MAINTAIN_MOTION:
@@ -199,8 +218,8 @@ class Threshold(RemembersFailures):
                     if visibility_m is None or visibility_m >= least_m
                 )
                 yield function, next(fitting, self.search_modes[-1])
-            elif function == FOLLOW_PIPELINE:
-                yield function, self.system.scenario.default_modes[FOLLOW_PIPELINE]
+            else:
+                yield from _default_modes(self.system.scenario, (function,))
 
 
 class Oracle(Threshold):
@@ -218,7 +237,12 @@ class Oracle(Threshold):
         ].signal  # which no real manager could know
 
     def mission_started(self) -> None:
-        """Start watching the true visibility."""
+        """Set the default modes of the functions that the whole mission needs, and start watching
+        the true visibility; maintain_motion waits for the first task.
+        """
+        needed = [name for name in self.system.functions if name != MAINTAIN_MOTION]
+        for function, mode in _default_modes(self.system.scenario, needed):
+            self.system.modes.change_mode(function, mode, latency_s=0.0)
         self.system.env.process(self._watch())
 
     def task_requested(self, task: Task) -> None:

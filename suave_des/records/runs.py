@@ -68,6 +68,10 @@ name.
 """
 
 
+_RUN_INDEX = "run_idx"
+"""Column of the exemplar's main branch (2026), by which its tests pair missions."""
+
+
 def _whole(seconds: float) -> float:
     """Whole seconds without a point, as the exemplar has them."""
     return int(seconds) if seconds == int(seconds) else seconds
@@ -99,6 +103,7 @@ _LAYOUT_1_5: _Layout = {
     "distance inspected (m)": (DISTANCE, lambda of: of[DISTANCE]),
     # The exemplar writes 0.0 when no reaction was completed.
     "mean reaction time (s)": (REACTION_TIME, lambda of: of[REACTION_TIME] or 0.0),
+    _RUN_INDEX: ("", lambda of: of["run"]),
 }
 _OWN = {name: name for name in (*COLUMNS, _LIMIT)}
 _LAYOUTS: tuple[Mapping[str, str], ...] = (
@@ -173,7 +178,8 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     was found: the time limit stands for it, as in the published table. A file that has a time
     limit, but does not say which missions found the pipeline, has found it in those whose search
     took less. In files that are no campaign's a reaction time of 0 stands for no reaction. Rows of
-    averages, blank rows and the header where it is repeated are left out.
+    averages, blank rows and the header where it is repeated are left out. A column run_idx of the
+    exemplar's pairs missions of one name, as a run's number and seed do those of a campaign.
 
     Args:
         path: of the file; columns that are no metrics are numbers where all their values are, and
@@ -245,6 +251,7 @@ class _Cells:
         """
         is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
         managers = [str(name) for name in self.text["manager"].unique()]
+        names = self.text["manager"]
         are_names = {name: bool(name.strip()) for name in managers}  # one of exec: has spaces
         self._check("manager", self.text["manager"].map(are_names), "a manager's name")
         self.text["manager"] = self.text["manager"].map(
@@ -277,6 +284,11 @@ class _Cells:
         }
         if limit_s is not None:
             values[_LIMIT] = limit_s
+        if _RUN_INDEX in self.text and not is_own:
+            numbers = self._numbers(_RUN_INDEX, is_whole=True)
+            if not pandas.DataFrame({"name": names, "run": numbers}).duplicated().any():
+                # The missions of one name and number have the same draws, whoever manages them.
+                values |= {"run": numbers, "seed": names.str.rpartition(" ")[0]}
         frame = pandas.DataFrame(values, index=self.text.index)
         if not is_campaigns:  # the exemplar writes 0.0 for none, a campaign nothing
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)

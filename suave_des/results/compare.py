@@ -361,6 +361,9 @@ def _samples(
         if left and len(both)
         else ""
     )
+    if "run_idx" in first.frame:
+        why = f"paired by run_idx, as the exemplar's own test does{rest}"
+        return True, why, both["x"].to_numpy(), both["y"].to_numpy()
     why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
     return True, why, both["x"].to_numpy(), both["y"].to_numpy()
 

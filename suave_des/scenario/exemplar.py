@@ -1,179 +1,60 @@
-"""The exemplar's own configuration files: their import as a scenario and a campaign, and the way
-back.
-
-The table of their keys, exemplar_keys.csv, says which revisions read each, what it is here, and its
-default; the page docs/reference/exemplar-files.md shows it. Source: kas-lab/suave (Apache-2.0) at
-the tags v1.2.1, v1.3.0, v1.4.0 and v1.5.0; `2023` made the published runs, `2025` is d5e97be. What
-the code of 1.2 to 1.4 does otherwise was not read: there it counts as 1.5's.
+"""The exemplar's own configuration files, imported as a scenario and a campaign; exemplar_export is
+the way back.
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import random
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
-import yaml
 from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
-from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown, unknown
-from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at, with_values
-from suave_des.scenario.models import LONGEST_S, Real, Scenario, in_order, mean
+from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
+from suave_des.scenario.exemplar_keys import (
+    CAMPAIGN,
+    DRAWN,
+    EXPERIMENT,
+    KEYS,
+    LAUNCH,
+    NODES,
+    PATHS,
+    PERTURBED,
+    REASONER,
+    REVISIONS,
+    RUNNER,
+    WATER_CURRENT,
+    WAVE,
+    Key,
+    is_every_node,
+    is_read,
+    node_of,
+    nodes_with,
+    read_by,
+    revision_of,
+)
+from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at
+from suave_des.scenario.models import LONGEST_S, Real, Scenario, in_order
 from suave_des.scenario.modes import modes_of
-from suave_des.scenario.yamlfile import Layer, Location, parse_yaml, read_yaml, validated
-
-RUNNER, REASONER, LAUNCH, EXPERIMENT = (
-    "suave_runner_node",
-    "reasoner",
-    "experiment_launch",
-    "experiments[]",
-)
-"""A campaign's node; any node with a reasoning_period; arguments NAME:=VALUE of a launch; keys of
-an experiment.
-"""
-CAMPAIGN = "campaign."
-"""Begins what is a key of a campaign file here, and not of a scenario."""
-REVISIONS: Mapping[str, str] = {
-    "2023": "seams2023",
-    "1.2": "release15",
-    "1.3": "release15",
-    "1.4": "release15",
-    "2025": "planta_exp1",
-    "1.5": "release15",
-}
-"""Shipped scenario that an import builds on, by revision, the oldest first."""
-_ORDER = tuple(REVISIONS)
-OLDEST, NEWEST = _ORDER[0], _ORDER[-1]
-FIRST_WITH_RUNNER, FIRST_WITH_BRINGUP = "1.4", "1.5"
-
-
-def is_since(revision: str, first: str) -> bool:
-    """Whether a revision is another one or came after it."""
-    return _ORDER.index(revision) >= _ORDER.index(first)
-
-
-class Key(NamedTuple):
-    """A parameter of a node, or a key of an experiment.
-
-    Attributes:
-        path: key path of the scenario, or of the campaign file after CAMPAIGN; empty: nothing here
-            corresponds to it.
-        default: of the exemplar's code, None if there is none or it is not known; its type is the
-            parameter's in ROS 2.
-        since, until: first and last revision whose code reads it.
-    """
-
-    node: str
-    name: str
-    path: str
-    default: Any
-    meaning: str
-    since: str
-    until: str
-
-    def is_read_by(self, revision: str) -> bool:
-        """Whether the code of a revision reads it."""
-        return is_since(revision, self.since) and is_since(self.until, revision)
-
-
-_TABLE, _REVISIONS_TABLE = (
-    [*csv.DictReader(Path(__file__).with_name(name).read_text(encoding="utf-8").splitlines())]
-    for name in ("exemplar_keys.csv", "exemplar_revisions.csv")
-)
-KEYS = tuple(Key(**{**row, "default": json.loads(row["default"] or "null")}) for row in _TABLE)
-"""The table; the runner gives its parameters to each mission, and draws from its intervals in this
-order.
-"""
-PATHS = {(key.node, key.name): key.path for key in reversed(KEYS)}
-"""Key path here of each parameter of a node; empty: nothing here corresponds to it."""
-PERTURBED = f"{CAMPAIGN}perturbations."
-DRAWN = tuple(key for key in KEYS if key.path.startswith(PERTURBED))
-"""The runner's intervals."""
-NODES = tuple(
-    dict.fromkeys(key.node for key in KEYS if key.node not in (REASONER, LAUNCH, EXPERIMENT))
-)
-ALIASES = {"parent_mission_node": "mission_node", "random_reasoner_node": "task_bridge"}
-"""Other names of nodes; the second is that of 2023."""
-
-_TELLING = {row["name"]: (row["since"], row["until"]) for row in _REVISIONS_TABLE}
-"""First and last revision with a node, a parameter, or the package of a launch."""
-
-
-def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
-    """Tell which revision files with these nodes, node.parameters and launched packages are of, and
-    why.
-
-    Raises:
-        InputError: there is none of that name, or the files fit several, or none.
-    """
-    if name is not None:
-        if name in REVISIONS:
-            return name, "as requested"
-        raise unknown(
-            f"there is no revision {shown(name)} of the exemplar",
-            name,
-            REVISIONS,
-            place="--revision",
-        )
-    fitting, telling = list(_ORDER), ""
-    for each, (first, last) in _TELLING.items():
-        if each in found:
-            left = [
-                revision
-                for revision in fitting
-                if is_since(revision, first) and is_since(last, revision)
-            ]
-            telling = each if len(left) < len(fitting) else telling
-            fitting = left
-    if len(fitting) == 1:
-        return fitting[0], f"only revision {fitting[0]} has {telling}"
-    if not fitting:
-        problem = f"no revision of the exemplar has all of {', '.join(each for each in _TELLING if each in found)}"
-        raise InputError(problem, remedy="say which it is: --revision")
-    problem = (
-        f"the files fit revisions {', '.join(fitting)} of the exemplar, which differ in their code"
-    )
-    raise InputError(problem, remedy=f"say which it is, as in --revision {fitting[-1]}")
-
-
-def read_by(revision: str) -> tuple[Key, ...]:
-    """Return the keys that the code of a revision reads, and that a scenario has."""
-    return tuple(
-        key
-        for key in KEYS
-        if key.path and not key.path.startswith(CAMPAIGN) and key.is_read_by(revision)
-    )
-
-
-def node_of(entry: str, given: Collection[str], name: str) -> str:
-    """Return the node of the table that an entry of a file is, with these parameters, for one of
-    them; or nothing.
-    """
-    bare = ALIASES.get(entry.removeprefix("/"), entry.removeprefix("/"))
-    if bare in ("**", "*"):  # the parameter is given to every node
-        return next(
-            (key.node for key in KEYS if key.name == name and key.node not in (LAUNCH, EXPERIMENT)),
-            "",
-        )
-    return bare if bare in NODES else REASONER if "reasoning_period" in given else ""
-
-
-# The import.
+from suave_des.scenario.yamlfile import Layer, Location, read_yaml, validated
 
 PARAMETERS = "ros__parameters"
 EXTENDED = "suave_extended"
 """The exemplar's mission with recharging."""
 TREES = {"suave_bt": "bt", "suave_bt_extended": "bt_extended"}
 """Manager by the name of the behaviour tree's executable."""
+_EVENTS: Final = "thruster_events"
 _VISIBILITY = "signals.water_visibility."
 _NO_COSINE = "not imported: the visibility of the base is no cosine"
+_NOT_NEEDED = "not needed here"
+_BATCHES = ("run_batch", "suave_cli")
+"""The exemplar's programs that run what a file of their own describes."""
 
 
 @dataclass(frozen=True)
@@ -221,9 +102,42 @@ def import_config(
             several revisions, or a value cannot be right.
     """
     notes: list[str] = []
-    documents = [each if isinstance(each, Layer) else read_yaml(each) for each in files]
-    parameters, modes = _parameters(documents, notes)
-    runner = _runner(parameters)
+    given = _given(files, notes)
+    runner = _runner(given.parameters)
+    _check_campaign(runner, campaign, runner_seed)
+    experiments = [] if runner is None else list(_experiments(runner, notes))
+    revision, why = revision_of(given.telling(experiments), revision)
+    base = REVISIONS[revision]
+    plain = load_scenario(base)
+    values = _values(given.parameters, revision, plain, notes)
+    values |= _battery_constraint(experiments, notes)
+    if plain.scenario.revision.name != revision:
+        values["revision"] = Value(revision, why)
+    if given.modes is not None:
+        values["modes_file"] = Value(str(given.modes.path.resolve()), "as it is")
+    loaded = load_scenario(base, over=_layer(values, plain.path))
+
+    text = None
+    if runner is not None:
+        notes += _mission_that_is_missing(runner, given.documents)
+        if campaign is None:
+            notes.append(_only_in_a_campaign(runner))
+        else:
+            content: Entries = {
+                ("campaign",): (1, "version of the form"),
+                ("scenario",): (_relative(out, campaign), ""),
+            }
+            requested = _requested(experiments, managers, notes)
+            content |= _campaign(runner, requested, loaded, runner_seed, notes)
+            text = _text(given.documents, content, ())
+    if given.modes is not None:
+        values["modes_file"] = Value(_relative(given.modes.path, out), "as it is")
+    scenario = _text(given.documents, {("base",): (base, why), **_entries(values)}, notes)
+    return Imported(loaded, base, why, scenario, text, tuple(notes))
+
+
+def _check_campaign(runner: Runner | None, campaign: Path | None, runner_seed: int | None) -> None:
+    """Raise an InputError if a campaign is needed and not requested, or the other way round."""
     if campaign is None and runner_seed is not None:
         problem = "the draws of the exemplar's runner are conditions of a campaign"
         raise InputError(problem, place="--runner-seed", remedy="add --campaign FILE")
@@ -232,58 +146,23 @@ def import_config(
         raise InputError(
             f"there is no campaign to import: no node {RUNNER} in the files", remedy=remedy
         )
-    experiments = [] if runner is None else list(_experiments(runner, notes))
 
-    found = {
-        name
-        for each in parameters
-        for name in (each.entry.removeprefix("/"), f"{each.node}.{each.name}")
-    }
-    found |= {word for each in experiments for word in each.launch.split()[2:3]}
-    revision, why = revision_of(found, revision)
-    base = REVISIONS[revision]
-    plain = load_scenario(base)
-    values = _values(parameters, revision, plain, notes) | _battery_constraint(experiments, notes)
-    if plain.scenario.revision.name != revision:
-        values["revision"] = Value(revision, why)
-    if any(other.data != modes[0].data for other in modes):
-        raise InputError(
-            "there are two System Modes files", file=modes[-1].path, remedy="give one of them"
-        )
-    if modes:
-        values["modes_file"] = Value(str(modes[0].path.resolve()), "as it is")
-    loaded = load_scenario(base, over=_layer(values, plain.path))
 
-    mission = None if runner is None else runner.parameters.get("mission_config_file")
-    if mission is not None and Path(str(mission.value)).name not in {
-        each.path.name for each in documents
-    }:
-        notes.append(
-            f"{mission.place}: not imported: {shown(mission.value)} is none of the files given"
-        )
-    text = None
-    if campaign is not None and runner is not None:
-        content: Entries = {
-            ("campaign",): (1, "version of the form"),
-            ("scenario",): (_relative(out, campaign), ""),
-        }
-        content |= _campaign(runner, experiments, loaded, managers, runner_seed, notes)
-        text = _text(documents, content, ())
-    elif runner is not None:
-        listed = ", ".join(
-            name for name in runner.parameters if PATHS.get((RUNNER, name), "").startswith(CAMPAIGN)
-        )
-        notes.append(
-            f"not part of a scenario (--campaign FILE writes it to a campaign file): {RUNNER}: {listed}"
-        )
-    order = list(Scenario.model_fields)
-    content = {("base",): (base, why)}
-    for path in sorted(
-        values, key=lambda path: (order.index(path.split(".")[0]), path.split(".")[:-1])
-    ):
-        value = _relative(modes[0].path, out) if path == "modes_file" else values[path].value
-        content[tuple(path.split("."))] = (value, values[path].comment)
-    return Imported(loaded, base, why, _text(documents, content, notes), text, tuple(notes))
+def _mission_that_is_missing(runner: Runner, documents: Sequence[Layer]) -> Iterator[str]:
+    """Yield a note if the mission's file that the runner names is none of those given."""
+    mission = runner.parameters.get("mission_config_file")
+    names = {each.path.name for each in documents}
+    if mission is not None and Path(str(mission.value)).name not in names:
+        yield f"{mission.place}: not imported: {shown(mission.value)} is none of the files given"
+
+
+def _only_in_a_campaign(runner: Runner) -> str:
+    """Return the note about the runner's parameters that no scenario has."""
+    listed = [
+        name for name in runner.parameters if PATHS.get((RUNNER, name), "").startswith(CAMPAIGN)
+    ]
+    what = "not part of a scenario (--campaign FILE writes it to a campaign file)"
+    return f"{what}: {RUNNER}: {', '.join(listed)}"
 
 
 # The files.
@@ -318,75 +197,197 @@ class Parameter:
         """File, line, node and parameter, for the user."""
         return f"{self.document.path}: line {self.line()}, {self.keys}"
 
+    def error(self, problem: str, remedy: str) -> InputError:
+        """An error about it."""
+        place = f"line {self.line()}, {self.keys}"
+        return InputError(problem, file=self.document.path, place=place, remedy=remedy)
+
     @property
     def source(self) -> str:
         """File and line, for a comment."""
         return f"{self.document.path.name}, line {self.line()}"
 
+    @property
+    def rank(self) -> tuple[bool, bool]:
+        """The runner's count before those of a mission, a node's own before those of every node."""
+        return self.node != RUNNER, is_every_node(self.entry)
 
-def _parameters(
-    documents: Sequence[Layer], notes: list[str]
-) -> tuple[list[Parameter], list[Layer]]:
-    """The parameters of known nodes, file by file, and the System Modes files; notes about the
-    rest.
+    @property
+    def in_file(self) -> Any:
+        """The value as it is in the file."""
+        return self.document.data[self.entry][PARAMETERS][self.name]
+
+    @property
+    def entry_lines(self) -> list[int]:
+        """Lines of the entries of a list."""
+        return [self.line(index) for index in _full(self.in_file)]
+
+
+@dataclass
+class Given:
+    """What is in the files.
+
+    Attributes:
+        parameters: of known nodes, file by file.
+        modes: the System Modes file, if there is one.
     """
-    parameters, modes = list[Parameter](), list[Layer]()
+
+    documents: Sequence[Layer]
+    parameters: list[Parameter] = field(default_factory=list)
+    modes: Layer | None = None
+
+    def telling(self, experiments: Iterable[Experiment]) -> set[str]:
+        """Return the names that may tell the revision: nodes, node.parameters and packages."""
+        found = {each.entry.removeprefix("/") for each in self.parameters}
+        found |= {f"{each.node}.{each.name}" for each in self.parameters}
+        return found | {word for each in experiments for word in each.launch.split()[2:3]}
+
+
+def _given(files: Sequence[Path | Layer], notes: list[str]) -> Given:
+    """Read the files; notes about what is not known in them."""
+    documents = [each if isinstance(each, Layer) else read_yaml(each) for each in files]
+    given = Given(documents)
     for document in documents:
-        contents = [
-            each.get(PARAMETERS) for each in document.data.values() if isinstance(each, dict)
-        ]
-        if any(
-            isinstance(each, dict) and each.get("type") in ("system", "node") for each in contents
-        ):
-            modes_of(document)
-            modes.append(document)
+        if not _has_modes(document):
+            given.parameters += _parameters(document, notes)
             continue
-        is_ours = False
-        for entry, content in document.data.items():
-            if not isinstance(content, dict) or not isinstance(
-                content.get(PARAMETERS, ""), dict | None
-            ):
-                remedy = (
-                    f"a configuration of the exemplar has NODE: {{{PARAMETERS}: {{KEY: VALUE}}}}"
-                )
-                raise document.error(f"{entry} has no mapping {PARAMETERS}", (entry,), remedy)
-            given = content[PARAMETERS] or {}
-            nodes = {name: node_of(entry, given, name) for name in given}
-            for name in filter(nodes.get, given):
-                value = _in_time(given[name]) if name == "thruster_events" else given[name]
-                parameters.append(Parameter(document, entry, name, value, nodes[name]))
-            place = (
-                f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
+        modes_of(document)
+        if given.modes is not None and given.modes.data != document.data:
+            raise InputError(
+                "there are two System Modes files", file=document.path, remedy="give one of them"
             )
-            if beside := [other for other in content if other != PARAMETERS]:
-                notes.append(
-                    f"{place}: not imported: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone"
-                )
-            is_known = any(nodes.values()) or (not given and bool(node_of(entry, given, "")))
-            is_ours = is_ours or is_known
-            if not is_known:
-                remedy = did_you_mean(entry.removeprefix("/"), NODES)
-                notes.append(
-                    f"{place}: not imported: {', '.join(given)}: the node is not known ({remedy})"
-                )
-        if not is_ours:
-            first = next(iter(document.data), "")
-            remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
-            raise document.error("has nothing of SUAVE in it", (first,), remedy)
-    return parameters, modes
+        given.modes = given.modes or document
+    return given
 
 
-def _in_time(events: Any) -> Any:
-    """Thruster events without spaces, and without empty ones, as ROS 2 writes an empty list.
+def _has_modes(document: Layer) -> bool:
+    """Whether a file is a System Modes file."""
+    contents = [each.get(PARAMETERS) for each in document.data.values() if isinstance(each, dict)]
+    types = [each.get("type") for each in contents if isinstance(each, dict)]
+    return "system" in types or "node" in types
 
-    Those before the start are at the start: the exemplar triggers them at its first tick.
+
+def _parameters(document: Layer, notes: list[str]) -> list[Parameter]:
+    """Return the parameters of known nodes in a file; notes about the rest.
+
+    Raises:
+        InputError: it is no configuration of nodes, or has none that is known.
+    """
+    contents = {entry: _content(document, entry) for entry in document.data}
+    is_runners = any(
+        node_of(entry, ()) == RUNNER or (is_every_node(entry) and "experiments" in content)
+        for entry, content in contents.items()
+    )
+    found, is_ours = list[Parameter](), False
+    for entry, content in contents.items():
+        of_entry = list(_of_entry(document, entry, content, is_runners=is_runners))
+        found += of_entry
+        is_ours = is_ours or bool(of_entry) or bool(node_of(entry, content))
+        notes += _unread(document, entry, content, {each.name for each in of_entry})
+    if not is_ours:
+        first = next(iter(document.data), "")
+        remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
+        raise document.error("has nothing of SUAVE in it", (first,), remedy)
+    return found
+
+
+def _unread(
+    document: Layer, entry: str, given: Mapping[str, Any], read: Collection[str]
+) -> Iterator[str]:
+    """Yield notes about what no node gets of an entry with these parameters."""
+    place = f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
+    if beside := [other for other in document.data[entry] if other != PARAMETERS]:
+        yield f"{place}: not imported: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone"
+    names = ", ".join(name for name in given if name not in read)
+    if is_every_node(entry):
+        if names:
+            yield f"{place}: not imported: {names}: no node of this file has it"
+    elif not node_of(entry, given):
+        remedy = did_you_mean(entry.removeprefix("/"), NODES)
+        yield f"{place}: not imported: {names}: the node is not known ({remedy})"
+
+
+def _content(document: Layer, entry: str) -> dict[str, Any]:
+    """Return the parameters of a file's entry; an InputError if it is no node's."""
+    content = document.data[entry]
+    given = content.get(PARAMETERS, "") if isinstance(content, dict) else ""
+    if given is None or isinstance(given, dict):
+        return given or {}
+    words = f"{document.path.name} {' '.join(document.data)}"
+    batches = [each for each in _BATCHES if each in words]
+    if batches or "experiments" in document.data:
+        programs = " or ".join(batches or _BATCHES)
+        problem = f"describes several experiments, for the exemplar's {programs}"
+        remedy = (
+            "give the mission and runner files that they use, those of one experiment at a time"
+        )
+        raise document.error(problem, (entry,), remedy)
+    remedy = f"a configuration of the exemplar has NODE: {{{PARAMETERS}: {{KEY: VALUE}}}}"
+    raise document.error(f"{entry} has no mapping {PARAMETERS}", (entry,), remedy)
+
+
+def _of_entry(
+    document: Layer, entry: str, given: Mapping[str, Any], *, is_runners: bool
+) -> Iterator[Parameter]:
+    """Yield the parameters of an entry, each for every node that gets it.
+
+    What is given to every node of a mission's file is not given to the runner, which another file
+    configures.
+    """
+    for name, in_file in given.items():
+        value = _compact(in_file) if name == _EVENTS else in_file
+        if is_every_node(entry):
+            nodes = [node for node in nodes_with(name) if is_runners or node != RUNNER]
+        else:
+            nodes = [node for node in (node_of(entry, given),) if node]
+        for node in nodes:
+            yield Parameter(document, entry, name, value, node)
+
+
+# Thruster events, as text.
+
+
+def _compact(events: Any) -> Any:
+    """Return thruster events without spaces, and without empty ones, as ROS 2 writes an empty
+    list.
     """
     if not isinstance(events, list):
         return events
-    texts = ["".join(each.split()) if isinstance(each, str) else each for each in events]
-    before = re.compile(r",-[\d.]+(e-?\d+)?\)$")
+    full = [events[index] for index in _full(events)]
+    return ["".join(each.split()) if isinstance(each, str) else each for each in full]
+
+
+def _full(entries: Any) -> list[int]:
+    """Return the indices of a list's entries that are not empty texts."""
+    if not isinstance(entries, list):
+        return []
     return [
-        before.sub(",0)", each) if isinstance(each, str) else each for each in texts if each != ""
+        index
+        for index, each in enumerate(entries)
+        if not isinstance(each, str) or each.strip() != ""
+    ]
+
+
+_BEFORE_START: Final = re.compile(
+    r"(\(\d+,\w+,)(-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\)", re.ASCII
+)
+
+
+def _time_before_start_s(event: Any) -> float | None:
+    """Return the time of a thruster event that is before the start; None if it is not."""
+    match = _BEFORE_START.fullmatch(event) if isinstance(event, str) else None
+    return None if match is None else float(match[2])
+
+
+def _from_start(events: Any) -> Any:
+    """Return thruster events of which those before the start are at the start: the exemplar
+    triggers them at its first tick.
+    """
+    if not isinstance(events, list):
+        return events
+    return [
+        each if _time_before_start_s(each) is None else _BEFORE_START.sub(r"\g<1>0)", each)
+        for each in events
     ]
 
 
@@ -401,62 +402,193 @@ class Value(NamedTuple):
     parameter: Parameter | None = None
 
 
+class Reading(NamedTuple):
+    """How a revision reads the files.
+
+    Attributes:
+        has_mission: whether a node of a mission is configured.
+        has_runner: whether the runner is.
+    """
+
+    revision: str
+    has_mission: bool
+    has_runner: bool
+
+    @classmethod
+    def of(cls, parameters: Sequence[Parameter], revision: str) -> Reading:
+        """Read parameters as those of a revision."""
+        has_mission = any(
+            each.node not in (RUNNER, REASONER, WATER_CURRENT)
+            and not (is_every_node(each.entry) and PATHS[each.node, each.name] == "")
+            for each in parameters
+        )
+        return cls(revision, has_mission, any(each.node == RUNNER for each in parameters))
+
+    @property
+    def passed(self) -> set[str]:
+        """Key paths of what the runner gives to each mission: all that has a default, with or
+        without a value in its file.
+        """
+        if not self.has_runner:
+            return set()
+        own = [key for key in read_by(self.revision) if key.node == RUNNER]
+        return {key.path for key in own if key.default is not None}
+
+    def why_not(self, parameter: Parameter) -> str | None:
+        """Return why a parameter does not count for a mission; None if it does."""
+        path = PATHS.get((parameter.node, parameter.name))
+        if path is None:
+            known = [key.name for key in KEYS if key.node == parameter.node]
+            return f"unknown key ({did_you_mean(parameter.name, known)})"
+        if path == "":
+            return _NOT_NEEDED
+        if not is_read(parameter.node, parameter.name, self.revision):
+            instead = (f"{key.node}.{key.name}" for key in self._keys() if key.path == path)
+            return f"revision {self.revision} reads {next(instead, 'nothing of the kind')}"
+        if path in self.passed and parameter.node != RUNNER:
+            return f"{RUNNER} gives each mission its own; without one, 0"
+        return None
+
+    def defaults(self) -> Iterator[Key]:
+        """Yield the keys that have a default, of nodes that take part in these missions."""
+        for key in self._keys():
+            takes_part = self.has_mission or (self.has_runner and key.node == RUNNER)
+            is_passed = key.path in self.passed and key.node != RUNNER
+            if key.default is not None and takes_part and not is_passed:
+                yield key
+
+    def _keys(self) -> tuple[Key, ...]:
+        return read_by(self.revision)
+
+
 def _values(
     parameters: Sequence[Parameter], revision: str, base: LoadedScenario, notes: list[str]
 ) -> dict[str, Value]:
-    """The values that a mission has, by key path, and notes about others; an InputError if two
-    contradict.
-    """
-    found, unneeded = dict[str, Parameter](), list[str]()
-    has_runner = any(each.node == RUNNER for each in parameters)
-    # The runner passes what has a default to each mission, with or without a value in its file.
-    passed = {
-        key.path
-        for key in read_by(revision)
-        if has_runner and key.node == RUNNER and key.default is not None
-    }
-    read = {(key.node, key.name) for key in KEYS if key.is_read_by(revision)}
-    for parameter in sorted(parameters, key=lambda each: each.node != RUNNER):
-        path, why = PATHS.get((parameter.node, parameter.name)), None
-        if path is None:
-            remedy = did_you_mean(
-                parameter.name, [key.name for key in KEYS if key.node == parameter.node]
-            )
-            why = f"unknown key ({remedy})"
-        elif not path:
-            unneeded.append(f"{parameter.keys} ({parameter.source})")
-        elif (parameter.node, parameter.name) not in read:
-            instead = (f"{key.node}.{key.name}" for key in read_by(revision) if key.path == path)
-            why = f"revision {revision} reads {next(instead, 'nothing of the kind')}"
-        elif path in passed and parameter.node != RUNNER:
-            why = f"{RUNNER} gives each mission its own; without one, 0"
-        elif (
-            not path.startswith(CAMPAIGN)
-            and (other := found.setdefault(path, parameter)).value != parameter.value
-        ):
-            if other is not parameter and (other.node != RUNNER or parameter.node == RUNNER):
-                problem, place = f"contradicts {other.place}", parameter.place.partition(": ")[2]
-                remedy = "make them alike, or leave one of them out"
-                raise InputError(problem, file=parameter.document.path, place=place, remedy=remedy)
-            why = None if other is parameter else f"the campaign's value counts ({other.place})"
-        if why is not None:
-            notes.append(f"{parameter.place}: not imported: {why}")
-    if unneeded:
-        notes.append(f"not needed here: {', '.join(unneeded)}")
-    values = {
-        path: Value(each.value, f"{each.source}: {each.keys}", each) for path, each in found.items()
-    }
+    """Return the values that a mission has, by key path; notes about others.
 
-    has_mission = any(each.node not in (RUNNER, REASONER) for each in parameters)
-    omitted: dict[str, list[str]] = {}
-    for key in read_by(revision):
-        if (
-            key.default is None
-            or key.path in values
-            or not (has_mission or (has_runner and key.node == RUNNER))
-        ):
+    Raises:
+        InputError: two files contradict one another, or the current cannot be read.
+    """
+    reading = Reading.of(parameters, revision)
+    given = _counted(_needed(parameters, reading, notes), notes)
+    given = _with_wave(given, parameters, reading, notes)
+    values = {
+        path: Value(
+            _from_start(each.value) if path == _EVENTS else each.value,
+            f"{each.source}: {each.keys}",
+            each,
+        )
+        for path, each in given.items()
+    }
+    values |= _defaults(reading, values, base, notes)
+    return _with_cosine(values, reading, base, notes)
+
+
+def _needed(parameters: Sequence[Parameter], reading: Reading, notes: list[str]) -> list[Parameter]:
+    """Return the parameters that count, the runner's first; notes about the others.
+
+    One that is given to every node counts if it does for some of them.
+    """
+    ordered = sorted(parameters, key=lambda each: each.rank)
+    reasons = [(each, reading.why_not(each)) for each in ordered]
+    needed = [each for each, why in reasons if why is None]
+    places = {each.place for each in needed}
+    unneeded = list[str]()
+    for each, why in reasons:
+        if each.place in places:
             continue
-        if key.path in passed and key.node != RUNNER:
+        places.add(each.place)
+        if why == _NOT_NEEDED:
+            unneeded.append(f"{each.keys} ({each.source})")
+        else:
+            notes.append(f"{each.place}: not imported: {why}")
+    if unneeded:
+        notes.append(f"{_NOT_NEEDED}: {', '.join(unneeded)}")
+    return needed
+
+
+def _counted(parameters: Sequence[Parameter], notes: list[str]) -> dict[str, Parameter]:
+    """Return the parameter that counts for each key path of a scenario, of parameters in the order
+    of their rank.
+
+    Raises:
+        InputError: two of equal rank have different values.
+    """
+    found: dict[str, Parameter] = {}
+    for parameter in parameters:
+        path = PATHS[parameter.node, parameter.name]
+        # Several parameters of the runner have one path in a campaign.
+        place = f"{CAMPAIGN}{parameter.name}" if path.startswith(CAMPAIGN) else path
+        first = found.setdefault(place, parameter)
+        if first.value == parameter.value:
+            continue
+        if first.rank == parameter.rank:
+            remedy = "make them alike, or leave one of them out"
+            raise parameter.error(f"contradicts {first.place}", remedy)
+        whose = "campaign" if first.rank[0] != parameter.rank[0] else "node"
+        notes.append(f"{parameter.place}: not imported: the {whose}'s value counts ({first.place})")
+    return {place: each for place, each in found.items() if not place.startswith(CAMPAIGN)}
+
+
+def _with_wave(
+    given: Mapping[str, Parameter],
+    parameters: Sequence[Parameter],
+    reading: Reading,
+    notes: list[str],
+) -> dict[str, Parameter]:
+    """Leave out the switch of HEAD's current, and the current where it is off.
+
+    Raises:
+        InputError: it is on, but cannot be read: a mission without this current, or with a part of
+            it, is another one.
+    """
+    wave = {path: each for path, each in given.items() if path.startswith(f"{WAVE}.")}
+    switch = given.get(WAVE)
+    if _is_on(switch, reading):
+        _check_wave(wave, switch, parameters)
+        notes += [f"{each.place}: read as {path}" for path, each in wave.items()]
+        return {path: each for path, each in given.items() if path != WAVE}
+    why = f"not imported: {RUNNER}.enable_water_current is not true"
+    notes += [f"{each.place}: {why}" for each in wave.values()]
+    return {path: each for path, each in given.items() if not path.startswith(WAVE)}
+
+
+def _is_on(switch: Parameter | None, reading: Reading) -> bool:
+    """Whether the current is on; without a switch, where no runner could switch it on."""
+    if switch is None:
+        return not reading.has_runner
+    if not isinstance(switch.value, bool):
+        raise switch.error(f"{shown(switch.value)} is not a boolean", "write true or false")
+    return switch.value
+
+
+def _check_wave(
+    wave: Collection[str], switch: Parameter | None, parameters: Sequence[Parameter]
+) -> None:
+    """Raise an InputError if the current has a key that is not known, or none at all."""
+    unread = [
+        each
+        for each in parameters
+        if each.node == WATER_CURRENT and (each.node, each.name) not in PATHS
+    ]
+    if switch is not None and not wave:
+        unread.append(switch)
+    if unread:
+        known = ", ".join(key.name for key in KEYS if key.node == WATER_CURRENT and key.path)
+        problem = f"the current cannot be read: known keys of {WATER_CURRENT} are {known}"
+        remedy = f"leave it out, with its switch, and give {WAVE} in the scenario"
+        raise unread[0].error(problem, remedy)
+
+
+def _defaults(
+    reading: Reading, given: Collection[str], base: LoadedScenario, notes: list[str]
+) -> dict[str, Value]:
+    """Return the defaults of the exemplar's nodes that differ from the base's values; a note about
+    all that are not given.
+    """
+    omitted, values = dict[str, list[str]](), dict[str, Value]()
+    for key in reading.defaults():
+        if key.path in given:
             continue
         omitted.setdefault(key.node, []).append(key.name)
         if at(base, key.path) != key.default:
@@ -464,19 +596,24 @@ def _values(
     if omitted:
         listed = "; ".join(f"{node}: {', '.join(names)}" for node, names in omitted.items())
         notes.append(f"not in the files, so at the defaults of the exemplar's nodes: {listed}")
+    return values
+
+
+def _with_cosine(
+    values: Mapping[str, Value], reading: Reading, base: LoadedScenario, notes: list[str]
+) -> dict[str, Value]:
+    """Make the visibility the cosine that the exemplar's observer publishes; without a mission, it
+    stays the base's, whatever it is.
+    """
     if base.scenario.signals[WATER_VISIBILITY].kind == "sinusoid":
-        return values
-    if has_mission:
-        return {
-            f"{_VISIBILITY}kind": Value("sinusoid", "as water_visibility_observer_node has it"),
-            **values,
-        }
-    notes += [
-        f"{each.place}: {_NO_COSINE}"
-        for path, each in found.items()
-        if path.startswith(_VISIBILITY)
-    ]
-    return {path: each for path, each in values.items() if not path.startswith(_VISIBILITY)}
+        return dict(values)
+    if reading.has_mission:
+        kind = Value("sinusoid", "as water_visibility_observer_node has it")
+        return {f"{_VISIBILITY}kind": kind, **values}
+    ignored = {path: each for path, each in values.items() if path.startswith(_VISIBILITY)}
+    given = [each.parameter for each in ignored.values() if each.parameter is not None]
+    notes += [f"{each.place}: {_NO_COSINE}" for each in given]
+    return {path: each for path, each in values.items() if path not in ignored}
 
 
 def at(loaded: LoadedScenario, path: str) -> Any:
@@ -500,9 +637,16 @@ def _layer(values: Mapping[str, Value], base: Path) -> Layer:
         if parameter is not None:
             file = parameter.document.path
             places[path] = Location(0, parameter.line(), file)
-            for index in range(len(value) if isinstance(value, list) else 0):
-                places[(*path, index)] = Location(0, parameter.line(index), file)
+            lines = enumerate(parameter.entry_lines)
+            places |= {(*path, index): Location(0, line, file) for index, line in lines}
     return Layer(data, places)
+
+
+def _entries(values: Mapping[str, Value]) -> Entries:
+    """The values as lines of a scenario file, in the order of its keys."""
+    order = list(Scenario.model_fields)
+    paths = sorted(values, key=lambda path: (order.index(path.split(".")[0]), path.split(".")[:-1]))
+    return {tuple(path.split(".")): (values[path].value, values[path].comment) for path in paths}
 
 
 # The campaign.
@@ -542,18 +686,30 @@ class Runner(NamedTuple):
         given = self.parameters.get(name)
         return f"default of {RUNNER}.{name}" if given is None else f"{given.source}: {name}"
 
+    def note(self, name: str, text: str) -> str:
+        """A note about one of its parameters."""
+        return f"{self.parameters[name].place}: {text}"
+
 
 def _runner(parameters: Sequence[Parameter]) -> Runner | None:
     """The runner, if there is one; an InputError if a value is impossible, or it has no
     experiments.
     """
-    found = {each.name: each for each in parameters if each.node == RUNNER}
+    found: dict[str, Parameter] = {}
+    for each in sorted(parameters, key=lambda each: each.rank):
+        if each.node == RUNNER:
+            found.setdefault(each.name, each)
     if not found:
         return None
     first = next(iter(found.values()))
-    return Runner(
-        found, validated(first.document.below(first.entry).below(PARAMETERS), _RunnerSettings)
-    )
+    places: dict[KeyPath, Location] = {(): first.document.place((first.entry, PARAMETERS))}
+    for each in found.values():
+        above = (each.entry, PARAMETERS, each.name)
+        inside = each.document.places.items()
+        places |= {path[2:]: place for path, place in inside if path[:3] == above}
+    data = {each.name: each.in_file for each in found.values()}
+    layer = Layer(data, places, (first.entry, PARAMETERS))
+    return Runner(found, validated(layer, _RunnerSettings))
 
 
 class Experiment(NamedTuple):
@@ -572,96 +728,118 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
     """The experiments, each by its own launch and mission; notes about what is not simulated."""
     parameter = runner.parameters["experiments"]
     for index, each in enumerate(runner.settings.experiments):
-        launch, file = each.experiment_launch, parameter.document.path
-        place = f"{file}: line {parameter.line(index)}, {parameter.keys}[{index}]"
-        arguments = dict(re.findall(r"(\w+):=(\S*)", launch))
-        for node, names in ((EXPERIMENT, json.loads(parameter.value[index])), (LAUNCH, arguments)):
-            unknown = [" ".join(name.split()) for name in names if (node, name) not in PATHS]
-            notes += [
-                f"{place}: not simulated: {name}: {shown(names.get(name))}" for name in unknown
-            ]
-        manager = arguments.get("adaptation_manager", each.adaptation_manager)
-        if manager != each.adaptation_manager:
-            notes.append(f"{place}: its launch starts {manager}, and not {each.adaptation_manager}")
-        missions = [
-            each.mission_name,
-            *(arguments.get(name) for name in ("mission_name", "mission", "mission_type")),
-        ]
-        is_extended = EXTENDED in missions or "extended" in "".join(launch.split()[3:4])
-        if manager == "bt":
-            executable = arguments.get(
-                "bt_executable", "suave_bt_extended" if is_extended else "suave_bt"
-            )
-            manager = TREES.get(executable, executable)
-        elif is_extended:
-            notes.append(
-                f"{place}: not simulated: the mission {EXTENDED} under {manager}, which flies suave here"
-            )
-        level: float | None = None
-        if arguments.get("battery_constraint", "").lower() == "true":
-            try:
-                level = float(arguments["battery_constraint_value"])
-            except (KeyError, ValueError):
-                notes.append(
-                    f"{place}: not imported: battery_constraint without a number as its value"
-                )
-        yield Experiment(place, manager, each.num_runs, launch, level)
+        place = (
+            f"{parameter.document.path}: line {parameter.line(index)}, {parameter.keys}[{index}]"
+        )
+        arguments = dict(re.findall(r"(\w+):=(\S*)", each.experiment_launch))
+        notes += _not_simulated(place, EXPERIMENT, json.loads(parameter.value[index]))
+        notes += _not_simulated(place, LAUNCH, arguments)
+        manager = _manager(place, each, arguments, notes)
+        level = _level(place, arguments, notes)
+        yield Experiment(place, manager, each.num_runs, each.experiment_launch, level)
+
+
+def _not_simulated(place: str, node: str, given: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a note for each key of an experiment or launch that is not in the table."""
+    for name, value in given.items():
+        if (node, name) not in PATHS:
+            words = " ".join(name.split())
+            yield f"{place}: not simulated: {words}: {shown(value)}"
+
+
+def _manager(
+    place: str, experiment: _Experiment, arguments: Mapping[str, str], notes: list[str]
+) -> str:
+    """Return the manager of an experiment, by its name here; notes if its launch or mission is
+    another one.
+    """
+    named, launch = experiment.adaptation_manager, experiment.experiment_launch
+    manager = arguments.get("adaptation_manager", named)
+    if manager != named:
+        notes.append(f"{place}: its launch starts {manager}, and not {named}")
+    of_launch = [arguments.get(name) for name in ("mission_name", "mission", "mission_type")]
+    launch_file = "".join(launch.split()[3:4])
+    is_extended = EXTENDED in (experiment.mission_name, *of_launch) or "extended" in launch_file
+    if manager == "bt":
+        tree = "suave_bt_extended" if is_extended else "suave_bt"
+        executable = arguments.get("bt_executable", tree)
+        return TREES.get(executable, executable)
+    if is_extended:
+        notes.append(
+            f"{place}: not simulated: the mission {EXTENDED} under {manager}, which flies suave here"
+        )
+    return manager
+
+
+def _level(place: str, arguments: Mapping[str, str], notes: list[str]) -> float | None:
+    """Return the level of the battery below which a launch aborts missions, if there is one."""
+    if arguments.get("battery_constraint", "").lower() != "true":
+        return None
+    try:
+        return float(arguments["battery_constraint_value"])
+    except (KeyError, ValueError):
+        notes.append(f"{place}: not imported: battery_constraint without a number as its value")
+        return None
 
 
 def _battery_constraint(experiments: Sequence[Experiment], notes: list[str]) -> dict[str, Value]:
     """The level below which missions are aborted; a campaign has one for all managers."""
     levels = {each.level for each in experiments}
-    why = "not all experiments have it; import this one from a file of its own"
-    for each in experiments if len(levels) > 1 else ():
-        if each.level is not None:
-            notes.append(
-                f"{each.place}: not imported: battery_constraint_value {each.level:g}: {why}"
-            )
-    level = levels.pop() if len(levels) == 1 else None
-    return (
-        {"battery.mission_ends_at_level": Value(level, "battery_constraint_value")} if level else {}
-    )
+    if len(levels) > 1:
+        why = "not all experiments have it; import this one from a file of its own"
+        notes += [
+            f"{each.place}: not imported: battery_constraint_value {each.level:g}: {why}"
+            for each in experiments
+            if each.level is not None
+        ]
+        return {}
+    level = next(iter(levels), None)
+    if level is None or level == 0.0:  # no level is below 0
+        return {}
+    return {"battery.mission_ends_at_level": Value(level, "battery_constraint_value")}
 
 
 Entries = dict[tuple[str, ...], tuple[Any, str]]
 """Values with their comments by key path, as lines of a YAML file."""
 
 
-def _campaign(
-    runner: Runner,
-    experiments: Sequence[Experiment],
-    loaded: LoadedScenario,
-    known: Collection[str],
-    runner_seed: int | None,
-    notes: list[str],
-) -> Entries:
-    """The runner's parameters as content of a campaign file; an InputError if there is nothing to
-    run.
+def _requested(
+    experiments: Sequence[Experiment], known: Collection[str], notes: list[str]
+) -> dict[str, int]:
+    """Return the managers to run, each with the greatest number of missions requested of it.
+
+    Raises:
+        InputError: there is none.
     """
-    runs, shared = dict[str, int](), runner.settings.random_interval
+    runs = dict[str, int]()
     for place, manager, number, *_ in experiments:
         if manager not in known:
             remedy = did_you_mean(manager, known)
             notes.append(f"{place}: not imported: there is no manager {shown(manager)} ({remedy})")
             continue
         if manager in runs:
-            notes.append(
-                f"{place}: not imported: {manager} is there already, and a campaign has each manager once"
-            )
+            why = f"{manager} is there already, and a campaign has each manager once"
+            notes.append(f"{place}: not imported: {why}")
         runs[manager] = max(runs.get(manager, 0), number)
-    if not runs:
-        raise InputError(
-            "none of its managers can be run",
-            place="experiments",
-            remedy=f"known: {', '.join(known)}",
-        )
+    if runs:
+        return runs
+    problem, remedy = "none of its managers can be run", f"known: {', '.join(known)}"
+    raise InputError(problem, place="experiments", remedy=remedy)
+
+
+def _campaign(
+    runner: Runner,
+    runs: Mapping[str, int],
+    loaded: LoadedScenario,
+    runner_seed: int | None,
+    notes: list[str],
+) -> Entries:
+    """The runner's parameters as content of a campaign file."""
     most = max(runs.values())
-    if fewer := ", ".join(
-        f"{manager} {number}" for manager, number in runs.items() if number < most
-    ):
-        notes.append(
-            f"every manager gets {most} runs, although fewer were requested ({fewer}); the first are the same"
-        )
+    fewer = [f"{manager} {number}" for manager, number in runs.items() if number < most]
+    if fewer:
+        why = f"although fewer were requested ({', '.join(fewer)}); the first are the same"
+        notes.append(f"every manager gets {most} runs, {why}")
     drawn = list(_perturbations(runner, loaded, notes))
     where = runner.comment("experiments")
     entries: Entries = {
@@ -673,77 +851,114 @@ def _campaign(
         notes.append(
             f"{RUNNER}: nothing is drawn at random: it has no _random_interval with a width"
         )
-    elif runner_seed is None:
-        entries[("runs_per_draw",)] = (shared, runner.comment("random_interval"))
-        for path, _, around, low, high, source in drawn:
-            value = {"distribution": "uniform", "minimum": around + low, "maximum": around + high}
-            value |= (
-                {"shared": "thruster_events_shift"} if path.startswith("thruster_events") else {}
-            )
-            entries[("perturbations", path)] = (value, source)
-    else:
-        conditions = -(-most // shared)
-        if rest := most % shared:
-            last = (
-                f"the last of {conditions} conditions has {number_of(rest, 'run')} in the exemplar"
-            )
-            notes.append(f"--runner-seed: {last}, and {shared} here, like the others")
-        stream = random.Random(runner_seed)
-        draws = [
-            [stream.random() for _ in DRAWN] for _ in range(conditions)
-        ]  # of all, of empty intervals, too
-        entries[("runs",)] = (min(most, shared), f"{where}; at each of the conditions")
-        for path, number, around, low, high, source in drawn:
-            values = [around + (low + (high - low) * draw[number]) for draw in draws]
-            values = (
-                [max(0.0, value) for value in values]
-                if path.startswith("thruster_events")
-                else values
-            )
-            entries[("sweep", "zip", path)] = (
-                values,
-                f"{source}, as Python draws from seed {runner_seed}",
-            )
+        return entries
+    if runner_seed is None:
+        return {**entries, **_drawn_anew(runner, drawn)}
+    return {**entries, **_conditions(runner, drawn, most, runner_seed, notes)}
+
+
+def _drawn_anew(runner: Runner, drawn: Sequence[Draw]) -> Entries:
+    """What the runner draws as perturbations, with draws of our own."""
+    sharing = runner.settings.random_interval
+    entries: Entries = {("runs_per_draw",): (sharing, runner.comment("random_interval"))}
+    for each in drawn:
+        value = {
+            "distribution": "uniform",
+            "minimum": each.around + each.low,
+            "maximum": each.around + each.high,
+        }
+        if each.is_event:
+            value["shared"] = "thruster_events_shift"
+        entries["perturbations", each.path] = (value, each.source)
     return entries
 
 
-def _perturbations(
-    runner: Runner, loaded: LoadedScenario, notes: list[str]
-) -> Iterator[tuple[str, int, float, float, float, str]]:
-    """Yield the runner's draws: key path, number in DRAWN, what the interval is added to, its ends,
-    and its source.
+def _conditions(
+    runner: Runner, drawn: Sequence[Draw], runs: int, seed: int, notes: list[str]
+) -> Entries:
+    """What the runner draws from a seed, as conditions."""
+    sharing = runner.settings.random_interval
+    conditions = -(-runs // sharing)
+    if rest := runs % sharing:
+        last = f"the last of {conditions} conditions has {number_of(rest, 'run')} in the exemplar"
+        notes.append(f"--runner-seed: {last}, and {sharing} here, like the others")
+    stream = random.Random(seed)
+    # Of all, of empty intervals, too.
+    draws = [[stream.random() for _ in DRAWN] for _ in range(conditions)]
+    where = f"{runner.comment('experiments')}; at each of the conditions"
+    entries: Entries = {("runs",): (min(runs, sharing), where)}
+    for each in drawn:
+        values = [each.value(draw[each.number]) for draw in draws]
+        source = f"{each.source}, as Python draws from seed {seed}"
+        entries["sweep", "zip", each.path] = (values, source)
+    return entries
+
+
+class Draw(NamedTuple):
+    """A draw of the runner.
+
+    Attributes:
+        path: key path of what is drawn.
+        number: of the interval in DRAWN.
+        around: what the interval is added to.
+        low, high: the interval's ends.
+        source: where it comes from.
     """
+
+    path: str
+    number: int
+    around: float
+    low: float
+    high: float
+    source: str
+
+    @property
+    def is_event(self) -> bool:
+        """Whether it is the time of a thruster event."""
+        return self.path.startswith(_EVENTS)
+
+    def value(self, share: float) -> float:
+        """The value at a share of the interval; a time before the start is the start."""
+        value = self.around + (self.low + (self.high - self.low) * share)
+        return max(0.0, value) if self.is_event else value
+
+
+def _perturbations(runner: Runner, loaded: LoadedScenario, notes: list[str]) -> Iterator[Draw]:
+    """Yield the runner's draws; notes about intervals from which nothing is drawn."""
     for number, key in enumerate(DRAWN):
         low, high = getattr(runner.settings, key.name)
         if (low, high) == (0.0, 0.0):
             if key.name in runner.parameters:
-                notes.append(f"{runner.parameters[key.name].place}: nothing is drawn from [0, 0]")
+                notes.append(runner.note(key.name, "nothing is drawn from [0, 0]"))
             continue
-        path = key.path.removeprefix(PERTURBED)
-        paths = _drawn_paths(path, loaded)
-        if path == "thruster_events" and (not paths or path not in runner.parameters):
-            notes.append(
-                f"{runner.parameters[key.name].place}: shifts nothing: {RUNNER} has no {path}"
-            )
-            continue
-        for each in paths:
-            if (around := at(loaded, each)) is None:
-                notes.append(f"{runner.parameters[key.name].place}: {_NO_COSINE}")
-                continue
-            source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {around:g}"
-            yield each, number, around, low, high, source
+        around = _around(key.path.removeprefix(PERTURBED), runner, loaded)
+        if not around:
+            notes.append(runner.note(key.name, f"shifts nothing: {RUNNER} has no {_EVENTS}"))
+        for path, value in around.items():
+            if value is None:
+                notes.append(runner.note(key.name, _NO_COSINE))
+            elif path.startswith(_EVENTS) and value + high < 0.0:
+                notes.append(runner.note(key.name, f"{path} is always before the start, and so 0"))
+            else:
+                source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {value:g}"
+                yield Draw(path, number, value, low, high, source)
 
 
-def _drawn_paths(path: str, loaded: LoadedScenario) -> list[str]:
-    """Return the key paths of what is drawn from one of the runner's intervals: a value, or all
-    thruster events.
+def _around(path: str, runner: Runner, loaded: LoadedScenario) -> dict[str, float | None]:
+    """Return what one of the runner's intervals is added to, by key path: a value of the scenario,
+    None if it has none, or the times of the runner's thruster events, which may be before the
+    start.
     """
-    events = loaded.scenario.thruster_events
-    return (
-        [f"{path}.{index}.time_s" for index in range(len(events))]
-        if path == "thruster_events"
-        else [path]
-    )
+    if path != _EVENTS:
+        return {path: at(loaded, path)}
+    if path not in runner.parameters:
+        return {}
+    before_s = [_time_before_start_s(each) for each in runner.parameters[path].value]
+    paths = [f"{path}.{index}.time_s" for index in range(len(before_s))]
+    return {
+        each: at(loaded, each) if time_s is None else time_s
+        for each, time_s in zip(paths, before_s, strict=True)
+    }
 
 
 # YAML with comments that name the source of each value.
@@ -772,218 +987,3 @@ def _text(documents: Sequence[Layer], entries: Entries, notes: Sequence[str]) ->
 def _relative(path: Path, file: Path) -> str:
     """How a file names another: relative to its own folder."""
     return Path(os.path.relpath(path.resolve(), file.resolve().parent)).as_posix()
-
-
-# The way back, and what the exemplar cannot express.
-
-MISSION_FILE, RUNNER_FILE = "mission_config.yaml", "runner_config.yml"
-MANAGERS = ("none", "random", "metacontrol", *TREES.values())
-_NOT_COMPARED = ("name", "description", "campaign", "scenario")
-
-
-def export_config(
-    loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str | None = None
-) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Write a scenario and a campaign as the exemplar's mission and runner files. No file is
-    written.
-
-    Args:
-        campaign: content of a campaign file: managers, runs, seed, runs_per_draw, perturbations,
-            and others.
-        revision: of the exemplar that reads the files; None: the scenario's.
-
-    Returns:
-        The texts by file name, and a line for each key that the exemplar cannot express:
-        import_config would give another value.
-
-    Raises:
-        InputError: there is no such revision, or it has none of the managers.
-    """
-    revision = revision or loaded.scenario.revision.name
-    if revision not in REVISIONS:
-        remedy = did_you_mean(revision, REVISIONS, "give --revision, one of")
-        raise InputError(
-            f"the exemplar has no revision {shown(revision)}", file=loaded.path, remedy=remedy
-        )
-    if loaded.scenario.signals[WATER_VISIBILITY].publishing_period_s is None:
-        period_s = loaded.scenario.revision.monitors.visibility_publishing_period_s
-        loaded = with_values(loaded, {f"signals.{WATER_VISIBILITY}.publishing_period_s": period_s})
-    counted, runner = with_values(loaded, dict(_event_times_s(loaded, revision))), dict[str, Any]()
-    mission = _mission(counted, revision)
-    if is_since(revision, FIRST_WITH_RUNNER):
-        runner = {RUNNER: {**mission.pop(RUNNER, {}), **_runner_of(loaded, campaign, revision)}}
-    files = {
-        name: nodes for name, nodes in ((MISSION_FILE, mission), (RUNNER_FILE, runner)) if nodes
-    }
-    head = f"# Written by `suave-des export-config` from {loaded.path.name}, for revision {revision} of the exemplar.\n"
-    texts = dict[str, str]()
-    for name, nodes in files.items():
-        content = {f"/{node}": {PARAMETERS: given} for node, given in nodes.items()}
-        texts[name] = head + yaml.safe_dump(content, sort_keys=False, width=1_000_000)
-    again = import_config(
-        [parse_yaml(text, Path(name)) for name, text in texts.items()],
-        loaded.path.with_name(f"again_{loaded.path.name}"),
-        managers=MANAGERS,
-        revision=revision,
-        campaign=Path("campaign.yaml") if runner else None,
-    )
-    there = yaml.safe_load(again.campaign or "{}")
-    campaign = {key: value for key, value in campaign.items() if value not in (None, {}, [])}
-    lost = list(
-        _differences(
-            counted.scenario.model_dump(mode="json"), again.loaded.scenario.model_dump(mode="json")
-        )
-    )
-    if runner:
-        lost += _differences(campaign, there)
-    elif campaign:
-        lost.append(
-            f"{', '.join(campaign)}: the exemplar has no experiment runner before {FIRST_WITH_RUNNER}"
-        )
-    return texts, tuple(lost)
-
-
-def _event_times_s(loaded: LoadedScenario, revision: str) -> Iterator[tuple[str, float]]:
-    """The times of thruster events where a revision counts them otherwise: from the start, or one
-    by one.
-    """
-    over, before_s = _layer({"revision": Value(revision, "")}, loaded.path), 0.0
-    there = load_scenario(
-        REVISIONS[revision], over=over
-    ).scenario.revision.monitors.thruster_event_times
-    if there != loaded.scenario.revision.monitors.thruster_event_times:
-        for number, time_s in enumerate(
-            max(0.0, mean(each.time_s)) for each in loaded.scenario.thruster_events
-        ):
-            t_s = before_s + time_s if there == "after_start" else max(before_s, time_s)
-            yield (
-                f"thruster_events.{number}.time_s",
-                t_s if there == "after_start" else t_s - before_s,
-            )
-            before_s = t_s
-
-
-def _mission(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, Any]]:
-    """The parameters of each node of which the scenario has a value of their type."""
-    nodes: dict[str, dict[str, Any]] = {}
-    for key in read_by(revision):
-        value = _value(loaded, key.path, key.default)
-        # The reasoner's file is another one. What the runner does anyway may have no key in an
-        # older revision.
-        if (
-            value is not None
-            and key.node != REASONER
-            and (key.node, value) != (RUNNER, key.default)
-        ):
-            node = (
-                "random_reasoner_node"
-                if (key.node, revision) == ("task_bridge", "2023")
-                else key.node
-            )
-            nodes.setdefault(node, {})[key.name] = value
-    return nodes
-
-
-def _value(loaded: LoadedScenario, path: str, default: Any) -> Any:
-    """A value of the scenario in the type of a default, as ROS 2 demands; None if it has none."""
-    if path == "thruster_events":
-        events = loaded.scenario.thruster_events
-        times_s = [mean(each.time_s) for each in events]
-        texts = [str(int(time_s)) if time_s.is_integer() else repr(time_s) for time_s in times_s]
-        return [
-            f"({each.thruster},{each.event},{time_s})"
-            for each, time_s in zip(events, texts, strict=True)
-        ]
-    value = at(loaded, path)
-    if value is None and path.endswith((".minimum", ".maximum")):  # of another signal than a cosine
-        value = at(loaded, f"{path.rpartition('.')[0]}.value")
-    if isinstance(default, int | float) and isinstance(value, int | float):
-        return round(value) if isinstance(default, int) else float(value)
-    return (
-        value
-        if type(value) is type(default) or (default is None and isinstance(value, str))
-        else None
-    )
-
-
-def _runner_of(
-    loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str
-) -> dict[str, Any]:
-    """The parameters that only the runner has; an InputError if the exemplar has none of the
-    managers.
-    """
-    drawn, found = campaign.get("perturbations") or {}, dict[str, Any]()
-    for key in DRAWN:
-        path = key.path.removeprefix(PERTURBED)
-        added = set[tuple[float, ...]]()  # to each value; to all thruster events the same
-        for each in _drawn_paths(path, loaded):
-            value, given = at(loaded, each), drawn.get(each)
-            if (
-                isinstance(value, float)
-                and isinstance(given, dict)
-                and given["distribution"] == "uniform"
-            ):
-                added.add(tuple(round(given[bound] - value, 9) for bound in ("minimum", "maximum")))
-            else:
-                added.add(())  # nothing that the runner can draw
-        if len(added) == 1 and () not in added:
-            found[key.name] = list(*added)
-    found["random_interval"] = campaign.get("runs_per_draw", 1)
-    if is_since(revision, FIRST_WITH_BRINGUP):
-        found["random_seed"] = campaign["seed"]
-    managers = [each for each in campaign["managers"] if each in MANAGERS]
-    if not managers:
-        problem = f"the exemplar has none of the managers {', '.join(campaign['managers'])}"
-        raise InputError(problem, file=loaded.path, remedy=f"it has {', '.join(MANAGERS)}")
-    files = {
-        "mission_config_pkg": "suave_missions",
-        "mission_config_file": f"config/{MISSION_FILE}",
-    }
-    experiments = [_experiment(each, campaign["runs"], loaded, revision) for each in managers]
-    return {**found, **files, "experiments": [json.dumps(each) for each in experiments]}
-
-
-def _experiment(manager: str, runs: int, loaded: LoadedScenario, revision: str) -> dict[str, Any]:
-    is_extended = manager == "bt_extended"
-    name = manager.removesuffix("_extended")
-    launch = f"ros2 launch suave_{name} suave_{manager}.launch.py"
-    if is_since(revision, FIRST_WITH_BRINGUP):
-        launch = f"ros2 launch suave_bringup mission.launch.py adaptation_manager:={name}"
-        launch += " bt_executable:=suave_bt_extended" if is_extended else ""
-        battery = loaded.scenario.battery
-        if battery is not None and battery.mission_ends_at_level is not None:
-            launch += f" battery_constraint:=true battery_constraint_value:={battery.mission_ends_at_level!r}"
-    mission = EXTENDED if is_extended else EXTENDED.removesuffix("_extended")
-    return {
-        "experiment_launch": launch,
-        "num_runs": runs,
-        "adaptation_manager": name,
-        "mission_name": mission,
-    }
-
-
-def _differences(
-    here: Mapping[str, Any], there: Mapping[str, Any], above: str = ""
-) -> Iterator[str]:
-    """Yield a line for each key of which the exemplar has another value."""
-    for key in dict.fromkeys((*here, *there)):
-        one, other = _rounded(here.get(key)), _rounded(there.get(key))
-        if one == other or (not above and key in _NOT_COMPARED):
-            continue
-        if key == "revision" and one["name"] != other["name"]:
-            yield f"revision: {one['name']} here; the code that reads the files is {other['name']}'s"
-        elif (
-            isinstance(one, dict)
-            and isinstance(other, dict)
-            and one.get("kind") == other.get("kind")
-        ):
-            yield from _differences(one, other, f"{above}{key}.")
-        elif isinstance(one, dict) and isinstance(other, dict):
-            yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
-        else:
-            yield f"{above}{key}: {shown(one)} here, {shown(other)} in the exemplar"
-
-
-def _rounded(value: Any) -> Any:
-    """Plain data without rounding errors."""
-    return json.loads(json.dumps(value), parse_float=lambda text: float(f"{float(text):.9g}"))

@@ -130,46 +130,16 @@ def load_scenario(
     inputs: dict[str, str] = {}
     layer = scenario_layer(inputs, name, over)
     scenario = validated(layer, Scenario)
-    knowledge = scenario.knowledge
     named, by = (scenario.modes_file, layer) if modes_file is None else (modes_file, None)
     modes_layer = read_input(inputs, named, "scenarios", by, ("modes_file",))
     modes = modes_of(modes_layer)
     modes.check(scenario, layer)
-
-    def in_scenario(key: str, remedy: str | None = None) -> list[Path]:
-        names = enumerate(getattr(knowledge, key))
-        return [
-            find_named(each, "ontology", layer, ("knowledge", key, index), remedy)
-            for index, each in names
-        ]
-
-    replaced = [find_named(each, "ontology") for each in replacements.get("ontologies", ())]
-    ontologies = tuple(replaced or in_scenario("ontologies"))
-    rules = in_scenario("rules", "a file of rules as text, named relative to this")
-    rules += map(Path, replacements.get("rules", ()))
+    ontologies, rules = _knowledge_files(scenario, layer, replacements)
     inputs |= hashes((*ontologies, *rules))
-    tables = {}
-    remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
-    for signal_name, signal in scenario.signals.items():
-        if isinstance(signal, TableSignal):
-            path = find_named(
-                signal.file, "scenarios", layer, ("signals", signal_name, "file"), remedy
-            )
-            tables[signal_name], inputs[shown_name(path)] = read_table(path)
-
-    changed = {
-        "ontologies": tuple(map(str, replacements.get("ontologies", ()))) or knowledge.ontologies,
-        "rules": (*knowledge.rules, *map(str, replacements.get("rules", ()))),
-        "disabled_rules": (*knowledge.disabled_rules, *replacements.get("disabled_rules", ())),
-        "reasoner": reasoner or knowledge.reasoner,
-    }
-    update = {
-        "knowledge": knowledge.model_copy(update=changed),
-        "modes_file": str(modes_file or scenario.modes_file),
-    }
-    scenario = scenario.model_copy(update=update)
+    tables = _tables(scenario, layer, inputs)
+    scenario = _with_replaced_files(scenario, replacements)
     loaded = LoadedScenario(
-        scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, (*rules,)
+        scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, rules
     )
     loaded = _set(loaded, replacements.get("values") or {}, "--set")
     if options := replacements.get("manager_options"):
@@ -179,6 +149,56 @@ def load_scenario(
         }
         loaded = _set(loaded, {"managers": managers}, "--manager-option")
     return loaded
+
+
+def _knowledge_files(
+    scenario: Scenario, layer: Layer, replacements: Replacements
+) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Find the ontologies, those given instead of the scenario's or its own, and the files of rules,
+    the scenario's before those given besides.
+    """
+
+    def in_scenario(key: str, remedy: str | None = None) -> list[Path]:
+        names = enumerate(getattr(scenario.knowledge, key))
+        return [
+            find_named(each, "ontology", layer, ("knowledge", key, index), remedy)
+            for index, each in names
+        ]
+
+    replaced = [find_named(each, "ontology") for each in replacements.get("ontologies", ())]
+    ontologies = replaced or in_scenario("ontologies")
+    rules = in_scenario("rules", "a file of rules as text, named relative to this")
+    return tuple(ontologies), (*rules, *map(Path, replacements.get("rules", ())))
+
+
+def _tables(scenario: Scenario, layer: Layer, inputs: dict[str, str]) -> dict[str, SignalTable]:
+    """Read the tables of the signals that have one, by the signals' names; adds the files' hashes
+    to `inputs`.
+    """
+    tables = {}
+    remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
+    for name, signal in scenario.signals.items():
+        if isinstance(signal, TableSignal):
+            path = find_named(signal.file, "scenarios", layer, ("signals", name, "file"), remedy)
+            tables[name], inputs[shown_name(path)] = read_table(path)
+    return tables
+
+
+def _with_replaced_files(scenario: Scenario, replacements: Replacements) -> Scenario:
+    """Name in a scenario the files and settings that are used in place of its own, and besides."""
+    knowledge = scenario.knowledge
+    rules, disabled = replacements.get("rules", ()), replacements.get("disabled_rules", ())
+    changed = {
+        "ontologies": tuple(map(str, replacements.get("ontologies", ()))) or knowledge.ontologies,
+        "rules": (*knowledge.rules, *map(str, rules)),
+        "disabled_rules": (*knowledge.disabled_rules, *disabled),
+        "reasoner": replacements.get("reasoner") or knowledge.reasoner,
+    }
+    update = {
+        "knowledge": knowledge.model_copy(update=changed),
+        "modes_file": str(replacements.get("modes_file") or scenario.modes_file),
+    }
+    return scenario.model_copy(update=update)
 
 
 def _set(loaded: LoadedScenario, values: Mapping[str, Any], option: str) -> LoadedScenario:

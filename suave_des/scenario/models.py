@@ -119,13 +119,16 @@ class Within:
         """Bounds of a plain number; JSON Schema does not apply them to mappings."""
         return {**handler(schema), "minimum": self.ge, "maximum": self.le}
 
+    def _least(self, key: str) -> float:
+        """Least value that a distribution may state under a key; an empty one is a plain number's."""
+        # A normal distribution that is cut at the floor may have its mean below.
+        may_be_below = self.draws_are_cut or (self.is_floor and key == "mean")
+        return -self.le if key != "" and may_be_below else self.ge
+
     def _check(self, value: AnyDistribution) -> AnyDistribution:
         low, high = self.ge, self.le
         for key, part in _stated(value):
-            # A normal distribution that is cut at the floor may have its mean below.
-            least = (
-                -high if key and (self.draws_are_cut or (self.is_floor and key == "mean")) else low
-            )
+            least = self._least(key)
             if not least <= part <= high:
                 raise wrong(
                     f"{part:.12g} is out of range",
@@ -1101,8 +1104,8 @@ class Requirement(Strict):
     """A requirement that may be partially satisfied, as in RELAX (Whittle et al., Requirements
     Engineering 15, 2010).
 
-    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required,
-    and falls linearly to 0 when it is off by the tolerance.
+    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required.
+    Where it is off by d, it is 1 - d / tolerance, at least 0, or exp(-d / tolerance).
     """
 
     metric: Metric | None = None
@@ -1114,7 +1117,9 @@ class Requirement(Strict):
     value: Number
     """The required value."""
     tolerance: NotNegative = 0.0
-    """Tolerated deviation from it."""
+    """Tolerated deviation from it; 0: none."""
+    decay: Literal["linear", "exponential"] = "linear"
+    """Satisfaction falls in a line to 0 at the tolerance, or exponentially, to 0.37 there."""
 
     @model_validator(mode="after")
     def _is_about_one_thing(self) -> Self:
@@ -1130,7 +1135,11 @@ class Requirement(Strict):
         gap = {"at_least": -off, "at_most": off, "close_to": abs(off)}[self.relation]
         if gap <= 0.0:
             return 1.0
-        return max(0.0, 1.0 - gap / self.tolerance) if self.tolerance > 0.0 else 0.0
+        if self.tolerance == 0.0:
+            return 0.0
+        if self.decay == "exponential":
+            return math.exp(-gap / self.tolerance)
+        return max(0.0, 1.0 - gap / self.tolerance)
 
 
 _DEFAULT_MODES = {GENERATE_SEARCH_PATH: "fd_spiral_low", FOLLOW_PIPELINE: "fd_follow_pipeline"}
@@ -1172,7 +1181,8 @@ class Scenario(Strict):
     modes_file: FileName = "suave_modes.yaml"
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
-    """Mode that the manager none sets, by function."""
+    """Mode of a function that a manager sets where it does not choose one: `none` always, others
+    but metacontrol of functions that they do not adapt."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
     """User-defined functions, by their name in the modes file."""
     knowledge: KnowledgeSettings = KnowledgeSettings()
@@ -1185,8 +1195,8 @@ class Scenario(Strict):
     """Each has a column of its own."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
     """Requirements that may be partially satisfied, as in RELAX (Whittle et al., Requirements
-    Engineering 15, 2010). The column requirement_NAME falls from 1 to 0 where the value is off by
-    the tolerance."""
+    Engineering 15, 2010). The column requirement_NAME falls from 1 towards 0 where the value is
+    off."""
 
     @field_validator("signals", mode="after")
     @classmethod
@@ -1204,7 +1214,7 @@ class Scenario(Strict):
         return {**_DEFAULT_MODES, **value}
 
     def default_mode(self, function: str) -> str | None:
-        """The mode that the manager none sets for a function."""
+        """The mode of a function under a manager that does not choose one; None: there is none."""
         return self.default_modes.get(
             function, domain.SURFACE_MODE if function == SURFACE else None
         )
@@ -1260,17 +1270,20 @@ class Scenario(Strict):
         return (*self.metrics, *(f"requirement_{name}" for name in self.requirements))
 
     @model_validator(mode="after")
-    def _parts_fit(self) -> Self:
+    def _metrics_have_what_they_are_of(self) -> Self:
         for index, metric in enumerate(self.metrics):
             if metric in self.metrics[:index]:
                 raise wrong(f"{metric} is given twice", "name each metric once", "metrics")
         needed = {*self.metrics, *(each.metric for each in self.requirements.values())}
         if self.leak is None and "surfacing_time_s" in needed:
             raise wrong("surfacing_time_s needs a leak", "add leak: {time_s: 100}", "metrics")
-        if self.battery is None and (
-            missing := [each for each in (BATTERY_LEVEL, "recharges") if each in needed]
-        ):
-            raise wrong(f"{missing[0]} needs a battery", "add battery: {}", "metrics")
+        for of_battery in (BATTERY_LEVEL, "recharges"):
+            if self.battery is None and of_battery in needed:
+                raise wrong(f"{of_battery} needs a battery", "add battery: {}", "metrics")
+        return self
+
+    @model_validator(mode="after")
+    def _attributes_are_measured_once(self) -> Self:
         measured = {*self.signals, *((BATTERY_LEVEL,) if self.battery is not None else ())}
         for name, each in self.requirements.items():
             if each.attribute is not None and each.attribute not in measured:

@@ -209,6 +209,25 @@ def modes_of(document: Layer) -> ModeTable:
         InputError: with file and line: an entry or mode of another form, an unknown part,
             an undefined mode of a node, missing ros__parameters, a parameter of the wrong kind.
     """
+    keys = _bare_names(document)
+    content = validated(document, dict[str, _Entry])
+    entries = {name: content[key].ros__parameters for name, key in keys.items()}
+    nodes = {
+        name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)
+    }
+    functions: dict[str, Mapping[str, Mode]] = {}
+    for name, entry in entries.items():
+        if isinstance(entry, _System):
+            functions |= _function(document, name, keys, entry, nodes)
+    if not functions:
+        raise document.error(
+            "defines no function", (), "a function is an entry with type: system, parts and modes"
+        )
+    return ModeTable(str(document.path), functions)
+
+
+def _bare_names(document: Layer) -> dict[str, str]:
+    """The entries' keys, by their names without a leading slash."""
     keys: dict[str, str] = {}
     for key in document.data:
         name = key.removeprefix("/")
@@ -217,33 +236,31 @@ def modes_of(document: Layer) -> ModeTable:
                 f"{name} appears twice, once with a leading slash", (key,), "keep one entry"
             )
         keys[name] = key
-    content = validated(document, dict[str, _Entry])
-    entries = {name: content[key].ros__parameters for name, key in keys.items()}
-    nodes = {
-        name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)
+    return keys
+
+
+def _function(
+    document: Layer,
+    name: str,
+    keys: Mapping[str, str],
+    system: _System,
+    nodes: Mapping[str, _NodeModes],
+) -> dict[str, Mapping[str, Mode]]:
+    """The modes of a system by its name, if its parts are nodes."""
+    path: KeyPath = (keys[name], "ros__parameters")
+    parts = [part.removeprefix("/") for part in system.parts]
+    for part in parts:
+        if part not in keys:
+            remedy = did_you_mean(part, keys, "defined")
+            raise document.error(f"unknown part {shown(part)} of {name}", (*path, "parts"), remedy)
+    if not all(part in nodes for part in parts):
+        return {}
+    known = {part: nodes[part] for part in parts}
+    modes = {
+        mode: _mode(document, (*path, "modes", mode), states, known)
+        for mode, states in system.modes.items()
     }
-    functions: dict[str, Mapping[str, Mode]] = {}
-    for name, system in entries.items():
-        if isinstance(system, _Node):
-            continue
-        path: KeyPath = (keys[name], "ros__parameters")
-        parts = [part.removeprefix("/") for part in system.parts]
-        if unknown := [part for part in parts if part not in keys]:
-            remedy = did_you_mean(unknown[0], keys, "defined")
-            raise document.error(
-                f"unknown part {shown(unknown[0])} of {name}", (*path, "parts"), remedy
-            )
-        if all(part in nodes for part in parts):
-            known = {part: nodes[part] for part in parts}
-            functions[name] = {DEFAULT_MODE: Mode(DEFAULT_MODE, False, {})} | {
-                mode: _mode(document, (*path, "modes", mode), states, known)
-                for mode, states in system.modes.items()
-            }
-    if not functions:
-        raise document.error(
-            "defines no function", (), "a function is an entry with type: system, parts and modes"
-        )
-    return ModeTable(str(document.path), functions)
+    return {name: {DEFAULT_MODE: Mode(DEFAULT_MODE, False, {}), **modes}}
 
 
 def _mode(

@@ -485,19 +485,21 @@ def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
             here = here[key]
         elif isinstance(here, list) and isinstance(key, int):
             here = here[key] if key < len(here) else None
-        else:
-            is_inside_text = (
-                isinstance(here, str) and key != "number"
-            )  # of a thruster event, and not a tag
-            if not is_inside_text and not (
-                detail["type"] == "missing" and key == detail["loc"][-1]
-            ):
-                continue
+        elif not _is_key_of_nothing(detail, here, key):
+            continue
         path.append(key)
     context = detail.get("ctx", {})
     given = context.get("keys", context.get("discriminator", "").strip("'")).split()
     candidates: list[KeyPath] = [(*path, key) for key in given if (*path, key) in layer.places]
     return min(candidates, key=lambda candidate: layer.place(candidate).depth, default=tuple(path))
+
+
+def _is_key_of_nothing(detail: ErrorDetails, here: Any, key: str | int) -> bool:
+    """Whether a part of pydantic's location that is nowhere in the data is a key: one that is
+    missing, or one inside the text of a thruster event, and not the tag of a union's member.
+    """
+    is_missing = detail["type"] == "missing" and key == detail["loc"][-1]
+    return is_missing or (isinstance(here, str) and key != "number")
 
 
 def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:

@@ -58,7 +58,9 @@ CALLER = "caller"
 
 
 class CallerManages(NoManager):
-    """Leaves adaptation to the caller; a task begins with the default modes of its functions."""
+    """Leaves adaptation to the caller; a task, and the mission, begins with the default modes of
+    its functions.
+    """
 
     subscribes_to: ClassVar[Collection[Kind]] = ()
 

@@ -19,7 +19,8 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.resources import shipped_folder
 from suave_des.results.figures import draw_folder
-from suave_des.scenario.exemplar import REVISIONS, import_config
+from suave_des.scenario.exemplar import import_config
+from suave_des.scenario.exemplar_keys import REVISIONS
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.command import ends_within

@@ -154,7 +154,9 @@ class TestSuaveFormat:
                 "pipeline found",
             ),
             *("time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"),
+            "run_idx",
         ]
+        assert [row["run_idx"] for row in theirs] == ["1", "2"]
         assert (theirs[0]["mission name"], theirs[1]["datetime"]) == (
             "suave none",
             "01-Jan-2000-00-00-02",

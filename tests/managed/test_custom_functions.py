@@ -57,16 +57,16 @@ class Lights(CustomFunction):
 
 @pytest.fixture
 def fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Flies a mission of a scenario given as text, under the manager none."""
+    """Flies a mission of a scenario given as text."""
     monkeypatch.chdir(tmp_path)
     shipped = load_scenario("seams2023").modes_path.read_text(encoding="utf-8")
     (tmp_path / "modes.yaml").write_text(shipped + MODES, encoding="utf-8")
 
-    def run(text: str) -> MissionResult:
+    def run(text: str, manager: str = "none") -> MissionResult:
         (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
         simulator = Simulator(load_scenario("mine.yaml"))
-        first = simulator.run("none", run=1, seed=1, record=True)
-        assert simulator.run("none", run=1, seed=1, record=True) == first
+        first = simulator.run(manager, run=1, seed=1, record=True)
+        assert simulator.run(manager, run=1, seed=1, record=True) == first
         return first
 
     return run
@@ -84,10 +84,38 @@ def test_a_function_is_active_while_the_task_lasts_that_needs_it(fly):
     assert (off.event, off.t_s) == ("lights_off", over_s + 0.5)
 
 
-def test_a_function_that_is_needed_all_the_time_belongs_to_no_task(fly):
-    assert (
-        of_lights(fly(NAMED.replace("search_pipeline", "mission_wide"))) == []
-    )  # none sets modes of tasks only
+@pytest.mark.parametrize(
+    ("manager", "on_by_s"),
+    [
+        ("none", 0.5),
+        ("fixed:fd_spiral_low", 0.5),
+        ("fixed:fd_dim", 0.5),
+        ("random", 0.5),
+        ("threshold", 2.5),  # its first cycle
+        ("oracle", 0.0),
+        ("bt", 0.6),  # its first tick
+        ("bt_extended", 0.6),
+    ],
+)
+def test_a_function_of_the_whole_mission_gets_its_default_mode_at_the_start_and_keeps_it(
+    fly, manager, on_by_s
+):
+    result = fly(NAMED.replace("search_pipeline", "mission_wide"), manager)
+    (on,) = of_lights(result)
+    assert on.event == "lights_on" and on.t_s <= on_by_s
+
+
+@pytest.mark.parametrize("manager", ["threshold", "oracle", "bt", "bt_extended"])
+def test_managers_that_adapt_leave_a_function_that_they_do_not_know_in_its_default_mode(
+    fly, manager
+):
+    on, off = of_lights(fly(NAMED, manager))
+    assert (on.event, off.event) == ("lights_on", "lights_off")
+
+
+def test_the_caller_finds_a_function_of_the_whole_mission_in_its_default_mode(fly):
+    fly(NAMED.replace("search_pipeline", "mission_wide"))
+    assert Mission("mine.yaml").mode_manager.current_mode("f_lights") == "fd_dim"
 
 
 def test_the_mission_itself_stays_the_same(fly):

@@ -11,7 +11,7 @@ from suave_des.registry import is_built_in, manager_class
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import support
 from suave_des.simulation.simulator import Simulator
-from tests.helpers.managers_at_work import FOLLOW, MODES, MOTION, SEARCH, AtWork
+from tests.helpers.managers_at_work import FOLLOW, MODES, SEARCH, AtWork
 
 BOTH = pytest.mark.parametrize("revision", ["2023", "1.5"])
 
@@ -71,7 +71,7 @@ def test_random_picks_among_all_modes_with_equal_chance(revision, task, function
 def test_random_leaves_maintain_motion_alone(revision):
     at_work = AtWork("random", revision)
     at_work.request("search_pipeline")
-    assert all(function != MOTION for _ in range(100) for function, _ in at_work.adapt())
+    assert {function for _ in range(100) for function, _ in at_work.adapt()} == {SEARCH}
 
 
 @BOTH
@@ -116,9 +116,6 @@ def test_in_a_mission_of_2023_randoms_search_is_ungrounded_before_the_coordinato
     ]
     assert (requests[0].t_s, requests[0].detail) == (detected_s, f"{SEARCH} -> fd_unground")
     assert detected_s < done_s <= detected_s + 1.0
-
-
-SEARCH = "f_generate_search_path"
 
 
 def requests(manager: str, scenario: str = "seams2023", run: int = 1) -> list[tuple[float, str]]:
@@ -196,6 +193,20 @@ def test_oracle_sees_that_a_threshold_itself_is_reached():
         each.t_s for each in events if each.detail == "f_generate_search_path = fd_spiral_high"
     ]
     assert high_s == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("step_s", [39.8, 40.4])
+def test_oracle_watches_until_the_mission_ends(step_s):
+    """Its time limit is looked at twice a second: in this run at 40.44 s."""
+    values = {
+        "mission.time_limit_s": 40.0,
+        "start.y_m": 300.0,  # where no pipeline is
+        "signals.water_visibility": {"kind": "step", "time_s": step_s, "before": 3, "after": 1},
+    }
+    events = run_mission("seams2023", "oracle", 3, 1, values=values).events
+    assert next(each.t_s for each in events if each.event == "mission_ended") > 40.43
+    (low_s,) = [each.t_s for each in events if each.detail == f"{SEARCH} = fd_spiral_low"]
+    assert low_s == pytest.approx(step_s)
 
 
 def test_oracle_takes_no_time_to_recover_a_thruster():

@@ -155,6 +155,27 @@ def test_satisfaction_falls_in_a_line_over_the_tolerance(relation, measured, deg
     assert requirement.satisfaction(measured) == pytest.approx(degree)
 
 
+@pytest.mark.parametrize(
+    ("relation", "measured", "tolerance", "degree"),
+    [
+        ("at_most", 130.0, 40.0, 0.7788008),  # exp(-1/4)
+        ("at_most", 160.0, 40.0, 0.3678794),  # exp(-1)
+        ("at_least", 60.0, 40.0, 0.2231302),  # exp(-3/2)
+        ("close_to", 120.0, 40.0, 1.0),
+        ("close_to", 121.0, 0.0, 0.0),
+    ],
+)
+def test_satisfaction_may_fall_exponentially(relation, measured, tolerance, degree):
+    requirement = Requirement(
+        metric="search_time_s",
+        relation=relation,
+        value=120.0,
+        tolerance=tolerance,
+        decay="exponential",
+    )
+    assert requirement.satisfaction(measured) == pytest.approx(degree, abs=1e-7)
+
+
 @pytest.fixture
 def mission(tmp_path):
     def fly(text: str, manager: str = "none", run: int = 3):

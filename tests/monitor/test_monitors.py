@@ -12,11 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.clock import call_at
+from suave_des.draws import Streams
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryMeasurements, Measurements, Timing
+from suave_des.monitor.measurements import (
+    BatteryMeasurements,
+    Measurements,
+    Timing,
+    message_loss,
+)
 from suave_des.monitor.monitors import start_monitors
 from suave_des.monitor.thrusters import thruster_monitor
-from suave_des.scenario.models import ThrusterEvent
+from suave_des.scenario.models import Monitor, ThrusterEvent
 from suave_des.world.signals import constant, sinusoid, step
 from tests.helpers.stand_ins import PlacedVehicle
 
@@ -138,6 +144,37 @@ def test_a_lost_message_is_not_the_next_one():
     assert [measured.next_message_s(t_s) for t_s in (0.2, 0.3, 3.2, 4.3)] == pytest.approx(
         [0.2, 3.2, 3.2, math.inf]
     )
+
+
+def lost(probability: float, *outages_s: tuple[float, float]) -> list[bool]:
+    """Which of the messages at 0, 1, 2, ... s are lost in a run."""
+    monitor = Monitor(dropout_probability=probability, outages_s=outages_s)
+    is_lost = message_loss("signals.v", monitor, Streams(1, 1))
+    return [is_lost(float(t_s)) for t_s in range(2000)]
+
+
+def test_no_loss_is_no_question():
+    assert message_loss("signals.v", Monitor(), Streams(1, 1)) is None
+
+
+@pytest.mark.parametrize("probability", [0.1, 0.7])
+def test_messages_are_lost_with_their_probability(probability):
+    # Four standard deviations of a share of 2000: 0.041 and less.
+    assert sum(lost(probability)) / 2000 == pytest.approx(probability, abs=0.041)
+
+
+def test_all_messages_of_an_outage_are_lost_with_its_ends_and_no_other():
+    missing = [t_s for t_s, is_lost in enumerate(lost(0.0, (60.0, 62.0), (80.0, 80.5))) if is_lost]
+    assert missing == [60, 61, 62, 80]
+
+
+def test_an_outage_changes_no_other_message():
+    during = range(100, 201)
+    chance, both = lost(0.3), lost(0.3, (100.0, 200.0))
+    assert [both[t_s] for t_s in during] == [True] * 101
+    assert [is_lost for t_s, is_lost in enumerate(both) if t_s not in during] == [
+        is_lost for t_s, is_lost in enumerate(chance) if t_s not in during
+    ]
 
 
 def test_signal_monitor_publishes_measurements_at_their_times(subscriber):

@@ -150,6 +150,19 @@ def test_files_of_the_exemplar_that_were_put_together_are_read(write):
     assert runs.frame.index.tolist() == [2, 5]
 
 
+@pytest.mark.parametrize(
+    ("indices", "runs", "seeds"),
+    [((4, 7), [4, 7], ["suave", "suave"]), ((4, 4), [], ["", ""])],
+    ids=["each once", "one twice"],
+)
+def test_run_idx_numbers_the_exemplars_missions_if_each_has_a_number_of_its_own(
+    write, indices, runs, seeds
+):
+    rows = [f"{OF_1_5.format('bt', True, 87, 40.25, 0.5)},{index}" for index in indices]
+    frame = read_runs(write("results.csv", "\n".join([f"{HEADER_1_5},run_idx", *rows]))).frame
+    assert (frame["run"].dropna().tolist(), frame["seed"].tolist()) == (runs, seeds)
+
+
 def test_an_error_below_a_repeated_header_names_its_own_line(write):
     path = write(
         "results.csv",

@@ -302,6 +302,21 @@ def test_that_most_missions_did_not_find_the_pipeline_comes_first():
     ).conclusion.startswith("The pipe")
 
 
+def test_the_exemplars_missions_are_paired_by_run_idx_whatever_their_order(tmp_path):
+    times_s = {"none": [100, 120, 140, 160, 180, 200], "bt": [91, 112, 133, 154, 175, 196]}
+    header = (
+        "mission name,pipeline found,time searching pipeline (s),distance inspected (m),run_idx"
+    )
+    for manager, order in (("none", 1), ("bt", -1)):
+        lines = [f"suave {manager},True,{t_s},9.5,{n}" for n, t_s in enumerate(times_s[manager])]
+        file = tmp_path / f"{manager}_suave.csv"
+        file.write_text("\n".join([header, *lines[::order]]), encoding="utf-8")
+    found = difference(compare_folders([tmp_path]), "none", "bt")
+    assert (found.paired, found.n) == (True, 6)
+    assert found.why == "paired by run_idx, as the exemplar's own test does"
+    assert found.p == stats.wilcoxon(times_s["none"], times_s["bt"]).pvalue == 2 / 2**6
+
+
 def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(campaign):
     times = pandas.read_csv(campaign / "runs.csv").pivot(
         index="run", columns="manager", values="search_time_s"

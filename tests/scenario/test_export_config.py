@@ -11,13 +11,9 @@ from hypothesis import strategies as st
 
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import (
-    MISSION_FILE,
-    REVISIONS,
-    RUNNER_FILE,
-    export_config,
-    import_config,
-)
+from suave_des.scenario.exemplar import import_config
+from suave_des.scenario.exemplar_export import MISSION_FILE, RUNNER_FILE, export_config
+from suave_des.scenario.exemplar_keys import REVISIONS
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.yamlfile import parse_yaml
 
@@ -156,6 +152,73 @@ def test_times_of_thruster_events_are_written_as_the_other_revision_counts_them(
     assert "thruster_events" not in "\n".join(lost)
 
 
+UNIFORM_S = {"distribution": "uniform", "minimum": 30.0, "maximum": 50.0}
+
+
+class TestTimesOfThrusterEvents:
+    @pytest.mark.parametrize(("revision", "of_second"), [("1.4", 0), ("1.5", 15)])
+    def test_that_are_random_are_told_to_be_lost_wherever_a_mean_is_written(
+        self, revision, of_second
+    ):
+        events = [
+            {"thruster": 1, "event": "failure", "time_s": UNIFORM_S},
+            {"thruster": 2, "event": "failure", "time_s": 15},
+        ]
+        loaded = with_values(load_scenario("planta_exp1"), {"thruster_events": events})
+        texts, lost = export_config(loaded, {"managers": ["bt"], "runs": 1, "seed": 1}, revision)
+        (line,) = [each for each in lost if each.startswith("thruster_events")]
+        assert "'distribution': 'uniform'" in line or "'thruster': 1" in line
+        written = yaml.safe_load(texts[MISSION_FILE])["/thruster_monitor"]["ros__parameters"]
+        assert written["thruster_events"] == ["(1,failure,40)", f"(2,failure,{of_second})"]
+
+    def test_of_one_that_waits_for_the_one_before_follow_at_once(self):
+        events = ["(1,failure,60)", "(2,failure,20)", "(3,failure,70)"]
+        loaded = with_values(load_scenario("planta_exp1"), {"thruster_events": events})
+        texts, _ = export_config(loaded, {"managers": ["bt"], "runs": 1, "seed": 1}, "1.4")
+        written = yaml.safe_load(texts[MISSION_FILE])["/thruster_monitor"]["ros__parameters"]
+        assert written["thruster_events"] == ["(1,failure,60)", "(2,failure,0)", "(3,failure,10)"]
+
+    def test_that_are_cut_at_the_start_keep_their_distribution(self):
+        loaded = with_values(BLANK["1.5"], {"thruster_events": ["(1,failure,0)", "(2,failure,10)"]})
+        drawn = {**UNIFORM_S, "shared": "thruster_events_shift"}
+        perturbed = {
+            "thruster_events.0.time_s": {**drawn, "minimum": -20.0, "maximum": 20.0},
+            "thruster_events.1.time_s": {**drawn, "minimum": 10.0, "maximum": 50.0},
+        }
+        campaign = {"managers": ["bt"], "runs": 1, "seed": 1, "perturbations": perturbed}
+        texts, lost = export_config(loaded, {**campaign, "runs_per_draw": 5})
+        runner = yaml.safe_load(texts[RUNNER_FILE])["/suave_runner_node"]["ros__parameters"]
+        assert runner["thruster_events"] == ["(1,failure,-20)", "(2,failure,10)"]
+        assert (runner["thruster_events_random_interval"], lost) == ([0, 40], ())
+
+    def test_that_a_campaign_draws_otherwise_for_each_are_told(self):
+        loaded = with_values(BLANK["1.5"], {"thruster_events": ["(1,failure,5)", "(2,failure,10)"]})
+        perturbed = {
+            "thruster_events.0.time_s": UNIFORM_S,
+            "thruster_events.1.time_s": UNIFORM_S,
+        }
+        campaign = {"managers": ["bt"], "runs": 1, "seed": 1, "perturbations": perturbed}
+        texts, lost = export_config(loaded, campaign)
+        assert "random_interval: [" not in texts[RUNNER_FILE].replace("\n", "")
+        assert lost[0].startswith("perturbations: {'thruster_events.0.time_s'")
+
+    def test_that_a_campaign_draws_are_told_where_another_revision_counts_otherwise(self):
+        """Each shift would count once there, and here for all events that follow."""
+        events = ["(1,failure,35)", "(2,failure,50)"]
+        loaded = with_values(BLANK["1.4"], {"thruster_events": events})
+        shared = {"distribution": "uniform", "shared": "thruster_events_shift"}
+        perturbed = {
+            "thruster_events.0.time_s": {**shared, "minimum": 30.0, "maximum": 40.0},
+            "thruster_events.1.time_s": {**shared, "minimum": 45.0, "maximum": 55.0},
+        }
+        campaign = {"managers": ["bt"], "runs": 1, "seed": 100, "perturbations": perturbed}
+        campaign["runs_per_draw"] = 5
+        assert export_config(loaded, campaign, "1.4")[1] == ()
+        texts, lost = export_config(loaded, campaign, "1.5")
+        assert "thruster_events_random_interval" not in texts[RUNNER_FILE]
+        assert any(line.startswith("perturbations: ") for line in lost)
+
+
 class TestWhatTheExemplarCannotExpress:
     def test_is_named_for_the_shipped_scenarios(self):
         assert lost_lines("release15").startswith("battery: nothing here")
@@ -184,8 +247,8 @@ class TestWhatTheExemplarCannotExpress:
         ("values", "words"),
         [
             (
-                {"mission.time_limit_s": 240.5},
-                "mission.time_limit_s: 240.5 here, 240.0 in the exemplar",
+                {"mission.time_limit_s": 240.7},
+                "mission.time_limit_s: 240.7 here, 241.0 in the exemplar",
             ),
             (
                 {"start.x_m": {"distribution": "uniform", "minimum": -3, "maximum": -2}},
@@ -199,6 +262,7 @@ class TestWhatTheExemplarCannotExpress:
                 },
                 "thruster_e",
             ),
+            ({"current.wave": {"mean_m_per_s": 0.1}}, "current.wave: {"),
             ({"current.x_m_per_s": 0.1}, "current.x_m_per_s: 0.1 here, 0.0 in the exemplar"),
             ({"signals.water_visibility.noise": 0.1}, "signals.water_visibility.noise: 0.1 here"),
             (

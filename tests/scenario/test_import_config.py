@@ -9,7 +9,8 @@ import yaml
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import REVISIONS, import_config
+from suave_des.scenario.exemplar import import_config
+from suave_des.scenario.exemplar_keys import EXPERIMENT, PATHS, REVISIONS, is_read
 from suave_des.scenario.loader import load_scenario
 from tests.helpers import rows_of
 
@@ -78,7 +79,7 @@ RUNNER_15 = """\
       - '{"experiment_launch": "ros2 launch x", "num_runs": 20, "adaptation_manager": "none", "mission_name": "suave"}'
       - '{"num_runs": 20, "adaptation_manager": "metacontrol"}'
 """
-EXPERIMENT = '{"num_runs": 20, "adaptation_manager": "metacontrol"}'
+LAST_EXPERIMENT = '{"num_runs": 20, "adaptation_manager": "metacontrol"}'
 LINE_PATTERN = re.compile(r"^    (\w+):")
 
 
@@ -122,11 +123,36 @@ def notes_about(result, words: str) -> list[str]:
     return [note for note in result.notes if words in note]
 
 
+def revision_of_file(file: Path) -> str:
+    """The revision that a file of the exemplar is of, by its name."""
+    if file.name == "planta_runner_config.yml":
+        return "1.4"
+    return next((each for each in ("1.2", "1.3", "1.4", "1.5") if f"v{each}" in file.name), "2025")
+
+
+NOT_READ = {"adapt_period", "f_generate_search_path_mode", "f_follow_pipeline_mode"}
+"""Keys that files have although the code of their revision reads them elsewhere, or no longer."""
+
+
 class TestUpstreamFiles:
     @pytest.mark.parametrize("file", sorted(UPSTREAM.glob("*.y*ml")), ids=lambda file: file.name)
+    def test_have_no_key_that_is_not_in_the_table_with_their_revision(self, file):
+        content, revision = yaml.safe_load(file.read_text()), revision_of_file(file)
+        keys = [
+            (entry.removeprefix("/"), name, given)
+            for entry, node in content.items()
+            for name, given in node["ros__parameters"].items()
+        ]
+        named = {(node, name) for node, name, _ in keys}
+        for *_, given in (each for each in keys if each[1] == "experiments"):
+            named |= {(EXPERIMENT, name) for each in given for name in json.loads(each)}
+        assert named <= PATHS.keys()
+        unread = {name for node, name in named if not is_read(node, name, revision)}
+        assert unread <= NOT_READ
+
+    @pytest.mark.parametrize("file", sorted(UPSTREAM.glob("*.y*ml")), ids=lambda file: file.name)
     def test_import_with_every_key_read_or_named(self, imported, file):
-        wanted = next((each for each in ("1.2", "1.4", "1.5") if f"v{each}" in file.name), "2025")
-        wanted = "1.4" if file.name == "planta_runner_config.yml" else wanted
+        wanted = revision_of_file(file)
         is_runner = "runner_config" in file.name
         result = imported(file.read_text(), campaign=is_runner, revision=wanted)
         text = "\n".join((result.scenario, result.campaign or "", *result.notes))
@@ -235,10 +261,55 @@ class TestValues:
         )
         assert (mine().mission.time_limit_s, mine().battery.discharge_time_s) == (120, 90)
 
-    def test_of_events_before_the_start_are_at_the_start(self, imported):
-        text = "thruster_monitor: {ros__parameters: {thruster_events: ['(1,failure,-5.5)', '', '(2,failure,3)']}}\n"
+    def test_given_to_every_node_reach_each_that_has_the_name(self, imported):
+        result = imported(
+            "/**: {ros__parameters: {qa_publishing_period: 0.7, f_generate_search_path_mode: fd_spiral_high}}\n"
+        )
+        visibility, battery = mine().signals["water_visibility"], mine().battery
+        assert (visibility.publishing_period_s, battery.publishing_period_s) == (0.7, 0.7)
+        # That mission_node no longer reads the mode is no news: task_bridge does.
+        assert mine().default_modes["f_generate_search_path"] == "fd_spiral_high"
+        assert not notes_about(result, "**")
+
+    def test_of_a_node_of_its_own_count_over_those_of_every_node(self, imported):
+        every = "/**: {ros__parameters: {qa_publishing_period: 0.7}}\n"
+        result = imported(
+            f"{every}/battery_monitor: {{ros__parameters: {{qa_publishing_period: 2.0}}}}\n"
+        )
+        visibility, battery = mine().signals["water_visibility"], mine().battery
+        assert (visibility.publishing_period_s, battery.publishing_period_s) == (0.7, 2)
+        assert notes_about(result, "the node's value counts (given0.yaml: line 2, battery_monitor")
+
+    def test_given_to_every_node_of_a_mission_are_not_the_runner_s(self, imported):
+        imported("/**: {ros__parameters: {water_visibility_sec_shift: 20.0, gui: true}}\n")
+        assert mine().signals["water_visibility"].shift_s == 20
+
+    def test_given_to_every_node_of_a_runner_s_file_are_the_runner_s_too(self, imported):
+        runner = RUNNER_15.replace("    water_visibility_sec_shift: 0\n", "")
+        result = imported(
+            runner + "/**: {ros__parameters: {water_visibility_sec_shift: 7.0}}\n", campaign=True
+        )
+        drawn = content_of(result)["perturbations"]["signals.water_visibility.shift_s"]
+        assert (drawn["minimum"], drawn["maximum"]) == (-33, 47)
+
+    def test_given_to_every_node_without_one_that_has_the_name_are_told(self, imported):
+        result = imported("/**: {ros__parameters: {time_limit: 120, time_limits: 3}}\n")
+        (note,) = notes_about(result, "time_limits")
+        assert (
+            note
+            == "given0.yaml: line 1, **: not imported: time_limits: no node of this file has it"
+        )
+
+    @pytest.mark.parametrize("time_s", ["-5.5", "-.5", "-5e+1", "-0"])
+    def test_of_events_before_the_start_are_at_the_start(self, imported, time_s):
+        text = f"thruster_monitor: {{ros__parameters: {{thruster_events: ['(1,failure,{time_s})', '', '(2,failure,3)']}}}}\n"
         imported(text)
         assert [each.time_s for each in mine().thruster_events] == [0, 3]
+
+    def test_of_an_event_are_at_its_own_line_though_there_is_an_empty_one_before(self, imported):
+        events = "      - '(1,failure,5)'\n      - ''\n      - '(9,failure,3)'\n"
+        text = f"thruster_monitor:\n  ros__parameters:\n    thruster_events:\n{events}"
+        assert refused(imported, text).place.startswith("line 6, ")
 
     def test_each_say_where_they_come_from(self, imported):
         lines = imported(MISSION_2023, revision=None).scenario.splitlines()
@@ -268,6 +339,61 @@ class TestValues:
         (note,) = notes_about(result, "mission_node.f_generate_search_path_mode")
         assert "revision 1.5 reads task_bridge.f_generate_search_path_mode" in note
         assert mine().default_modes["f_generate_search_path"] == "fd_spiral_high"
+
+
+CURRENT = "water_current: {ros__parameters: {mean: 0.1, amplitude: 0.05, period: 60, sec_shift: 4, direction: 1.5}}\n"
+
+
+class TestCurrent:
+    """HEAD's runner switches a current on."""
+
+    def with_switch(self, imported, switch, current=CURRENT):
+        runner = RUNNER_15.replace("    random_seed", f"{switch}    random_seed")
+        return imported(runner + current, revision=None)
+
+    def test_of_head_is_a_wave(self, imported):
+        result = self.with_switch(imported, "    enable_water_current: true\n")
+        wave = mine().current.wave
+        assert (wave.mean_m_per_s, wave.amplitude_m_per_s) == (0.1, 0.05)
+        assert (wave.period_s, wave.shift_s, wave.direction_rad) == (60, 4, 1.5)
+        assert notes_about(result, "water_current.mean: read as current.wave.mean_m_per_s")
+
+    def test_of_a_mission_s_file_needs_no_switch(self, imported):
+        result = imported(CURRENT, revision=None)
+        assert (result.why, mine().current.wave.period_s) == (
+            "only revision 1.5 has water_current",
+            60,
+        )
+
+    def test_of_a_mission_s_file_leaves_all_else_as_the_base_has_it(self, imported):
+        imported(CURRENT, revision=None)
+        same = {"name", "description", "current"}
+        base = load_scenario("release15").scenario
+        assert mine().model_dump(exclude=same) == base.model_dump(exclude=same)
+
+    @pytest.mark.parametrize("switch", ["    enable_water_current: false\n", ""])
+    def test_that_is_not_switched_on_is_told(self, imported, switch):
+        result = self.with_switch(imported, switch)
+        assert mine().current.wave is None
+        assert len(notes_about(result, "enable_water_current is not true")) == 5
+
+    @pytest.mark.parametrize(
+        ("switch", "current", "place", "problem"),
+        [
+            (
+                "true",
+                CURRENT.replace("mean", "speed"),
+                "line 19, water_current.speed",
+                "known keys",
+            ),
+            ("true", "", "line 6, suave_runner_node.enable_water_current", "known keys"),
+            ("often", CURRENT, "line 6, suave_runner_node.enable_water_current", "not a boolean"),
+        ],
+    )
+    def test_that_cannot_be_read_is_refused(self, imported, switch, current, place, problem):
+        with pytest.raises(InputError, match=problem) as caught:
+            self.with_switch(imported, f"    enable_water_current: {switch}\n", current)
+        assert caught.value.place == place
 
 
 class TestRevision:
@@ -402,7 +528,7 @@ class TestCampaign:
             ),
             ("[-40, 40]", "[40, -40]", "line 9, ", "the beginning 40 is above the end -40"),
             (
-                EXPERIMENT,
+                LAST_EXPERIMENT,
                 '{"adaptation_manager": "bt"}',
                 "line 17, ",
                 "experiments[1].num_runs: is missing",
@@ -421,6 +547,30 @@ class TestCampaign:
         error = refused(imported, text, campaign=True)
         assert error.place.startswith(place)
         assert words in str(error)
+
+    def test_shifts_events_first_and_cuts_them_at_the_start_afterwards(self, imported):
+        runner = RUNNER_15.replace("(1,failure,35)", "(1,failure,-4)")
+        drawn = content_of(imported(runner, campaign=True))["perturbations"]
+        assert mine().thruster_events[0].time_s == 0
+        first = drawn["thruster_events.0.time_s"]
+        assert (first["minimum"], first["maximum"]) == (-9, 11)
+
+    def test_tells_an_event_that_no_shift_brings_after_the_start(self, imported):
+        runner = RUNNER_15.replace("(1,failure,35)", "(1,failure,-15.5)")
+        result = imported(runner, campaign=True)
+        assert "thruster_events.0.time_s" not in content_of(result)["perturbations"]
+        assert notes_about(result, "thruster_events.0.time_s is always before the start")
+
+    def test_of_two_files_must_not_contradict(self, imported):
+        other = RUNNER_15.replace("random_seed: 100", "random_seed: 101")
+        error = refused(imported, RUNNER_15, other, campaign=True)
+        assert (error.file, error.place) == ("given1.yaml", "line 6, suave_runner_node.random_seed")
+
+    def test_may_be_in_two_files(self, imported):
+        first, experiments = RUNNER_15.split("    experiments:")
+        second = f"suave_runner_node:\n  ros__parameters:\n    experiments:{experiments}"
+        content = content_of(imported(first, second, campaign=True))
+        assert (content["managers"], content["seed"]) == (["none", "metacontrol"], 100)
 
     def test_needs_a_runner_with_experiments(self, imported):
         assert "no node suave_runner_node" in refused(imported, MISSION_15, campaign=True).problem
@@ -455,6 +605,11 @@ class TestExperiments:
             assert (
                 content_of(self.with_experiments(imported, first, second))["managers"] == managers
             )
+
+    @pytest.mark.parametrize("numbers", [(5, 20), (20, 5)])
+    def test_of_one_manager_give_it_the_greatest_number_of_missions(self, imported, numbers):
+        given = [json.dumps({"num_runs": each, "adaptation_manager": "none"}) for each in numbers]
+        assert content_of(self.with_experiments(imported, *given))["runs"] == 20
 
     @pytest.mark.parametrize(
         ("experiment", "words"),
@@ -545,6 +700,14 @@ class TestRunnerSeed:
                 round(time_s, 2) for time_s in values[f"thruster_events.{event}.time_s"]
             ] == failures_s
 
+    def test_cuts_times_before_the_start(self, imported):
+        study = STUDY_OF_2025.replace("(1,failure,100)", "(1,failure,-10)")
+        times_s = content_of(imported(study, campaign=True, runner_seed=100))["sweep"]["zip"]
+        # The shifts are 46.39, -8.81, -38.12, -30.60, 11.08, -75.18 s: see above.
+        assert [round(time_s, 2) for time_s in times_s["thruster_events.0.time_s"]] == [
+            *(36.39, 0, 0, 0, 1.08, 0)
+        ]
+
     def test_tells_what_differs(self, imported):
         result = imported(STUDY_OF_2025.replace("30", "12"), campaign=True, runner_seed=100)
         assert notes_about(
@@ -600,6 +763,16 @@ class TestBadInput:
             True,
             True,
         )
+
+    @pytest.mark.parametrize(
+        "text",
+        ["run_batch:\n  - {manager: none}\n", "suave_cli: {a: 1}\n", "experiments: [{a: 1}]\n"],
+        ids=["run_batch", "suave_cli", "run_batch or suave_cli"],
+    )
+    def test_files_of_several_experiments_are_told_by_what_they_are(self, imported, text, request):
+        program = request.node.callspec.id
+        problem = f"describes several experiments, for the exemplar's {program}"
+        assert refused(imported, text).problem == problem
 
     def test_two_files_may_say_the_same_and_must_not_contradict(self, imported):
         same = "thruster_monitor: {ros__parameters: {thruster_events: ['(1, failure, 35)', '(3,recovery,50.0)']}}\n"

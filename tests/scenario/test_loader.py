@@ -304,3 +304,9 @@ def test_a_value_given_in_python_is_not_blamed_on_the_scenario_s_file(path, valu
         with_values(load_scenario("seams2023"), {path: value})
     assert wrong.value.file is None
     assert str(wrong.value).startswith(told)
+
+
+@pytest.mark.parametrize("entry", ["1", "first", "-1", "\u0661", "1" * 5000])
+def test_an_entry_that_a_list_does_not_have_is_refused(entry):
+    with pytest.raises(InputError, match="entries are 0 to 0"):
+        with_values(load_scenario("seams2023"), {f"thruster_events.{entry}.time_s": 3.0})

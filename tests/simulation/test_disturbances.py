@@ -31,7 +31,10 @@ def details(result: MissionResult, event: str) -> list[str]:
     return [each.detail for each in result.events if each.event == event]
 
 
-@pytest.mark.parametrize("manager", ["none", "metacontrol", "bt", "bt_extended"])
+@pytest.mark.parametrize(
+    "manager",
+    ["none", "fixed:fd_spiral_high", "threshold", "oracle", "metacontrol", "bt", "bt_extended"],
+)
 def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, manager):
     result = fly(LEAK, manager)
     assert "hull LEAK" in details(result, "component_status")
