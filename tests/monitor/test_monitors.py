@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.clock import call_at
-from suave_des.draws import Streams
+from suave_des.draws import Draws, Streams
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import (
     BatteryMeasurements,
@@ -22,6 +22,7 @@ from suave_des.monitor.measurements import (
 )
 from suave_des.monitor.monitors import start_monitors
 from suave_des.monitor.thrusters import Thrusters, thruster_monitor
+from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Monitor, ThrusterEvent, ThrusterFailureRevision
 from suave_des.world.signals import constant, sinusoid, step
 from tests.helpers.stand_ins import PlacedVehicle
@@ -69,6 +70,22 @@ def test_when_messages_have_a_new_value(signal, until_s, timing, time_step_s, ti
     assert Measurements.of("v", signal, until_s, timing, time_step_s).times_s == pytest.approx(
         times_s
     )
+
+
+def test_monitors_in_step_publish_just_after_each_period():
+    scenario = load_scenario("planta_exp1").scenario
+    assert Timing.of(scenario, Draws(scenario, 1, 1, {}, {}), "v", 0.2) == (
+        0.2,
+        pytest.approx(0.21),
+    )
+
+
+def test_other_monitors_have_another_phase_in_each_run():
+    scenario = load_scenario("release15").scenario
+    phases = [
+        Timing.of(scenario, Draws(scenario, 1, run, {}, {}), "v", 2.0).phase_s for run in range(200)
+    ]
+    assert 0.0 <= min(phases) < 0.1 and 1.9 < max(phases) < 2.0
 
 
 def test_a_message_has_the_value_of_its_whole_second():
@@ -340,6 +357,17 @@ def test_battery_falls_by_a_two_hundredth_a_second(subscriber):
         150.5,
         pytest.approx(0.2475),
     )
+
+
+def test_the_true_level_falls_to_zero_and_anew_from_each_recharge():
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 500.0)
+    assert [level.level(t_s) for t_s in (0.0, 50.0, 200.0, 300.0)] == [1.0, 0.75, 0.0, 0.0]
+    level.recharge(300.0)
+    assert level.level(350.0) == 0.75
+
+
+def test_a_level_is_measured_until_the_end_of_the_mission():
+    assert BatteryMeasurements(200.0, Timing(1.0, 0.5), 3.5).times_s == [0.5, 1.5, 2.5, 3.5]
 
 
 def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):
