@@ -191,7 +191,7 @@ def _drawn_events(
 def _bounds(drawn: Any) -> tuple[float, float] | None:
     """Return the bounds of what a campaign draws; None if it is not uniform."""
     if isinstance(drawn, dict) and drawn["distribution"] == "uniform":
-        return drawn["minimum"], drawn["maximum"]
+        return float(drawn["minimum"]), float(drawn["maximum"])
     return None
 
 

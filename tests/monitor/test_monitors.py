@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.clock import call_at
-from suave_des.draws import Streams
+from suave_des.draws import Draws, Streams
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import (
     BatteryMeasurements,
@@ -21,8 +21,9 @@ from suave_des.monitor.measurements import (
     message_loss,
 )
 from suave_des.monitor.monitors import start_monitors
-from suave_des.monitor.thrusters import thruster_monitor
-from suave_des.scenario.models import Monitor, ThrusterEvent
+from suave_des.monitor.thrusters import Thrusters, thruster_monitor
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.models import Monitor, ThrusterEvent, ThrusterFailureRevision
 from suave_des.world.signals import constant, sinusoid, step
 from tests.helpers.stand_ins import PlacedVehicle
 
@@ -71,9 +72,30 @@ def test_when_messages_have_a_new_value(signal, until_s, timing, time_step_s, ti
     )
 
 
+def test_monitors_in_step_publish_just_after_each_period():
+    scenario = load_scenario("planta_exp1").scenario
+    assert Timing.of(scenario, Draws(scenario, 1, 1, {}, {}), "v", 0.2) == (
+        0.2,
+        pytest.approx(0.21),
+    )
+
+
+def test_other_monitors_have_another_phase_in_each_run():
+    scenario = load_scenario("release15").scenario
+    phases = [
+        Timing.of(scenario, Draws(scenario, 1, run, {}, {}), "v", 2.0).phase_s for run in range(200)
+    ]
+    assert 0.0 <= min(phases) < 0.1 and 1.9 < max(phases) < 2.0
+
+
 def test_a_message_has_the_value_of_its_whole_second():
     measured = Measurements.of("v", VISIBILITY, 30.0, Timing(1.0, 0.7), 1.0)
     assert measured.values == [VISIBILITY(float(t)) for t in range(30)]
+
+
+def test_a_signal_is_read_at_multiples_of_its_time_step():
+    measured = Measurements.of("v", lambda t_s: t_s, 6.0, Timing(1.0, 0.7), 2.5)
+    assert (measured.times_s, measured.values) == (pytest.approx([0.7, 2.7, 5.7]), [0.0, 2.5, 5.0])
 
 
 def test_rounding_errors_of_a_timer_do_not_shift_a_step():
@@ -190,6 +212,54 @@ def test_signal_monitor_publishes_measurements_at_their_times(subscriber):
 # Thrusters
 
 
+class NotedVehicle:
+    """Keeps the state of each thruster."""
+
+    def __init__(self) -> None:
+        self.thrusters = ["works"] * 6
+
+    def set_thruster(self, t_s: float, number: int, state: str) -> None:
+        self.thrusters[number - 1] = state
+
+
+def noted_thrusters(effective_from_s: float = 0.0, logged: list | None = None) -> Thrusters:
+    """Thrusters of a vehicle that notes their states."""
+    revision = ThrusterFailureRevision(effective_from_s=effective_from_s)
+    log = [] if logged is None else logged
+    return Thrusters(
+        simpy.Environment(), NotedVehicle(), revision, lambda *event: log.append(event)
+    )
+
+
+@pytest.mark.parametrize(("recoverable", "after"), [(True, "works"), (False, "frozen")])
+def test_only_a_failure_that_is_recoverable_is_recovered(recoverable, after):
+    thrusters = noted_thrusters()
+    thrusters.apply(ThrusterEvent(thruster=2, event="failure", time_s=0.0, recoverable=recoverable))
+    assert thrusters.vehicle.thrusters[1] == "frozen"
+    assert thrusters.recover(2) == recoverable
+    assert thrusters.vehicle.thrusters == ["works", after, *["works"] * 4]
+
+
+def test_a_recovery_by_itself_ends_even_a_failure_that_is_not_recoverable():
+    thrusters = noted_thrusters()
+    failure = ThrusterEvent(thruster=2, event="failure", time_s=0.0, recoverable=False)
+    thrusters.apply(failure)
+    thrusters.apply(ThrusterEvent(thruster=2, event="recovery", time_s=0.0, recoverable=False))
+    assert thrusters.working == [(0.0, 5), (0.0, 6)]
+    thrusters.apply(failure.model_copy(update={"recoverable": True, "failure_mode": "dead"}))
+    assert thrusters.vehicle.thrusters[1] == "dead" and thrusters.recover(2)
+
+
+@pytest.mark.parametrize(("effective_from_s", "state"), [(0.0, "frozen"), (0.1, "works")])
+def test_a_failure_has_no_effect_before_the_revisions_time(effective_from_s, state):
+    logged = list[tuple[str, ...]]()
+    thrusters = noted_thrusters(effective_from_s, logged)
+    thrusters.apply(ThrusterEvent(thruster=6, event="failure", time_s=0.0))
+    assert thrusters.vehicle.thrusters[5] == state
+    without_effect = [("thruster_monitor", "failure_without_effect", "c_thruster_6")]
+    assert logged == (without_effect if state == "works" else [])
+
+
 def event(thruster: int, happens: str, time_s: float) -> tuple[ThrusterEvent, float]:
     return ThrusterEvent(thruster=thruster, event=happens, time_s=0.0), time_s
 
@@ -287,6 +357,17 @@ def test_battery_falls_by_a_two_hundredth_a_second(subscriber):
         150.5,
         pytest.approx(0.2475),
     )
+
+
+def test_the_true_level_falls_to_zero_and_anew_from_each_recharge():
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 500.0)
+    assert [level.level(t_s) for t_s in (0.0, 50.0, 200.0, 300.0)] == [1.0, 0.75, 0.0, 0.0]
+    level.recharge(300.0)
+    assert level.level(350.0) == 0.75
+
+
+def test_a_level_is_measured_until_the_end_of_the_mission():
+    assert BatteryMeasurements(200.0, Timing(1.0, 0.5), 3.5).times_s == [0.5, 1.5, 2.5, 3.5]
 
 
 def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):

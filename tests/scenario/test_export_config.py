@@ -178,17 +178,19 @@ class TestTimesOfThrusterEvents:
         written = yaml.safe_load(texts[MISSION_FILE])["/thruster_monitor"]["ros__parameters"]
         assert written["thruster_events"] == ["(1,failure,60)", "(2,failure,0)", "(3,failure,10)"]
 
-    def test_that_are_cut_at_the_start_keep_their_distribution(self):
-        loaded = with_values(BLANK["1.5"], {"thruster_events": ["(1,failure,0)", "(2,failure,10)"]})
+    @pytest.mark.parametrize("second_s", [0, 10])
+    def test_that_are_cut_at_the_start_keep_their_distribution(self, second_s):
+        events = ["(1,failure,0)", f"(2,failure,{second_s})"]
+        loaded = with_values(BLANK["1.5"], {"thruster_events": events})
         drawn = {**UNIFORM_S, "shared": "thruster_events_shift"}
         perturbed = {
             "thruster_events.0.time_s": {**drawn, "minimum": -20.0, "maximum": 20.0},
-            "thruster_events.1.time_s": {**drawn, "minimum": 10.0, "maximum": 50.0},
+            "thruster_events.1.time_s": {**drawn, "minimum": second_s, "maximum": second_s + 40.0},
         }
         campaign = {"managers": ["bt"], "runs": 1, "seed": 1, "perturbations": perturbed}
         texts, lost = export_config(loaded, {**campaign, "runs_per_draw": 5})
         runner = yaml.safe_load(texts[RUNNER_FILE])["/suave_runner_node"]["ros__parameters"]
-        assert runner["thruster_events"] == ["(1,failure,-20)", "(2,failure,10)"]
+        assert runner["thruster_events"] == ["(1,failure,-20)", f"(2,failure,{second_s})"]
         assert (runner["thruster_events_random_interval"], lost) == ([0, 40], ())
 
     def test_that_a_campaign_draws_otherwise_for_each_are_told(self):

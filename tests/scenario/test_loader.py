@@ -310,3 +310,9 @@ def test_a_value_given_in_python_is_not_blamed_on_the_scenario_s_file(path, valu
 def test_an_entry_that_a_list_does_not_have_is_refused(entry):
     with pytest.raises(InputError, match="entries are 0 to 0"):
         with_values(load_scenario("seams2023"), {f"thruster_events.{entry}.time_s": 3.0})
+
+
+def test_a_value_that_is_replaced_by_a_wrong_one_is_told_by_its_key():
+    with pytest.raises(InputError) as caught:
+        with_values(load_scenario("seams2023"), {"mission.time_limit_s": -1.0})
+    assert caught.value.place == "line 1, mission.time_limit_s"

@@ -22,6 +22,12 @@ def refused(path: Path | str) -> str:
     return message
 
 
+def test_a_key_has_at_most_200_characters(write):
+    longest = "k" * 200
+    assert read_yaml(write("longest.yaml", f"{longest}: 1\n")).data == {longest: 1}
+    assert "a key must be short text" in refused(write("longer.yaml", f"k{longest}: 1\n"))
+
+
 SCALARS = {
     **{
         "1.5": 1.5,
