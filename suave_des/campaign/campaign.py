@@ -5,7 +5,8 @@ finish; and training.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -19,6 +20,7 @@ from suave_des.campaign.missions import (
     MissionRunner,
     Remark,
     WorkerError,
+    alarms_heard,
 )
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
@@ -81,41 +83,45 @@ def run_campaign(
         CampaignInterrupted: Ctrl-C; finished missions are kept.
         InputError, WorkerError, StoreError: as suave_des.run_campaign.
     """
-    if managers is not None:
-        several = (
-            managers
-            if isinstance(managers, Iterable) and not isinstance(managers, str | type)
-            else [managers]
-        )
-        managers = list(map(name_of, several))
     loaded = scenario if isinstance(scenario, LoadedScenario) else None
     named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
-    given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
+    names = None if managers is None else _names(managers)
+    given = {"managers": names, "runs": runs, "seed": seed, "workers": workers, "out": out}
     spec = CampaignSpec.of(named, **given, **options)
     if spec.out is not None:
-        files.check_output_folder(
-            spec.out, "campaign", overwrite=spec.overwrite, left_over=is_left_over
-        )
-        if not spec.overwrite and has_campaign(spec.out):
-            remedy = f"--resume {spec.out} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
-            raise InputError(
-                "the output folder is not empty: it has a campaign in it",
-                file=spec.out,
-                remedy=remedy,
-            )
+        _check_is_free(spec.out, overwrite=spec.overwrite)
     file = read_campaign_file(spec.scenario) if loaded is None else None
     if settings := settings_of(spec.with_file(file).managers):
         spec = spec.model_copy(
             update={"replacements": {**spec.replacements, "manager_options": settings}}
         )
     with ExitStack() as stack:
-        return _run(
-            stack,
-            spec.with_file(file),
-            lambda: inputs.read_campaign(spec, file, loaded),
-            None,
-            on_progress,
+        checked = _checked(
+            stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded)
         )
+        return _finish(checked, _new(stack, checked), on_progress, is_new=True)
+
+
+def _names(managers: ManagerLike | Iterable[ManagerLike]) -> list[str]:
+    """Return the names of one manager or several."""
+    if isinstance(managers, str | type):
+        return [name_of(managers)]
+    if isinstance(managers, Iterable):
+        return [name_of(manager) for manager in managers]
+    return [name_of(managers)]  # which says what it expected
+
+
+def _check_is_free(folder: Path, *, overwrite: bool) -> None:
+    """Check that a new campaign may be written into a folder.
+
+    Raises:
+        InputError: something is in it that is not to be replaced.
+    """
+    files.check_output_folder(folder, "campaign", overwrite=overwrite, left_over=is_left_over)
+    if not overwrite and has_campaign(folder):
+        remedy = f"--resume {folder} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
+        problem = "the output folder is not empty: it has a campaign in it"
+        raise InputError(problem, file=folder, remedy=remedy)
 
 
 def resume_campaign(
@@ -144,7 +150,9 @@ def resume_campaign(
         store, campaign = stack.enter_context(
             _stored(Path(folder), changed, managers, confirmed=confirmed)
         )
-        return _run(stack, campaign.spec, lambda: campaign, store, on_progress)
+        checked = _checked(stack, campaign.spec, lambda: campaign)
+        _resume(store, checked, Path(folder))
+        return _finish(checked, store, on_progress, is_new=False)
 
 
 def opened_campaign(
@@ -192,81 +200,136 @@ def _stored(
         yield store, campaign
 
 
-def _run(
-    stack: ExitStack,
-    spec: CampaignSpec,
-    read: Callable[[], Campaign],
-    store: Store | None,
-    on_progress: OnProgress | None,
-) -> CampaignResult:
-    """Check a campaign, run the missions that are not done yet, and write the files.
+@dataclass(frozen=True)
+class _Checked:
+    """A campaign whose inputs are checked.
 
-    `stack` closes at the end what is opened here; `store` is that of a campaign that is resumed,
-    None for a new one.
+    Attributes:
+        executor: runs its missions.
+        decided_by: SHA-256 of each further file that decides its results.
+        about: what its store notes about it.
+    """
+
+    campaign: Campaign
+    executor: Executor
+    decided_by: Mapping[str, str]
+    about: Mapping[str, Any]
+
+    @property
+    def folder(self) -> Path | None:
+        """Folder for result files."""
+        return self.campaign.spec.out
+
+    @property
+    def resuming_command(self) -> str:
+        """The command that runs the rest of it, and writes its files."""
+        return f"suave-des campaign --resume {self.folder}"
+
+
+def _checked(stack: ExitStack, spec: CampaignSpec, read: Callable[[], Campaign]) -> _Checked:
+    """Read and check a campaign, while its workers start; `stack` ends them.
+
+    Raises:
+        InputError: something given cannot be used.
     """
     executor: Executor = in_process
     spec.check()
-    if (
-        spec.processes > 1 and spec.scheduler is None
-    ):  # at once: they import while this process reads and checks
+    if spec.processes > 1 and spec.scheduler is None:
         executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes
     campaign = read()
     decided_by = inputs.check_campaign(campaign)
     if spec.scheduler is not None:
-        try:
-            from suave_des.campaign.cluster import connected
-        except ImportError as error:
-            problem = f"a scheduler needs Dask, which is not installed ({error})"
-            raise InputError(problem, remedy="pip install 'suave-des[dask]'") from None
-        executor = stack.enter_context(connected(spec.scheduler))
-    folder, is_new = spec.out, store is None
+        executor = stack.enter_context(_connected(spec.scheduler))
     decides = inputs.deciding(campaign, decided_by)
     about = {
         "request": campaign.request.stored(),
         "deciding": decides,
         "identity": inputs.identity(decides),
     }
-    if store is None:
-        store = stack.enter_context(_new_store(folder, about))
-        if folder is not None:
-            inputs.note_own(campaign, folder)
-    elif folder is not None:
-        with store.reading():
-            inputs.check_same(store.about("deciding"), decides, folder)
-        tidy(folder, is_new=False)
-        store.forget_passing_failures()
-        for name, value in about.items():
-            store.note(name, value)
-    stopped, remarks = _work(campaign, store, executor, on_progress)
-    if stopped is not None and ((is_new and store.count() == 0) or isinstance(stopped, InputError)):
-        raise stopped
-    command = f"suave-des campaign --resume {folder}"
-    if isinstance(stopped, StoreError):
-        kept = folder is not None and has_campaign(folder)
-        raise StoreError(
-            f"{stopped}{f'; what was kept before is safe: {command} runs the rest' if kept else ''}"
-        )
+    return _Checked(campaign, executor, decided_by, about)
+
+
+def _connected(scheduler: str) -> AbstractContextManager[Executor]:
+    """Connect to a Dask cluster; an InputError without Dask."""
     try:
-        with store.reading():
-            result = gather(
-                campaign, store.outcomes, (*map(str, remarks), *inputs.trained_on(campaign))
-            )
-            if folder is not None:
-                hashes = {**decided_by, **(campaign.file.inputs if campaign.file else {})}
-                made = provenance(campaign.loaded, hashes, campaign.spec.command)
-                result.write({**made, "campaign_sha256": about["identity"]})
-    except (KeyboardInterrupt, InputError) as error:
-        how = f"nothing is lost: {command} writes the files"
-        if folder is None:
-            raise
-        if isinstance(error, KeyboardInterrupt):
-            raise KeyboardInterrupt(f"interrupted; {how}") from None
-        raise InputError(error.problem, file=error.file, remedy=how) from None
+        from suave_des.campaign.cluster import connected
+    except ImportError as error:
+        problem = f"a scheduler needs Dask, which is not installed ({error})"
+        raise InputError(problem, remedy="pip install 'suave-des[dask]'") from None
+    return connected(scheduler)
+
+
+def _new(stack: ExitStack, checked: _Checked) -> Store:
+    """Begin the store of a new campaign, which `stack` closes."""
+    store = stack.enter_context(_new_store(checked.folder, checked.about))
+    if checked.folder is not None:
+        inputs.note_own(checked.campaign, checked.folder)
+    return store
+
+
+def _resume(store: Store, checked: _Checked, folder: Path) -> None:
+    """Prepare a store for the rest of its campaign.
+
+    Raises:
+        InputError: something that determines results is not what it was.
+    """
+    with store.reading():
+        inputs.check_same(store.about("deciding"), checked.about["deciding"], folder)
+    tidy(folder, is_new=False)
+    store.forget_passing_failures()
+    for name, value in checked.about.items():
+        store.note(name, value)
+
+
+def _finish(
+    checked: _Checked, store: Store, on_progress: OnProgress | None, *, is_new: bool
+) -> CampaignResult:
+    """Run the missions that are not done yet, and write the files."""
+    stopped, remarks = _work(checked.campaign, store, checked.executor, on_progress)
+    if isinstance(stopped, InputError):
+        raise stopped
+    if stopped is not None and is_new and store.count() == 0:
+        raise stopped
+    if isinstance(stopped, StoreError):
+        raise _with_what_is_kept(stopped, checked)
+    result = _result(checked, store, remarks)
     if isinstance(stopped, WorkerError):
         raise WorkerError(f"{stopped}; {result.kept()}")
     if stopped is not None:
         raise CampaignInterrupted(result)
     return result
+
+
+def _with_what_is_kept(stopped: StoreError, checked: _Checked) -> StoreError:
+    """Return an error about a store with what can be done about it."""
+    if checked.folder is None or not has_campaign(checked.folder):
+        return StoreError(str(stopped))
+    rest = f"what was kept before is safe: {checked.resuming_command} runs the rest"
+    return StoreError(f"{stopped}; {rest}")
+
+
+def _result(checked: _Checked, store: Store, remarks: Sequence[Remark]) -> CampaignResult:
+    """Gather the result of a campaign, and write its files."""
+    campaign, folder = checked.campaign, checked.folder
+    how = f"nothing is lost: {checked.resuming_command} writes the files"
+    try:
+        with store.reading():
+            told = (*map(str, remarks), *inputs.trained_on(campaign))
+            result = gather(campaign, store.outcomes, told)
+            if folder is not None:
+                of_file = campaign.file.inputs if campaign.file else {}
+                hashes = {**checked.decided_by, **of_file}
+                made = provenance(campaign.loaded, hashes, campaign.spec.command)
+                result.write({**made, "campaign_sha256": checked.about["identity"]})
+        return result
+    except KeyboardInterrupt:
+        if folder is None:
+            raise
+        raise KeyboardInterrupt(f"interrupted; {how}") from None
+    except InputError as error:
+        if folder is None:
+            raise
+        raise InputError(error.problem, file=error.file, remedy=how) from None
 
 
 @contextmanager
@@ -314,18 +377,19 @@ def _work(
                 done += 1
                 failed += isinstance(each, MissionFailure)
         if left := campaign.planned - done:
-            for among in executor(campaign, campaign.missions(store.settled), left):
-                finished = []
-                for key, each in among:
-                    if isinstance(each, Remark):
-                        remarks.add(each)
-                    else:
-                        finished.append((key, each))
-                        failed += isinstance(each, MissionFailure)
-                store.append(finished)
-                done += len(finished)
-                if on_progress is not None:
-                    on_progress(Progress(done, failed, campaign.planned))
+            with alarms_heard():
+                for among in executor(campaign, campaign.missions(store.settled), left):
+                    finished = []
+                    for key, each in among:
+                        if isinstance(each, Remark):
+                            remarks.add(each)
+                        else:
+                            finished.append((key, each))
+                            failed += isinstance(each, MissionFailure)
+                    store.append(finished)
+                    done += len(finished)
+                    if on_progress is not None:
+                        on_progress(Progress(done, failed, campaign.planned))
         store.commit()
     except (KeyboardInterrupt, SuaveDesError) as error:
         stopped = error

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ctypes
 import signal
+import sys
 import threading
 import time
 from collections import Counter
@@ -13,7 +14,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import count, product
+from itertools import chain, product
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -167,6 +168,12 @@ all, and WorkerError if workers end again and again.
 """
 
 
+def reasoner_is_stuck() -> bool:
+    """Whether a reasoner of this process works on what was waited for in vain."""
+    pellet = sys.modules.get("suave_des.knowledge.pellet")  # many missions do without
+    return pellet is not None and bool(pellet.is_stuck())
+
+
 class MissionRunner:
     """Runs missions of one campaign in this process."""
 
@@ -177,6 +184,7 @@ class MissionRunner:
         short_mission(campaign.loaded)
         members = len(self._variation.ensemble.members) if self._variation.ensemble else 1
         self._simulator = lru_cache(members)(self._simulator_of)  # missions come point by point
+        self._values = lru_cache(1)(self._variation.sweep.values)
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
         self._number = Counter[int]()
         self._too_long, self._in_time = Counter[int](), set[int]()
@@ -193,8 +201,14 @@ class MissionRunner:
         simulator = self._simulator(point, self._variation.member(run))
         return simulator.run(manager, run, self.campaign.spec.seed, record=True), simulator.loaded
 
-    def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
+    def each(
+        self, missions: Iterable[MissionKey], *, until_stuck: bool = False
+    ) -> Iterator[Finished]:
         """Yield the outcome of each mission, in order.
+
+        Args:
+            missions: their keys.
+            until_stuck: whether a mission after which the reasoner does not come back is the last.
 
         Raises:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
@@ -202,23 +216,26 @@ class MissionRunner:
         for key in missions:
             if key.manager not in self._in_time and self._too_long[key.manager] >= _IN_VAIN:
                 continue
-            manager = self.campaign.spec.managers[key.manager]
             outcome, remarks = self._outcome(key)
             yield key, outcome
-            if not (isinstance(outcome, MissionFailure) and not outcome.lasting):
-                self._in_time.add(key.manager)
-            elif key.manager not in self._in_time:
-                self._too_long[key.manager] += 1
-                if self._too_long[key.manager] == _IN_VAIN:
-                    yield key, Remark(manager, GIVEN_UP)
-            if (
-                not is_built_in(manager)
-                and not isinstance(outcome, MissionFailure)
-                and self._differs(key, outcome)
-            ):
-                yield key, Remark(manager, NOT_REPEATABLE)
-            for remark in remarks:
+            for remark in chain(self._remarks(key, outcome), remarks):
                 yield key, remark
+            if until_stuck and reasoner_is_stuck():
+                return
+
+    def _remarks(self, key: MissionKey, outcome: Row | MissionFailure) -> Iterator[Remark]:
+        """Yield what the outcome of a mission says about its manager, among those before it."""
+        manager = self.campaign.spec.managers[key.manager]
+        if not isinstance(outcome, MissionFailure):
+            self._in_time.add(key.manager)
+            if not is_built_in(manager) and self._differs(key, outcome):
+                yield Remark(manager, NOT_REPEATABLE)
+        elif outcome.lasting:
+            self._in_time.add(key.manager)
+        elif key.manager not in self._in_time:
+            self._too_long[key.manager] += 1
+            if self._too_long[key.manager] == _IN_VAIN:
+                yield Remark(manager, GIVEN_UP)
 
     def _differs(self, key: MissionKey, outcome: Row | MissionFailure) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run
@@ -233,12 +250,8 @@ class MissionRunner:
 
     def _outcome(self, key: MissionKey) -> tuple[Row | MissionFailure, list[Remark]]:
         """Run a mission; return its outcome, and what its manager's author should know."""
-        spec, variation, manager = (
-            self.campaign.spec,
-            self._variation,
-            self.campaign.spec.managers[key.manager],
-        )
-        values, member = variation.sweep.values(key.point), variation.member(key.run)
+        spec, manager = self.campaign.spec, self.campaign.spec.managers[key.manager]
+        member = self._variation.member(key.run)
         simulator = self._simulator(key.point, member)
         began_s = time.process_time()
         try:
@@ -259,24 +272,26 @@ class MissionRunner:
             if is_built_in(manager) and used_s < _LEAST_SHARE * spec.time_out_s:
                 cause += "; the machine was busy with other work"
             return self.campaign.failed(key, cause, error.time_s)[1], []
-        drawn = (result.drawn[path] for path in variation.drawn)
-        members = () if member is None else (member,)
+        return self._row(key, member, result), [Remark(manager, text) for text in result.remarks]
+
+    def _row(self, key: MissionKey, member: int | None, result: MissionResult) -> Row:
+        """Make the row of a mission: of runs.csv, and its knowledge states if they are recorded."""
+        spec, variation = self.campaign.spec, self._variation
+        values = self._values(key.point)
         row = (
             *row_of(result.metrics),
             *map(cell_of, values.values()),
-            *drawn,
-            *members,
+            *(result.drawn[path] for path in variation.drawn),
+            *(() if member is None else (member,)),
             *further_of(result),
         )
-        if spec.record_knowledge:
-            swept = {variation.paths[name]: value for name, value in values.items()}
-            known = (
-                mission_line(manager, key.point, key.run, result.knowledge, swept)
-                if result.knowledge
-                else ""
-            )
-            row = (*row, known)
-        return row, [Remark(manager, text) for text in result.remarks]
+        if not spec.record_knowledge:
+            return row
+        if not result.knowledge:
+            return (*row, "")
+        manager = spec.managers[key.manager]
+        swept = {variation.paths[name]: value for name, value in values.items()}
+        return (*row, mission_line(manager, key.point, key.run, result.knowledge, swept))
 
     def _simulator_of(self, point: int, member: int | None) -> Simulator:
         """Make the simulator of a point and of a member of the ensemble."""
@@ -292,6 +307,37 @@ class MissionRunner:
 # Time limits, so that a manager that never returns costs its own mission only.
 
 
+_left: list[int] = []
+"""How many more ticks the mission under way has in the main thread; empty outside of missions."""
+_hears: list[int] = []
+"""Of the blocks in which alarms are heard: at most one."""
+
+
+@contextmanager
+def alarms_heard() -> Iterator[None]:
+    """Have the alarms of missions heard in the block: to do so for each mission anew takes a tenth
+    of the time of the shortest ones.
+    """
+    if _hears or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with handled([signal.SIGALRM], _tick):
+        _hears.append(1)
+        try:
+            yield
+        finally:
+            _hears.clear()
+
+
+def _tick(number: int, frame: FrameType | None) -> None:
+    if not _left:
+        return  # of an alarm that comes too late
+    _left[0] -= 1
+    if _left[0] <= 0:
+        signal.setitimer(signal.ITIMER_REAL, _REPEAT_S, _REPEAT_S)
+        raise MissionTimeOut
+
+
 @contextmanager
 def _time_limit(seconds: float) -> Iterator[None]:
     """Raise MissionTimeOut in the block when it takes longer, and again while it swallows that.
@@ -301,16 +347,12 @@ def _time_limit(seconds: float) -> Iterator[None]:
     """
     tick_s = seconds / _TICKS
     if threading.current_thread() is threading.main_thread():
-        ticks = count(1)
-
-        def tick(number: int, frame: FrameType | None) -> None:
-            if next(ticks) < _TICKS:
-                return
-            signal.setitimer(signal.ITIMER_REAL, _REPEAT_S, _REPEAT_S)
-            raise MissionTimeOut
-
-        with handled([signal.SIGALRM], tick), alarm(tick_s, tick_s):
-            yield
+        _left.append(_TICKS)
+        try:
+            with alarms_heard(), alarm(tick_s, tick_s):
+                yield
+        finally:
+            _left.clear()
         return
     thread, over = ctypes.c_ulong(threading.get_ident()), threading.Event()
 

@@ -28,6 +28,8 @@ from suave_des.campaign.missions import (
     MissionRunner,
     Remark,
     WorkerError,
+    alarms_heard,
+    reasoner_is_stuck,
 )
 from suave_des.errors import SuaveDesError
 from suave_des.interrupts import INTERRUPTS, signals_deferred
@@ -71,13 +73,12 @@ def in_process(
 
     A reasoner that does not come back cannot be stopped: the rest then runs in a worker process.
     """
-    runner, remaining = MissionRunner(campaign), iter(missions)
-    for key in remaining:
-        for each in runner.each((key,)):
-            yield [each]
-        if _reasoner_is_stuck():
-            with LocalWorkers(campaign.spec.managers, 1) as workers:
-                yield from workers.outcomes(campaign, remaining, total)
+    remaining = iter(missions)
+    for each in MissionRunner(campaign).each(remaining, until_stuck=True):
+        yield [each]
+    if reasoner_is_stuck():
+        with LocalWorkers(campaign.spec.managers, 1) as workers:
+            yield from workers.outcomes(campaign, remaining, total)
 
 
 class LocalWorkers:
@@ -340,12 +341,14 @@ def unpacked(content: bytes) -> Campaign:
 # What runs in a worker process.
 
 
-def finished(runner: MissionRunner, chunk: Chunk) -> list[Finished]:
-    """Run missions; without memory for them this process ends as if killed for it: a new one begins
-    with little.
+def finished(
+    runner: MissionRunner, missions: Iterable[MissionKey], *, until_stuck: bool = False
+) -> list[Finished]:
+    """Run missions as MissionRunner.each; without memory for them this process ends as if killed
+    for it: a new one begins with little.
     """
     try:
-        return list(runner.each(chunk))
+        return list(runner.each(missions, until_stuck=until_stuck))
     except MemoryError:
         os._exit(errno.ENOMEM)
 
@@ -367,31 +370,14 @@ class Answer(NamedTuple):
     is_of_chunk: bool = True
 
 
-def _reasoner_is_stuck() -> bool:
-    """Whether work that a reasoner of this process has taken too long for still goes on."""
-    pellet = sys.modules.get("suave_des.knowledge.pellet")  # it is not, where it was not imported
-    return pellet is not None and bool(pellet.is_stuck())
-
-
-def _answer_of(runner: MissionRunner, chunk: Chunk) -> Answer:
-    """Run missions, until the reasoner is stuck."""
-    outcomes: list[Finished] = []
-    for number, key in enumerate(chunk, start=1):
-        outcomes += finished(runner, (key,))
-        if _reasoner_is_stuck():
-            return Answer(outcomes, chunk[number:], is_stuck=True)
-    return Answer(outcomes)
-
-
 def work(connection: Connection[Any, Any]) -> None:
     """Receive a campaign, then chunks of its missions, and send back their outcomes, until the
     other end is closed.
     """
     import suave_des.simulation.simulator  # noqa: F401 - all that missions need, before the campaign arrives
 
-    with suppress(
-        EOFError, BrokenPipeError, ConnectionResetError
-    ):  # the campaign is over, or its process has ended
+    ends = suppress(EOFError, BrokenPipeError, ConnectionResetError)
+    with alarms_heard(), ends:  # the campaign is over, or its process has ended
         runner = None
         while True:
             message = connection.recv()
@@ -401,7 +387,9 @@ def work(connection: Connection[Any, Any]) -> None:
                     runner = MissionRunner(unpacked(message))
                     answer = Answer([], is_of_chunk=False)
                 else:
-                    answer = _answer_of(runner, message)
+                    left = iter(message)
+                    outcomes = finished(runner, left, until_stuck=True)
+                    answer = Answer(outcomes, tuple(left), reasoner_is_stuck())
             except SuaveDesError as error:
                 answer = error
             except Exception:

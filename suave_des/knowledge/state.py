@@ -116,15 +116,17 @@ class KnowledgeState:
 
     def __str__(self) -> str:
         """Return the form that messages show, on one line."""
+        values: tuple[tuple[str, Value], ...] = (
+            *self.groundings,
+            *self.components,
+            *self.measurements,
+        )
         parts = [
             *(
                 f"objective {each.function}" + (f" ({each.status})" if each.status else "")
                 for each in self.objectives
             ),
-            *(
-                f"{name} = {value_text(value)}"
-                for name, value in (*self.groundings, *self.components, *self.measurements)
-            ),
+            *(f"{name} = {value_text(value)}" for name, value in values),
         ]
         return ", ".join(parts) or "the empty state"
 

@@ -44,7 +44,7 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers, tmp_path):
         place = f"manager {manager}, run {failure.run}, mission time 50.00 s"
         assert (
             str(failure)
-            == f"{place}: ValueError: I do not know what to do (awkward_managers.py, line 32)"
+            == f"{place}: ValueError: I do not know what to do (awkward_managers.py, line 34)"
         )
     rows = rows_of(tmp_path / "out")
     assert [int(row["run"]) for row in rows if row["manager"] == manager] == [
@@ -61,7 +61,7 @@ def test_a_manager_that_calls_exit_is_one_that_raises_and_when_all_missions_fail
 ):
     result = run_campaign("seams2023", [f"{AWKWARD}:Quits"], 1, 1, out=tmp_path / "out")
     assert [failure.cause for failure in result.failures] == [
-        "SystemExit: no more (awkward_managers.py, line 39)"
+        "SystemExit: no more (awkward_managers.py, line 41)"
     ]
     assert rows_of(tmp_path / "out") == []
     assert (

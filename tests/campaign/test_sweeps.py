@@ -103,8 +103,10 @@ def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path):
     )  # drawn by the scenario, each run its own
 
 
-def test_keys_that_share_a_draw_with_one_that_runs_share_share_it_too():
-    """A scenario's second event comes 25 s after the first, whose time is perturbed."""
+def times_of_events(runs_per_draw: int) -> list[tuple[float, float]]:
+    """Times of two events in runs 1 to 3, the first perturbed: 25 s lie between their intervals,
+    and they share a draw.
+    """
     drawn = {"distribution": "uniform", "shared": "shift"}
     first, second = ({**drawn, "minimum": low, "maximum": low + 20} for low in (30, 55))
     events = [
@@ -112,12 +114,20 @@ def test_keys_that_share_a_draw_with_one_that_runs_share_share_it_too():
         for number, time_s in ((1, 40.0), (2, second))
     ]
     loaded = with_values(load_scenario("seams2023"), {"thruster_events": events})
-    loaded, variation = vary(loaded, {}, {"thruster_events.0.time_s": first}, 3)
+    loaded, variation = vary(loaded, {}, {"thruster_events.0.time_s": first}, runs_per_draw)
     simulator = Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
-    for run in (1, 2, 3):
-        times_s = simulator.run("none", run, 5).drawn
-        between_s = times_s["thruster_events.1.time_s"] - times_s["thruster_events.0.time_s"]
-        assert between_s == pytest.approx(25.0, abs=1e-9)
+    keys = [f"thruster_events.{number}.time_s" for number in (0, 1)]
+    runs = (simulator.run("none", run, 5).drawn for run in (1, 2, 3))
+    return [(drawn[keys[0]], drawn[keys[1]]) for drawn in runs]
+
+
+def test_keys_that_share_a_draw_share_it_where_runs_share_that_of_one_of_them():
+    assert [later - earlier for earlier, later in times_of_events(3)] == pytest.approx([25.0] * 3)
+
+
+def test_a_draw_that_keys_share_is_the_same_in_the_runs_that_share_it():
+    assert len(set(times_of_events(3))) == 1
+    assert len(set(times_of_events(1))) == 3
 
 
 @settings(max_examples=5, deadline=None)

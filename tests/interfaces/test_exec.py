@@ -255,6 +255,14 @@ def test_a_mission_that_is_left_leaves_its_program_to_the_next():
     assert len({process for process, _, _, _ in heard()}) == 1
 
 
+@pytest.mark.parametrize(
+    ("body", "is_lasting"), [("sys.exit(7)", True), ("os.kill(os.getpid(), 9)", False)]
+)
+def test_that_a_program_was_killed_need_not_happen_again(body, is_lasting):
+    result = campaign.run_campaign("seams2023", [program(body)], 1, 1)
+    assert [each.lasting for each in result.failures] == [is_lasting]
+
+
 ONCE_LATE = """
 if not os.path.exists("late"):
     open("late", "w").close()

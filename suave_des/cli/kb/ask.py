@@ -5,7 +5,7 @@ decided.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -28,7 +28,7 @@ from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.state import Reasoning
+    from suave_des.knowledge.state import Reasoning, Value
 
 
 TableFormat = Literal["text", "csv", "json"]
@@ -48,7 +48,7 @@ def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
     for objective in state.objectives:
         status = f"  {objective.status}" if objective.status else ""
         yield f"  objective   {objective.function}{status}"
-    parts = {
+    parts: dict[str, Iterable[tuple[str, Value]]] = {
         "grounding": state.groundings,
         "component": state.components,
         "measured": state.measurements,

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 TimeLimitS = Annotated[
     float,
-    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s."),
+    typer.Option(
+        "--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s of CPU time."
+    ),
 ]
 MaxFailed = Annotated[
     int,

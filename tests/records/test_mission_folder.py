@@ -1,0 +1,277 @@
+"""The folder of a mission is read as it was written, and what is wrong in it is named with its
+place.
+"""
+
+import json
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+from suave_des import Mission, load_scenario
+from suave_des.errors import InputError
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.metrics.result import KnowledgeRecord
+from suave_des.records import mission_folder
+from suave_des.records.mission_folder import (
+    EVENTS_FILE,
+    KNOWLEDGE_FILE,
+    MISSION_FILE,
+    TRAJECTORY_FILE,
+    knowledge_text,
+    mission_files,
+    mission_line,
+    provenance,
+    read_knowledge,
+    read_mission,
+    read_missions,
+    record_of,
+    scenario_line,
+)
+
+OBJECTIVE = ObjectiveState("f_generate_search_path", "UNGROUNDED", True)
+FULL = {
+    "objectives": [OBJECTIVE],
+    "groundings": {"f_maintain_motion": "fd_all_thrusters"},
+    "components": {"c_thruster_1": "FALSE"},
+    "measurements": {"water_visibility": "2.50"},
+}
+"""Parts of a state of knowledge."""
+
+
+def state(**parts: object) -> KnowledgeState:
+    """A state that has these parts in place of those of FULL."""
+    return KnowledgeState.of(**{**FULL, **parts})
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return load_scenario("seams2023")
+
+
+@pytest.fixture(scope="module")
+def result():
+    """A mission of metacontrol that was recorded."""
+    return Mission("seams2023", "metacontrol", run=1, seed=8, record=True).result()
+
+
+@pytest.fixture
+def folder(result, loaded, tmp_path: Path) -> Path:
+    for name, text in mission_files(result, loaded, {"own.py": "abc"}, ("run",)).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def test_metrics_are_read_as_they_were(folder, result, loaded):
+    assert read_mission(folder).metrics == record_of(result, loaded).metrics
+
+
+def test_the_scenario_is_read_as_it_was(folder, loaded):
+    assert read_mission(folder).settings == loaded.scenario
+
+
+def test_events_are_read_as_they_were(folder, result):
+    read = read_mission(folder).events
+    assert read["event"].to_list() == [event.event for event in result.events]
+
+
+def test_the_trajectory_is_read_as_it_was(folder, result):
+    read = read_mission(folder).trajectory
+    assert read["x_m"].to_list() == pytest.approx(
+        [each.x_m for each in result.trajectory], abs=1e-6
+    )
+
+
+def test_states_of_knowledge_are_read_exactly_as_they_were(folder, result):
+    read = read_mission(folder).knowledge
+    assert [each.state for each in read] == [each.state for each in result.knowledge]
+
+
+def test_the_altitudes_of_search_modes_are_read_as_they_were(folder, loaded):
+    assert read_mission(folder).search_altitudes_m == loaded.modes.search_altitudes_m
+
+
+def test_inputs_are_those_of_the_scenario_and_further_ones(folder, loaded):
+    assert read_mission(folder).inputs == {**loaded.inputs, "own.py": "abc"}
+
+
+def test_a_mission_without_knowledge_has_no_file_of_it(result, loaded):
+    assert KNOWLEDGE_FILE in mission_files(result, loaded, {}, ())
+    bare = Mission("seams2023", "none", record=True).result()
+    assert KNOWLEDGE_FILE not in mission_files(bare, loaded, {}, ())
+
+
+def test_the_end_is_the_time_of_the_last_point(folder, result):
+    assert read_mission(folder).end_s == result.trajectory[-1].t_s
+
+
+def test_where_it_comes_from_has_no_time_of_day(loaded):
+    assert provenance(loaded, {}, ("run",)) == provenance(loaded, {}, ("run",))
+
+
+# What is wrong.
+
+
+def replaced(path: Path, line: int, column: str, text: str) -> None:
+    """Change a cell of a CSV file."""
+    lines = path.read_text().splitlines()
+    cells = lines[line - 1].split(",")
+    cells[lines[0].split(",").index(column)] = text
+    lines[line - 1] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize("text", ["soon", "inf", "nan"])
+@pytest.mark.parametrize("column", ["t_s", "x_m"])
+def test_a_cell_that_is_no_finite_number_is_named_with_its_line(folder, column, text):
+    replaced(folder / TRAJECTORY_FILE, 3, column, text)
+    with pytest.raises(InputError) as caught:
+        read_mission(folder)
+    assert caught.value.place == "line 3"
+    assert caught.value.problem == f"{column}: expected a finite number, got '{text}'"
+
+
+def test_an_empty_cell_is_a_missing_value(folder):
+    replaced(folder / TRAJECTORY_FILE, 3, "x_m", "")
+    assert read_mission(folder).trajectory["x_m"].isna().to_list()[:3] == [False, True, False]
+
+
+def test_but_each_point_has_a_time(folder):
+    replaced(folder / TRAJECTORY_FILE, 3, "t_s", "")
+    with pytest.raises(InputError, match="line 3: t_s: expected a finite number, got ''"):
+        read_mission(folder)
+
+
+def test_a_detail_that_is_the_word_none_is_no_missing_value(folder):
+    replaced(folder / EVENTS_FILE, 2, "detail", "none")
+    assert read_mission(folder).events["detail"].iloc[0] == "none"
+
+
+@pytest.mark.parametrize("name", [EVENTS_FILE, TRAJECTORY_FILE])
+def test_a_file_without_rows_is_told(folder, name):
+    (folder / name).write_text((folder / name).read_text().splitlines()[0] + "\n")
+    with pytest.raises(InputError, match=f"{name}: is empty"):
+        read_mission(folder)
+
+
+@pytest.mark.parametrize("name", [MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE])
+def test_a_file_that_is_missing_is_told(folder, name):
+    (folder / name).unlink()
+    with pytest.raises(InputError, match=name):
+        read_mission(folder)
+
+
+def test_a_column_that_is_missing_is_told(folder):
+    path = folder / TRAJECTORY_FILE
+    path.write_text(path.read_text().replace("x_m", "x", 1))
+    with pytest.raises(InputError, match="x_m is missing"):
+        read_mission(folder)
+
+
+def test_angles_that_are_missing_are_zero(folder):
+    path = folder / TRAJECTORY_FILE
+    path.write_text(path.read_text().replace("roll_rad", "roll", 1))
+    assert set(read_mission(folder).trajectory["roll_rad"]) == {0.0}
+
+
+@pytest.mark.parametrize("key", ["scenario", "manager", "search_time_s"])
+def test_a_metric_that_is_missing_is_told(folder, key):
+    mission = json.loads((folder / MISSION_FILE).read_text())
+    del mission["metrics"][key]
+    (folder / MISSION_FILE).write_text(json.dumps(mission))
+    with pytest.raises(InputError, match=f"{key} is missing"):
+        read_mission(folder)
+
+
+@pytest.mark.parametrize("content", [[], {}, {"metrics": 1, "scenario": 2}])
+def test_what_is_no_record_of_a_mission_is_told(folder, content):
+    (folder / MISSION_FILE).write_text(json.dumps(content))
+    with pytest.raises(InputError, match="is not the record of a mission"):
+        read_mission(folder)
+
+
+def test_a_scenario_that_cannot_be_read_today_is_told_when_it_is_needed(folder):
+    mission = json.loads((folder / MISSION_FILE).read_text())
+    mission["scenario"]["tide"] = 1
+    (folder / MISSION_FILE).write_text(json.dumps(mission))
+    record = read_mission(folder)
+    with pytest.raises(InputError, match="one that this suave-des does not read"):
+        _ = record.settings
+
+
+# Knowledge states.
+
+
+def read_again(records: list[KnowledgeRecord], folder: Path) -> tuple[KnowledgeRecord, ...]:
+    """Write states as a campaign does, and read them."""
+    path = folder / "states.jsonl"
+    head = scenario_line(load_scenario("seams2023").scenario)
+    path.write_text(head + mission_line("metacontrol", 0, 1, records), encoding="utf-8")
+    (mission,) = read_missions(path)
+    return mission.records
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"objectives": []},
+        {"objectives": [ObjectiveState("f_generate_search_path", "UNGROUNDED", False)]},
+        {"groundings": {"f_maintain_motion": "fd_recover_thrusters"}},
+        {"components": {"c_thruster_1": "RECOVERED"}},
+        {"measurements": {"battery_level": "2.50"}},
+    ],
+)
+def test_states_that_differ_in_one_part_stay_different(tmp_path, other):
+    records = [KnowledgeRecord(1.0, state()), KnowledgeRecord(2.0, state(**other))]
+    assert read_again(records, tmp_path) == tuple(records)
+
+
+def test_states_that_differ_in_measured_values_only_are_in_the_table_once():
+    records = [
+        KnowledgeRecord(float(value), state(measurements={"water_visibility": value}))
+        for value in (1, 2)
+    ]
+    assert len(json.loads(mission_line("metacontrol", 0, 1, records))["states"]) == 1
+
+
+def test_their_values_are_those_of_their_cycles(tmp_path):
+    values = (Decimal("1.10"), Decimal("0.000001"))
+    records = [
+        KnowledgeRecord(t_s, state(measurements={"water_visibility": value}))
+        for t_s, value in enumerate(values)
+    ]
+    found = [dict(each.state.measurements) for each in read_again(records, tmp_path)]
+    assert [each["water_visibility"] for each in found] == list(values)
+
+
+def test_the_scenario_has_what_is_swept_as_at_the_missions_point(tmp_path):
+    path = tmp_path / "states.jsonl"
+    scenario = load_scenario("seams2023").scenario
+    lines = [
+        mission_line("metacontrol", point, 1, [], {"signals.water_visibility.period_s": period_s})
+        for point, period_s in enumerate((40.0, 120.0))
+    ]
+    path.write_text(scenario_line(scenario) + "".join(lines))
+    periods = [each.scenario.signals["water_visibility"].period_s for each in read_missions(path)]
+    assert periods == [40.0, 120.0]
+
+
+def test_a_line_that_is_damaged_is_named(tmp_path):
+    path = tmp_path / KNOWLEDGE_FILE
+    path.write_text(knowledge_text([KnowledgeRecord(1.0, state())]) + "{\n")
+    with pytest.raises(InputError, match=r"line 2: is damaged: .* \(run the mission again\)"):
+        read_knowledge(path)
+
+
+def test_a_state_that_a_table_does_not_have_is_damage(tmp_path):
+    path = tmp_path / "states.jsonl"
+    line = json.loads(mission_line("metacontrol", 0, 1, [KnowledgeRecord(1.0, state())]))
+    line["cycles"][0][1] = 7
+    head = scenario_line(load_scenario("seams2023").scenario)
+    path.write_text(head + json.dumps(line) + "\n")
+    with pytest.raises(InputError, match=r"line 2: is damaged: .* \(run the campaign again\)"):
+        list(read_missions(path))
+
+
+def test_versions_name_every_library_that_decides():
+    assert {"suave-des", "python", *mission_folder.LIBRARIES} == set(mission_folder.versions())

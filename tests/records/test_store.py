@@ -1,0 +1,293 @@
+"""The store of a campaign keeps outcomes, whatever ends its process, and says what is wrong with
+it.
+"""
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.records import store as stores
+from suave_des.records.metrics import COLUMNS
+from suave_des.records.store import (
+    MANIFEST_FILE,
+    RUNS_FILE,
+    STORE_FILE,
+    SUAVE_FOLDER,
+    MissionFailure,
+    MissionKey,
+    Store,
+    StoreError,
+    has_campaign,
+    is_left_over,
+    read_manifest,
+    runs_pieces,
+    tidy,
+    write_campaign,
+)
+
+FIRST, SECOND, THIRD = (MissionKey(0, 0, run) for run in (1, 2, 3))
+ROW = ("sea", "none", 1, 87.0, True, None)
+PASSING = MissionFailure("none", 2, 50.0, "not done after 2 s (time-out)", lasting=False)
+LASTING = MissionFailure("none", 3, None, "ValueError: no", point=4)
+
+
+@pytest.fixture
+def store(tmp_path: Path):
+    """A store of a campaign that has begun."""
+    with closing(Store(tmp_path / STORE_FILE)) as opened:
+        opened.begin({"identity": "one"})
+        yield opened
+
+
+def test_outcomes_come_back_in_the_order_of_their_keys(store):
+    found = [(THIRD, LASTING), (FIRST, ROW), (SECOND, PASSING)]
+    store.append(found)
+    assert list(store.outcomes()) == sorted(found, key=lambda each: each[0])
+
+
+def test_an_outcome_takes_the_place_of_an_earlier_one_of_its_mission(store):
+    store.append([(FIRST, PASSING)])
+    store.append([(FIRST, ROW)])
+    assert list(store.outcomes()) == [(FIRST, ROW)]
+
+
+def test_only_failures_that_may_not_recur_are_forgotten(store):
+    store.append([(FIRST, ROW), (SECOND, PASSING), (THIRD, LASTING)])
+    store.forget_passing_failures()
+    assert [key for key, _ in store.outcomes()] == [FIRST, THIRD]
+
+
+def test_settled_are_the_runs_of_one_manager_at_one_point(store):
+    others = [MissionKey(0, 1, 5), MissionKey(1, 0, 6)]
+    store.append([(key, ROW) for key in (FIRST, THIRD, *others)])
+    assert store.settled(0, 0) == {1, 3}
+
+
+def test_what_is_noted_is_found_under_its_name(store):
+    store.note("identity", {"runs": 3})
+    assert store.about("identity") == {"runs": 3}
+
+
+def test_what_was_never_noted_is_damage(store):
+    with pytest.raises(InputError, match="is damaged: its request is missing"):
+        store.about("request")
+
+
+def test_unless_there_is_a_default(store):
+    assert store.about("remarks", default=["none"]) == ["none"]
+
+
+def test_a_closed_store_can_still_be_read(tmp_path):
+    with closing(Store(tmp_path / STORE_FILE)) as opened:
+        opened.begin({})
+        opened.append([(FIRST, ROW)])
+    assert list(opened.outcomes()) == [(FIRST, ROW)]
+
+
+def test_a_closed_store_is_one_file(tmp_path):
+    with closing(Store(tmp_path / STORE_FILE)) as opened:
+        opened.begin({})
+    assert [path.name for path in tmp_path.iterdir()] == [STORE_FILE]
+
+
+def test_one_that_has_no_outcome_is_removed_if_that_is_asked_for(tmp_path):
+    opened = Store(tmp_path / STORE_FILE)
+    opened.begin({})
+    opened.close(keep_empty=False)
+    assert not (tmp_path / STORE_FILE).exists()
+
+
+def test_one_that_has_outcomes_is_not(tmp_path):
+    opened = Store(tmp_path / STORE_FILE)
+    opened.begin({})
+    opened.append([(FIRST, ROW)])
+    opened.close(keep_empty=False)
+    assert (tmp_path / STORE_FILE).exists()
+
+
+def test_a_store_begins_anew_in_place_of_an_earlier_campaign(tmp_path):
+    with closing(Store(tmp_path / STORE_FILE)) as earlier:
+        earlier.begin({"identity": "one"})
+        earlier.append([(FIRST, ROW)])
+    with closing(Store(tmp_path / STORE_FILE)) as later:
+        later.begin({"identity": "two"})
+        assert (later.count(), later.about("identity")) == (0, "two")
+
+
+def test_two_campaigns_cannot_use_a_folder_at_the_same_time(store, tmp_path):
+    with pytest.raises(InputError, match="another campaign is running in the output folder"):
+        Store(tmp_path / STORE_FILE)
+
+
+def changed(folder: Path, statement: str) -> None:
+    """Change a store as another program would."""
+    with closing(sqlite3.connect(folder / STORE_FILE)) as db, db:
+        db.execute(statement)
+
+
+@pytest.fixture
+def closed(tmp_path: Path) -> Path:
+    """The folder of a store with an outcome."""
+    with closing(Store(tmp_path / STORE_FILE)) as opened:
+        opened.begin({"identity": "one"})
+        opened.append([(FIRST, ROW)])
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("statement", "problem"),
+    [
+        ("UPDATE outcomes SET content = '[1]'", "the outcome of run 1 is not what was written"),
+        ("UPDATE outcomes SET run = 2", "the outcome of run 2 is not what was written"),
+        ("UPDATE outcomes SET kind = 1", "the outcome of run 1 is not what was written"),
+    ],
+)
+def test_an_outcome_that_was_changed_is_damage(closed, statement, problem):
+    changed(closed, statement)
+    with closing(Store(closed / STORE_FILE)) as opened, pytest.raises(InputError, match=problem):
+        list(opened.outcomes())
+
+
+def test_what_was_noted_and_then_changed_is_damage(closed):
+    changed(closed, "UPDATE about SET value = '\"two\"'")
+    with (
+        closing(Store(closed / STORE_FILE)) as opened,
+        pytest.raises(InputError, match="its identity is not what was written"),
+    ):
+        opened.about("identity")
+
+
+def test_a_store_of_another_version_is_told(closed):
+    changed(closed, "PRAGMA user_version = 2")
+    with pytest.raises(InputError, match="store of version 2, and this suave-des has version 3"):
+        Store(closed / STORE_FILE)
+
+
+def test_a_file_that_is_no_store_is_damage(tmp_path):
+    (tmp_path / STORE_FILE).write_text("my notes " * 100)
+    with pytest.raises(InputError, match="is damaged"):
+        Store(tmp_path / STORE_FILE)
+
+
+def test_it_is_replaced_only_if_that_is_asked_for(tmp_path):
+    (tmp_path / STORE_FILE).write_text("my notes " * 100)
+    with closing(Store(tmp_path / STORE_FILE, replace=True)) as opened:
+        assert opened.is_new
+
+
+def test_a_store_whose_file_was_removed_can_keep_nothing(tmp_path):
+    with closing(Store(tmp_path / STORE_FILE)) as opened:
+        opened.begin({})
+        (tmp_path / STORE_FILE).unlink()
+        with pytest.raises(StoreError, match="was removed while the campaign ran"):
+            opened.commit()
+
+
+def test_outcomes_are_durable_after_a_while_without_being_asked(tmp_path, monkeypatch):
+    now_s = iter([0.0, 0.0, stores._COMMIT_PERIOD_S + 1.0, 2.0])
+    monkeypatch.setattr(stores.time, "monotonic", lambda: next(now_s))
+    opened = Store(tmp_path / STORE_FILE)
+    opened.begin({})
+    opened.append([(FIRST, ROW)])
+    opened.append([(SECOND, ROW)])
+    opened._db.execute("ROLLBACK")  # what a kill loses
+    opened._db.execute("BEGIN")
+    assert opened.count() == 2
+    opened.close()
+
+
+def test_a_folder_has_a_campaign_from_its_beginning_on(closed):
+    assert has_campaign(closed)
+
+
+def test_a_folder_in_which_none_was_begun_has_none(tmp_path):
+    Store(tmp_path / STORE_FILE).close()
+    assert not has_campaign(tmp_path)
+
+
+def test_one_that_is_in_use_counts_as_a_campaign(tmp_path):
+    with closing(Store(tmp_path / STORE_FILE)):
+        assert has_campaign(tmp_path)
+
+
+def test_a_damaged_store_counts_as_a_campaign(tmp_path):
+    (tmp_path / STORE_FILE).write_text("my notes " * 100)
+    assert has_campaign(tmp_path)
+
+
+def test_only_files_of_the_database_are_left_over():
+    names = (f"{STORE_FILE}-wal", STORE_FILE, RUNS_FILE)
+    assert [is_left_over(name) for name in names] == [True, True, False]
+
+
+# The files beside it.
+
+
+def test_metrics_are_rounded_in_runs_csv():
+    row = tuple(0.123456789 for _ in COLUMNS)
+    _, line = "".join(runs_pieces(COLUMNS, [row])).splitlines()
+    assert set(line.split(",")) == {"0.123457"}
+
+
+def test_what_was_drawn_has_all_its_digits_in_runs_csv():
+    row = (*(None for _ in COLUMNS), 0.1234567890123456, "low")
+    _, line = "".join(runs_pieces((*COLUMNS, "start.x_m", "mode"), [row])).splitlines()
+    assert line.split(",")[len(COLUMNS) :] == ["0.1234567890123456", "low"]
+
+
+def test_files_of_an_earlier_campaign_that_are_not_written_again_are_gone(tmp_path):
+    write_campaign(tmp_path, {RUNS_FILE: "a", MANIFEST_FILE: "{}"}, {})
+    write_campaign(tmp_path, {RUNS_FILE: "b"}, {})
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {RUNS_FILE: "b"}
+
+
+def test_the_exemplars_files_have_a_folder_of_their_own(tmp_path):
+    write_campaign(tmp_path, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    assert (tmp_path / SUAVE_FOLDER / "none_suave.csv").read_text() == "b"
+
+
+def test_which_is_gone_when_a_campaign_has_none(tmp_path):
+    write_campaign(tmp_path, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    write_campaign(tmp_path, {RUNS_FILE: "a"}, {})
+    assert not (tmp_path / SUAVE_FOLDER).exists()
+
+
+def test_unless_the_user_has_put_something_into_it(tmp_path):
+    write_campaign(tmp_path, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    (tmp_path / SUAVE_FOLDER / "notes.txt").write_text("mine")
+    write_campaign(tmp_path, {RUNS_FILE: "a"}, {})
+    assert [path.name for path in (tmp_path / SUAVE_FOLDER).iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize(("is_new", "kept"), [(True, []), (False, [RUNS_FILE])])
+def test_the_results_of_an_earlier_campaign_are_removed_before_a_new_one(tmp_path, is_new, kept):
+    (tmp_path / RUNS_FILE).write_text("a")
+    tidy(tmp_path, is_new=is_new)
+    assert [path.name for path in tmp_path.iterdir()] == kept
+
+
+def test_a_link_in_place_of_the_exemplars_folder_is_not_followed(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / SUAVE_FOLDER).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="is a link"):
+        tidy(tmp_path, is_new=True)
+
+
+def test_a_folder_without_a_manifest_has_an_empty_one(tmp_path):
+    assert read_manifest(tmp_path) == {}
+
+
+def test_a_manifest_of_the_campaign_that_is_kept_is_read(closed):
+    manifest = {"campaign_sha256": "one", "runs": 3}
+    (closed / MANIFEST_FILE).write_text(json.dumps(manifest))
+    assert read_manifest(closed) == manifest
+
+
+def test_a_manifest_of_another_campaign_is_told(closed):
+    (closed / MANIFEST_FILE).write_text('{"campaign_sha256": "two"}')
+    with pytest.raises(InputError, match=r"runs\.csv and campaign\.sqlite are of different"):
+        read_manifest(closed)
