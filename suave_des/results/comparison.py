@@ -444,22 +444,29 @@ def _conclusions(
         for each in summaries
         if each["metric"] == metric.name and "mean" in each
     }
-    points = dict.fromkeys(group.point for group in groups.groups)
-    if len(points) == 1 or len(points) == len(groups.groups):
-        points = {"": None}
     points_of: dict[str, list[str]] = {}
-    for point in points:
-        names = [group.name for group in groups.groups if not point or group.point == point]
-        text = overall_conclusion(
-            metric, differences, {name: means[name] for name in names if name in means}, names
-        )
+    for point, names in _names_at_points(groups):
+        own = {name: means[name] for name in names if name in means}
+        text = overall_conclusion(metric, differences, own, names)
         if metric.name == SEARCH_TIME:
             text = f"{_lost(groups, names)}{text}"
-        points_of.setdefault(text.replace(point, "") if point else text, []).append(
-            point.removeprefix(", ")
-        )
+        without_point = text.replace(point, "") if point else text
+        points_of.setdefault(without_point, []).append(point.removeprefix(", "))
     for text, where in points_of.items():
         yield f"{'; '.join(where)}: {text}" if where[0] else text
+
+
+def _names_at_points(groups: Groups) -> Iterator[tuple[str, list[str]]]:
+    """Yield the points of a sweep at which managers are compared, with the names of the groups; all
+    names without a point, if the points are what is compared, or nothing is swept.
+    """
+    names_at: dict[str, list[str]] = {}
+    for group in groups.groups:
+        names_at.setdefault(group.point, []).append(group.name)
+    if len(names_at) in (1, len(groups.groups)):
+        yield "", [group.name for group in groups.groups]
+    else:
+        yield from names_at.items()
 
 
 def _lost(groups: Groups, names: Sequence[str]) -> str:

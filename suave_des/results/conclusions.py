@@ -261,25 +261,25 @@ def overall_conclusion(
     """
     if len(groups) < 2:
         return f"There is only {groups[0]}, so there is nothing to compare it with."
-    own = [
-        each
-        for each in differences
-        if each["test"]
-        and each["metric"] == metric.name
-        and {each["group"], each["other"]} <= set(groups)
-    ]
+    own = [each for each in differences if _is_about(each, metric, groups)]
     if not own:
         return f"No two of them have a {metric.title} that could be compared."
     if len(own) == 1 or not metric.better or len(means) < 2:
         return " ".join(each["conclusion"] for each in own[:_MOST_SENTENCES])
     best = max(means, key=lambda name: metric.better * means[name])
     against = [each for each in own if best in (each["group"], each["other"])]
-    sentences = list(_means_of_best(best, metric, against, means, len(groups) - 1))
+    sentences = _means_of_best(best, metric, against, means, len(groups) - 1)
     with_ranks = [each for each in against if not _is_of_shares(each) and not _is_equal(each)]
     if with_ranks:
         sentences.append(_ranks_of_best(best, metric, with_ranks))
         sentences.append(_pairs_of_best(best, metric, with_ranks))
     return " ".join(sentences)
+
+
+def _is_about(found: Row, metric: Metric, groups: Sequence[str]) -> bool:
+    """Return whether a difference is tested, in this metric, and of two of these groups."""
+    is_of_groups = {found["group"], found["other"]} <= set(groups)
+    return bool(found["test"]) and found["metric"] == metric.name and is_of_groups
 
 
 def _means_of_best(
@@ -289,29 +289,51 @@ def _means_of_best(
 
     It is the best only if it is shown to be better than all others, of which there are so many.
     """
-    better = [each for each in against if _has_mean_shown(each) and _favours(each, best, metric)]
-    worse = [each for each in against if _has_mean_shown(each) and each not in better]
-    open_ones = [each for each in against if not _has_mean_shown(each)]
-    alike = [_not_shown(each, best) for each in open_ones]
-    sentences = []
-    if better and len(better) == others:
-        most = metric.most if _is_of_shares(better[0]) else f"{metric.most} on average"
-        sentences.append(f"{best} {most}: {_and(_amounts(best, metric, better))}; {_ps(better)}.")
-    elif better:
-        rest = f"; no difference of the means is shown to {_and(alike)}" if alike else ""
-        verb = _verb(metric)
-        sentences.append(
-            f"On average, {best} {verb} {_and(_amounts(best, metric, better))}; {_ps(better)}{rest}."
-        )
-    elif alike:
-        is_alone = list(means.values()).count(means[best]) == 1
-        has = "has the best mean" if is_alone else "has, with others, the best mean"
-        is_better_in_runs = all(_favours(each, best, metric) for each in open_ones)
-        has += "" if is_better_in_runs or not is_alone else " of all its runs"
-        sentences.append(
-            f"No difference of the mean {_without_mean(metric)} is shown between {best}, which {has}, and {_and(alike)}."
-        )
-    return sentences + [_sentence_of_means(each, metric) for each in worse]
+    better: list[Row] = []
+    worse: list[Row] = []
+    alike: list[Row] = []
+    for each in against:
+        if not _has_mean_shown(each):
+            alike.append(each)
+        elif _favours(each, best, metric):
+            better.append(each)
+        else:
+            worse.append(each)
+    sentences = [_sentence_of_means(each, metric) for each in worse]
+    if better:
+        is_best_of_all = len(better) == others
+        return [_claim_of_best(best, metric, better, alike, is_best_of_all), *sentences]
+    if alike:
+        return [_claim_of_none(best, metric, alike, means), *sentences]
+    return sentences
+
+
+def _claim_of_best(
+    best: str, metric: Metric, better: Sequence[Row], alike: Sequence[Row], is_best_of_all: bool
+) -> str:
+    """Write by how much the best mean is better than those from which it differs."""
+    amounts, test = _and(_amounts(best, metric, better)), _ps(better)
+    if not is_best_of_all:
+        rest = _and([_not_shown(each, best) for each in alike]) if alike else ""
+        no_others = f"; no difference of the means is shown to {rest}" if rest else ""
+        return f"On average, {best} {_verb(metric)} {amounts}; {test}{no_others}."
+    if _is_of_shares(better[0]):
+        return f"{best} {metric.most}: {amounts}; {test}."
+    return f"{best} {metric.most} on average: {amounts}; {test}."
+
+
+def _claim_of_none(
+    best: str, metric: Metric, alike: Sequence[Row], means: Mapping[str, float]
+) -> str:
+    """Write that the best mean is not shown to differ from others."""
+    if list(means.values()).count(means[best]) > 1:
+        has = "has, with others, the best mean"
+    elif all(_favours(each, best, metric) for each in alike):
+        has = "has the best mean"
+    else:
+        has = "has the best mean of all its runs"
+    others = _and([_not_shown(each, best) for each in alike])
+    return f"No difference of the mean {_without_mean(metric)} is shown between {best}, which {has}, and {others}."
 
 
 def _ranks_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:

@@ -493,6 +493,12 @@ def _draw_panel(
     for place, (number, curve) in enumerate(zip(style.looks(list(curves)), curves, strict=True)):
         beside = (place - (len(curves) - 1) / 2) * apart
         _draw_means(axes, curves[curve], beside, number, curve)
+    _set_ticks(axes, places, words)
+    return counts
+
+
+def _set_ticks(axes: Axes, places: pandas.Series[float], words: Sequence[str]) -> None:
+    """Mark swept words, or the swept values if there are few, on the horizontal axis."""
     if words:
         shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
         long = max(map(len, words)) > 6 and len(words) > 2
@@ -510,7 +516,6 @@ def _draw_panel(
         axes.set_xticks(values, [f"{value:g}" for value in values])
     else:
         axes.xaxis.set_major_locator(MaxNLocator(4))
-    return counts
 
 
 def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:

@@ -140,20 +140,13 @@ def grouped(
             lacking.append(f"{name} {found.left_out} of {runs}")
         horizon_s = float(part[HORIZON].iloc[0])
         groups.append(Group(name, _by_run(found.rows), found.are_missions, point, horizon_s))
-    if lacking and not any(len(group.frame) for group in groups):
-        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
-        raise InputError(
-            "no manager has a run with missions at all points of the sweep", remedy=remedy
-        )
+    on_points = list(_notes_on_points(groups, averaged, frame, lacking))
     chosen = _chosen_metrics(metrics, groups)
-    notes = list(_notes(groups, averaged, frame, alike))
-    if lacking:
-        notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
-    if _are_at_other_points(frame, averaged):
-        notes.append(
-            f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
-        )
-    notes += _notes_on_metrics(groups, chosen)
+    notes = [
+        *_notes(groups, averaged, frame, alike),
+        *on_points,
+        *_notes_on_metrics(groups, chosen),
+    ]
     limit_s = min(group.horizon_s for group in groups)
     lost = dict(_mostly_lost(groups))
     return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost)
@@ -518,6 +511,28 @@ def _mostly_lost(groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
                 else f"{lost.mean():.0%} of its"
             )
             yield group.name, f"{share} missions"
+
+
+def _notes_on_points(
+    groups: Sequence[Group],
+    averaged: Sequence[str],
+    frame: pandas.DataFrame,
+    lacking: Sequence[str],
+) -> Iterator[str]:
+    """Say which runs lack a point of the sweep, and whether campaigns have the same points.
+
+    Raises:
+        InputError: no run has all points.
+    """
+    if lacking and not any(len(group.frame) for group in groups):
+        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
+        raise InputError(
+            "no manager has a run with missions at all points of the sweep", remedy=remedy
+        )
+    if lacking:
+        yield f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out"
+    if _are_at_other_points(frame, averaged):
+        yield f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
 
 
 def _notes_on_metrics(groups: Sequence[Group], metrics: Sequence[Metric]) -> Iterator[str]:
