@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 IMAGES = Path(__file__).resolve().parent / "images"
-PICTURES = ("replay.png", "replay-two.png", "report.png")
+PICTURES = ("replay.png", "replay-phone.png", "replay-two.png", "report.png")
 _COLOURS = 256
 
 
@@ -45,26 +45,31 @@ def main() -> None:
             ),
             "report": report_page([campaign]),
         }
+        pages["replay-phone"] = pages["replay"]
         for page, text in pages.items():
             (folder / f"{page}.html").write_text(text, encoding="utf-8")
         browser = playwright.chromium.launch(
             executable_path=shutil.which("chromium"), args=["--no-sandbox"]
         )
         _take(browser, folder / "replay.html", "#t=37&theme=dark", (1180, 760))
+        _take(browser, folder / "replay-phone.html", "#t=37&theme=dark", (390, 760), scale=2)
         _take(browser, folder / "replay-two.html", "#t=76&theme=light", (1180, 860))
         _take(browser, folder / "report.html", "#theme=light", (1180, 1000))
         browser.close()
 
 
-def _take(browser: Browser, file: Path, where: str, size: tuple[int, int]) -> None:
-    """Take one picture, in as few colours as it needs."""
-    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+def _take(browser: Browser, file: Path, where: str, size: tuple[int, int], scale: int = 1) -> None:
+    """Take one picture, in as few colours as it needs; scale: pixels of the screen to one here."""
+    viewport = {"width": size[0], "height": size[1]}
+    page = browser.new_page(viewport=viewport, device_scale_factor=scale)
     page.goto(file.as_uri() + where)
     while not page.evaluate("document.body.dataset.ready || document.body.dataset.time"):
         page.wait_for_timeout(100)
     page.wait_for_timeout(1000)
     with Image.open(io.BytesIO(page.screenshot())) as taken:
-        picture = taken.convert("RGB").quantize(_COLOURS, kmeans=4)
+        # A palette of the most frequent colours would leave out those of a mark or a thin line.
+        coverage = Image.Quantize.MAXCOVERAGE
+        picture = taken.convert("RGB").quantize(_COLOURS, method=coverage, kmeans=4)
     target = IMAGES / f"{file.stem}.png"
     picture.save(target, optimize=True)
     print(f"{target.name}: {target.stat().st_size / 1000:.0f} kB")

@@ -22,6 +22,7 @@ _PAGES = {
 """Pages of the repository's root, and their names on the site."""
 _LINK = re.compile(r"\]\(([^)#\s]+)((?:#[^)\s]*)?)\)")
 _LINK_WITH_TEXT = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)\)")
+_SOURCE = re.compile(r'(src|srcset)="([^"]+)"')
 _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*:")
 """What an address begins with: https:, mailto:, and data: of a notebook's pictures."""
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -114,6 +115,12 @@ def _on_site(text: str, own: str, root: Path) -> str:
             on_site = on_site.replace(".ipynb", ".md")
         return f"]({posixpath.relpath(on_site, posixpath.dirname(own) or '.')}{found[2]})"
 
+    def picture(found: re.Match[str]) -> str:
+        path = _in_repository(found[2], own, root)
+        return found[0] if path is None else f'{found[1]}="{path.removeprefix("docs/")}"'
+
+    if own == "index.md":  # other pages have no HTML with pictures
+        text = _SOURCE.sub(picture, text)
     return _LINK.sub(link, _LINK_WITH_TEXT.sub(linked_or_plain, text))
 
 

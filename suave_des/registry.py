@@ -276,6 +276,7 @@ def _imported(what: str, module: str) -> ModuleType:
         own = [
             each for each in extract_tb(error.__traceback__)[1:] if "importlib" not in each.filename
         ]
+        own = [each for each in own if not _LIBRARY.match(each.filename)] or own
         if own:
             raise InputError(
                 problem, file=own[-1].filename, place=f"line {own[-1].lineno}"

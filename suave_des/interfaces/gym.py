@@ -88,6 +88,11 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     ) -> None:
         if not 0.05 <= period_s < inf:
             raise InputError(f"period_s: {period_s} is out of range", remedy="give 0.05 s or more")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(
+                f"render_mode: there is no {shown(render_mode)}",
+                remedy='give "rgb_array", or None; `suave-des replay` shows a mission in a browser',
+            )
         if not reward.keys() <= REWARD.keys():
             raise InputError(
                 f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}"

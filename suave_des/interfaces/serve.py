@@ -33,6 +33,32 @@ _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _JSON: Final = "application/json"
 _ADVANCE: Final = "advance_s"
 _LONGEST_S: Final = 1e6
+REQUESTS: Final = {
+    "GET /": "this list",
+    "GET /monitor": "what the mission's state is; null: not measured yet",
+    "GET /monitor_schema": "JSON schema of the answer of /monitor, with what each name means",
+    "PUT /execute": "requests modes by function, then advances by advance_s; null: as it is",
+    "GET /execute_schema": "JSON schema of the body of /execute",
+    "GET /adaptation_options": "the modes of each function",
+    "GET /adaptation_options_schema": "JSON schema of the answer of /adaptation_options",
+    "POST /advance": "advances mission time by advance_s; answers as /monitor",
+    "POST /start": "begins another mission: run, seed; answers as /monitor",
+    "GET /metrics": "a row of runs.csv",
+}
+"""What a session answers; bodies are JSON."""
+_MEANINGS: Final = {
+    "time_s": "mission time",
+    "is_over": "whether the mission has ended",
+    "task": "the current task; empty: none",
+    "distance_inspected_m": "length of pipeline that was inspected",
+    "x_m": "position, east",
+    "y_m": "position, north",
+    "z_m": "position, up",
+    "roll_rad": "attitude",
+    "pitch_rad": "attitude",
+    "yaw_rad": "attitude; 0 is east, positive to the north",
+}
+"""Of the names in /monitor that every scenario has."""
 Json = dict[str, Any]
 
 
@@ -57,6 +83,7 @@ class Session:
         self._run, self._seed = run, seed
         self._lock = threading.Lock()
         self._paths: dict[tuple[str, str], Callable[[Any], Json]] = {
+            ("GET", "/"): lambda _: dict(REQUESTS),
             ("GET", "/monitor"): lambda _: self._monitor(),
             ("PUT", "/execute"): self._execute,
             ("GET", "/adaptation_options"): lambda _: self._options(),
@@ -137,11 +164,15 @@ class Session:
         return self._monitor()
 
     def _monitor_schema(self) -> Json:
-        number, text, either = {"type": "number"}, {"type": "string"}, {"type": ["number", "null"]}
-        kinds: Json = {"is_over": {"type": "boolean"}, "task": text}
-        kinds |= dict.fromkeys(self._mission.manager.system.measurements, either)
-        kinds |= dict.fromkeys((*THRUSTER_NAMES, *self._options()), text)
-        return _schema({name: kinds.get(name, number) for name in self._monitor()}, required=True)
+        number, text = {"type": "number"}, {"type": "string"}
+        kinds: Json = {name: number | {"description": said} for name, said in _MEANINGS.items()}
+        kinds["is_over"]["type"], kinds["task"]["type"] = "boolean", "string"
+        measured = {"type": ["number", "null"], "description": "measured; null: not yet"}
+        status = text | {"description": "status of the thruster; empty: none was published"}
+        mode = text | {"description": "mode of the function, requested last; empty: none"}
+        kinds |= dict.fromkeys(self._mission.manager.system.measurements, measured)
+        kinds |= dict.fromkeys(THRUSTER_NAMES, status) | dict.fromkeys(self._options(), mode)
+        return _schema({name: kinds[name] for name in self._monitor()}, required=True)
 
     def _execute_schema(self) -> Json:
         modes = {

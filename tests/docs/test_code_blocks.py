@@ -13,6 +13,7 @@ from doc_blocks import IMAGES, PAGES, ROOT, Block, blocks_of, differs, run_page
 from jupyter_client.manager import KernelManager
 from make_screenshots import PICTURES
 from mkdocs_hooks import notebook_markdown
+from PIL import Image
 from refresh_notebooks import NOTEBOOKS, executed, shown
 
 from tests.helpers.command import python
@@ -143,6 +144,15 @@ def test_every_picture_is_drawn_by_a_block_or_taken_by_the_script():
 def test_pictures_are_small_pngs(picture):
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert picture.stat().st_size < 300_000
+
+
+@pytest.mark.parametrize("name", ["--mode-follow", "--mode-low", "--bad", "--good"])
+def test_the_picture_of_two_missions_keeps_the_colours_of_lines_and_marks(name):
+    css = (ROOT / "suave_des" / "pages" / "assets" / "common.css").read_text(encoding="utf-8")
+    wanted = bytes.fromhex(re.search(rf"{name}: #(\w{{6}})", css)[1])  # the first theme is light
+    with Image.open(IMAGES / "replay-two.png") as picture:
+        drawn = [colour for _, colour in picture.convert("RGB").getcolors()]
+    assert min(max(abs(a - b) for a, b in zip(wanted, each, strict=True)) for each in drawn) < 16
 
 
 # Keeps the script, as Slurm does: dask-jobqueue removes it as soon as it is submitted.

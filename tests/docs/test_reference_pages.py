@@ -74,6 +74,11 @@ def test_columns_are_those_of_the_file(page, heading, names):
     assert lists(section(page, heading))[0] == list(names)
 
 
+def test_the_guide_to_managers_lists_every_kind_of_diagnostics():
+    rows = tables(section(ROOT / "docs" / "guides" / "managers.md", "Hooks"))[0]
+    assert [row[0] for row in rows] == [f"`Kind.{kind.name}`" for kind in suave_des.Kind]
+
+
 def test_every_further_metric_has_a_column_and_can_be_compared():
     assert {*lists(section(CSV_PAGE, "runs.csv"))[1]} == {*FURTHER_METRICS, "requirement_NAME"}
     assert {*FURTHER_METRICS} <= METRICS.keys()

@@ -149,6 +149,16 @@ def test_the_copy_button_copies_commands_without_prompt_and_output(site, browser
     assert [line for line in copied(site, browser, ".", text).splitlines() if line] == lines
 
 
+@pytest.mark.parametrize(
+    ("size", "picture"), [(DESKTOP, "replay.png"), (PHONE, "replay-phone.png")]
+)
+def test_the_first_picture_is_one_for_the_window(site, browser, size, picture):
+    with opened(browser, site / "index.html", size) as found:
+        shown = "document.querySelector('article picture img')"
+        assert found.value(f"{shown}.currentSrc").endswith(f"/images/{picture}")
+        assert found.value(f"{shown}.naturalWidth") > 300
+
+
 class TestHooks:
     def markdown(self, text, own="guides/page.md"):
         from types import SimpleNamespace

@@ -192,3 +192,15 @@ def test_it_draws_the_way_so_far(simulator):
     after = environment.render()
     assert before.shape == after.shape == (400, 600, 3) and before.dtype == np.uint8
     assert (before != after).any()
+
+
+def test_gymnasium_makes_it_by_its_module_without_an_import_before():
+    name = f"suave_des.interfaces.gym:{NAME}"
+    program = f"import gymnasium\nprint(type(gymnasium.make({name!r}).unwrapped).__name__)"
+    done = python("-W", "error", "-c", program)
+    assert (done.stdout, done.stderr) == ("PipelineInspection\n", "")
+
+
+def test_a_way_to_render_that_it_does_not_have_is_refused():
+    with pytest.raises(InputError, match="render_mode: there is no 'human'"):
+        PipelineInspection(render_mode="human")

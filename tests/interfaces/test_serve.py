@@ -241,3 +241,17 @@ def test_monitor_shows_what_the_mission_shows(port, simulator):
     assert found["water_visibility"] == mission.measured("water_visibility")
     assert found["c_thruster_1"] == "FALSE" and found[SEARCH] == mission.current_mode(SEARCH)
     assert found["x_m"] == mission.pose.x_m
+
+
+def test_it_lists_its_requests(simulator, port):
+    status, answer = request(port, "GET", "/")
+    listed = [tuple(each.split()) for each in json.loads(answer)]
+    assert status == 200
+    assert sorted(listed) == sorted(Session(simulator)._paths)
+
+
+def test_the_schema_says_what_each_name_of_the_monitor_means(port):
+    properties = json.loads(request(port, "GET", "/monitor_schema")[1])["properties"]
+    assert properties.keys() == json.loads(request(port, "GET", "/monitor")[1]).keys()
+    assert all(each["description"] for each in properties.values())
+    assert properties["water_visibility"]["type"] == ["number", "null"]

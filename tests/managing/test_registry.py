@@ -42,8 +42,9 @@ def test_a_name_that_leads_to_no_manager_is_bad_input(name, words):
         ("import sys\nsys.exit(0)\n", "SystemExit", "line 2"),
         ("def broken(:\n", "invalid syntax", "line 1"),
         ("import math\n\nmath.sqrt(-1.0)\n", "ValueError", "line 3"),
+        ("from suave_des import Kind\nKIND = Kind.MEASURED\n", "AttributeError", "line 2"),
     ],
-    ids=["exits", "syntax", "raises"],
+    ids=["exits", "syntax", "raises", "raises in a library"],
 )
 def test_a_module_that_fails_on_import_is_bad_input_with_its_line(
     source, problem, place, tmp_path, monkeypatch

@@ -212,3 +212,27 @@ def test_names_are_text_never_markup(missions, tmp_path, browser):
         assert found.complaints == []
         assert found.page.text_content("h1") == name
         assert found.value("document.querySelectorAll('img, h1 b').length") == 0
+
+
+def test_a_key_hides_all_that_explains_the_mission_and_what_is_to_come(one, browser):
+    explains = ".mind, .legend, #subtitle, .figure:has(.mode)"
+    visible = f"[...document.querySelectorAll('{explains}')].filter(each => each.checkVisibility())"
+    with opened(browser, one, hash_=f"#t={FAILURE_S}") as found:
+        told, drawn = found.value(f"{visible}.length"), colours(found, "#timeline")
+        assert told == 4
+        found.page.keyboard.press("w")
+        found.wait_until(f"{visible}.length === 0")
+        found.page.wait_for_timeout(100)
+        assert colours(found, "#timeline") < drawn / 2
+        found.page.keyboard.press("w")
+        found.wait_until(f"{visible}.length === 4")
+
+
+def test_with_two_missions_in_a_low_window_readings_stand_below_the_picture(both, browser):
+    place = "document.querySelector('{}').getBoundingClientRect()"
+    with opened(browser, both, DESKTOP) as found:
+        readings = found.value(f"{place.format('.hud.bottom')}.top")
+        picture = found.value(f"{place.format('canvas.scene')}.bottom")
+        side = found.value(f"{place.format('.side')}.top")
+        bottom = found.value(f"{place.format('.hud.bottom')}.bottom")
+    assert picture <= readings + 1 and bottom <= side + 1

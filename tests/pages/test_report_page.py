@@ -55,6 +55,29 @@ class TestItOpensWithoutComplaintOrRequestAndFitsTheWindow:
             assert_is_drawn_and_fits(ready(found), report, PHONE, "dark")
 
 
+OVERLAP = """(() => {
+  const box = name => document.querySelector(name).getBoundingClientRect();
+  const [legend, title, side] = [box('#run-legend'), box('#run-time .xtitle'), box('#run-time .ytitle')];
+  return { overlap: legend.top < title.bottom, left: side.top - box('#run-time').top };
+})()"""
+
+
+def test_on_a_phone_the_timeline_s_legend_and_titles_stand_clear_of_each_other(report, browser):
+    with opened(browser, report, PHONE) as found:
+        place = ready(found).value(OVERLAP)
+    assert not place["overlap"]
+    assert place["left"] >= 0
+
+
+def test_the_timeline_names_its_marks_and_modes_as_a_replay_does(opened_report):
+    told = opened_report.value(
+        "[...document.querySelectorAll('#run-legend span')].map(each => each.textContent)"
+    )
+    assert told[0] == "▼adaptation"
+    assert told[told.index("altitude in") - 1] == "┄visibility"
+    assert "━fd_spiral_low" in told and "━fd_follow_pipeline" in told
+
+
 def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
     page = opened_report.page
     assert "none" in page.text_content("#conclusion")

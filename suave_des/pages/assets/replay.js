@@ -138,6 +138,7 @@ function makePane(play) {
     element('div', { class: 'hud top' }, element('div', { class: 'manager' }, play.manager), parts.state),
     element('div', { class: 'hud bottom' }, figure('altitude', parts.altitude), parts.seeing,
       figure('inspected', parts.distance), figure('thrusters', parts.lamps), figure('mode', parts.mode)));
+  parts.mode.parentElement.classList.add('word');
   const panel = makePanel(play);
   const box = element('article', { class: 'pane', 'aria-label': play.mission.name },
     element('div', { class: 'world' }, stage, element('div', { class: 'side' }, parts.side)), panel.box);
@@ -280,12 +281,18 @@ function enlarge() {
   requestDraw();
 }
 
+/** Hide what explains the mission, so that who watches has to: panels, marks, modes, and what is still to come. */
+function hideWords() {
+  document.documentElement.classList.toggle('wordless');
+  requestDraw();
+}
+
 const changeSpeed = (by) => chooseSpeed(SPEEDS[clamp(SPEEDS.indexOf(state.speed) + by, 0, SPEEDS.length - 1)]);
 const KEYS = {
   ' ': () => setPlaying(!state.isPlaying), k: () => setPlaying(!state.isPlaying),
   ArrowLeft: (event) => goTo(state.t - (event.shiftKey ? 10 : 1)), ArrowRight: (event) => goTo(state.t + (event.shiftKey ? 10 : 1)),
   Home: () => goTo(0), End: () => goTo(span), n: () => goTo(nextStop(state.t, 1)), p: () => goTo(nextStop(state.t, -1)),
-  '+': () => changeSpeed(1), '=': () => changeSpeed(1), '-': () => changeSpeed(-1), l: toggleTheme, b: enlarge,
+  '+': () => changeSpeed(1), '=': () => changeSpeed(1), '-': () => changeSpeed(-1), l: toggleTheme, b: enlarge, w: hideWords,
   1: () => setView('3d'), 2: () => setView('above'), 3: () => setView('side'), '?': () => byId('help').showModal(),
 };
 addEventListener('keydown', (event) => {

@@ -252,6 +252,7 @@ function drawCommand() {
 const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 
 function drawTimeOf(way) {
+  byId('run-legend').replaceChildren();
   if (!way) {
     show('run-time', [], {});
     const empty = byId('run-time').querySelector('.empty');
@@ -264,31 +265,34 @@ function drawTimeOf(way) {
     type: 'scatter', mode: 'lines', x: way.t_s, y: way.visibility_m, name: 'visibility', fill: 'tozeroy', fillcolor: fade(groupColour(0), 0.08),
     line: { color: colour('--faint'), width: 1.2, dash: 'dot' }, hovertemplate: '%{y:.2f} m at %{x:.0f} s<extra>visibility</extra>',
   }];
-  const named = new Set();
   way.modes.forEach(([from, mode], place) => {
     const until = way.modes[place + 1]?.[0] ?? Infinity;
     const inside = way.t_s.map((t, n) => n).filter((n) => way.t_s[n] >= from && way.t_s[n] <= until + 1);
     traces.push({
       type: 'scatter', mode: 'lines', x: inside.map((n) => way.t_s[n]), y: inside.map((n) => way.altitude_m[n]), name: plain(mode || 'no mode'),
-      showlegend: !named.has(mode),
       line: { color: modeColour(mode), width: 2.6 }, hovertemplate: `%{y:.2f} m at %{x:.0f} s<extra>${plain(mode || 'no mode')}</extra>`,
     });
-    named.add(mode);
   });
   const top = Math.max(...way.altitude_m, ...way.visibility_m.map((each) => each ?? 0)) * 1.08;
   const failures = way.events.filter(([, event, detail]) => event === 'component_status' && detail.endsWith(' FALSE'));
   const seen = way.events.filter(([, event]) => event === 'pipeline_detected');
-  for (const [name, symbol, tint, own] of [['adaptation', 'triangle-down', '--ink', way.adaptations],
-    ['failure', 'circle', '--bad', failures], ['pipeline seen', 'star', '--good', seen]]) {
+  const marks = [['adaptation', 'triangle-down', '--ink', way.adaptations], ['thruster fails', 'diamond', '--bad', failures],
+    ['pipeline found', 'circle', '--good', seen]];
+  for (const [name, symbol, tint, own] of marks) {
     traces.push({
       type: 'scatter', mode: 'markers', x: own.map((each) => each[0]), y: own.map(() => top), text: own.map((each) => plain(each.at(-1))),
-      marker: { symbol, size: 10, color: colour(tint) }, hovertemplate: `%{x:.1f} s: ${name}, %{text}<extra></extra>`, name, showlegend: true,
+      marker: { symbol, size: 10, color: colour(tint) }, hovertemplate: `%{x:.1f} s: ${name}, %{text}<extra></extra>`, name,
     });
   }
-  show('run-time', traces, layoutOf('mission time (s)', 'altitude; visibility, dotted (m)', {
-    yaxis: { rangemode: 'tozero' }, showlegend: true, legend: { orientation: 'h', y: -0.22, font: { size: 11 }, itemclick: false, itemdoubleclick: false },
-  }));
+  show('run-time', traces, layoutOf('mission time (s)', 'altitude, visibility (m)', { yaxis: { rangemode: 'tozero' } }));
+  const entry = (sign, tint, words) => element('span', {}, element('b', { style: `color:${tint}` }, sign), words);
+  const modes = [...new Set(way.modes.map(([, mode]) => mode))].filter((mode) => mode);
+  byId('run-legend').replaceChildren(
+    ...marks.filter(([, , , own]) => own.length).map(([name, symbol, tint]) => entry(SIGNS[symbol], colour(tint), name)),
+    entry('┄', colour('--faint'), 'visibility'), element('span', {}, 'altitude in'), ...modes.map((mode) => entry('━', modeColour(mode), mode)),
+  );
 }
+const SIGNS = { 'triangle-down': '▼', diamond: '◆', circle: '●' };
 
 function drawMapOf(way) {
   if (!way) {

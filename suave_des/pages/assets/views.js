@@ -191,6 +191,7 @@ function showLegend(box, plays) {
 /** Altitude and visibility of every mission over the whole time, with what happened. */
 function drawTimeline(surface, plays, t, span, modeColour) {
   const { drawing: d, width, height } = surface;
+  const isWordless = document.documentElement.classList.contains('wordless');
   d.clearRect(0, 0, width, height);
   const axis = height - 17;
   const lane = axis / plays.length;
@@ -209,15 +210,16 @@ function drawTimeline(surface, plays, t, span, modeColour) {
     d.fill();
     d.globalAlpha = 1;
     for (let i = 4; i < track.t.length; i += 4) {
-      d.strokeStyle = modeColour(track.mode[i]);
-      d.globalAlpha = track.t[i] <= t ? 1 : 0.42;
+      d.strokeStyle = isWordless ? colour('--soft') : modeColour(track.mode[i]);
+      d.globalAlpha = track.t[i] <= t ? 1 : isWordless ? 0 : 0.42;
       d.lineWidth = 1.9;
       strokeLine(d, [across(track.t[i - 4]), up(track.z[i - 4] - BED)], [across(track.t[i]), up(track.z[i] - BED)]);
+      if (isWordless) continue;
       d.fillStyle = modeColour(track.mode[i]);
       d.fillRect(across(track.t[i - 4]), bottom + 1.5, across(track.t[i]) - across(track.t[i - 4]) + 0.4, 3);
     }
     d.globalAlpha = 1;
-    for (const mark of play.marks) {
+    for (const mark of isWordless ? [] : play.marks) {
       const x = across(mark.t);
       d.fillStyle = colour(MARKS[mark.kind].colour);
       drawMark(d, mark.kind, x, top - 5);
