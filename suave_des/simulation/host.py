@@ -17,7 +17,6 @@ from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
 from suave_des.monitor.measurements import Measurements, Thresholds
 from suave_des.registry import dependencies_of, measured_somewhere, names_in, times_of
-from suave_des.scenario.models import support
 
 RAISED = (Exception, SystemExit)
 """Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an
@@ -58,9 +57,6 @@ class ManagerHost:
     _due_s: float = field(
         default=inf, init=False
     )  # next time of `adapt`; while it waits, the earliest
-    _effect_after_s: float = field(
-        default=inf, init=False
-    )  # a call of `adapt`; inf: too often to be expected
     _idle_regions: set[tuple[int, ...]] = field(
         default_factory=set, init=False
     )  # in which calls change nothing
@@ -92,18 +88,9 @@ class ManagerHost:
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         if times is not None:
-            (self._period_s, self._due_s, latency_s), self._is_event_triggered = (
-                times,
-                is_event_triggered,
-            )
-            if (
-                is_event_triggered or self._period_s >= 15.0
-            ):  # to look ahead anew takes as long as to fly 15 s in vain
-                self._effect_after_s = (
-                    latency_s + support(self.system.scenario.latencies.mode_change_s)[0]
-                )
+            (self._period_s, self._due_s), self._is_event_triggered = times, is_event_triggered
             self._alarm = Alarm(self.system.env, self._adapt)
-            self._set_alarm(self._due_s)
+            self._alarm.set(self._due_s)
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""
@@ -141,7 +128,7 @@ class ManagerHost:
         self._idle_regions.clear()
         if self._is_waiting:
             self._is_waiting = False
-            self._set_alarm(summed_tick(self.system.env.now, self._due_s, self._period_s))
+            self._alarm.set(summed_tick(self.system.env.now, self._due_s, self._period_s))
 
     def _diagnostic(self, diagnostic: Diagnostic) -> None:
         self._guarded(self.manager.diagnostic, diagnostic)
@@ -170,7 +157,7 @@ class ManagerHost:
         if changed:
             self._idle_regions.clear()
         if not waits or now_s < period_s:
-            self._set_alarm(self._due_s)
+            self._alarm.set(self._due_s)
             return
         self._is_waiting, next_due_s = True, self._due_s
         regions, event_s = self._regions_until(now_s)
@@ -181,12 +168,7 @@ class ManagerHost:
             tick_s = summed_tick(event_s, next_due_s, period_s)
             next_due_s = tick_s + period_s
             regions, event_s = self._regions_until(tick_s)
-        self._set_alarm(tick_s, exactly=True)
-
-    def _set_alarm(self, t_s: float, *, exactly: bool = False) -> None:
-        """Have `adapt` called at a mission time, and its effect expected."""
-        self._alarm.set(t_s, exactly=exactly)
-        self.system._vehicle.expected_changes_s["manager"] = t_s + self._effect_after_s
+        self._alarm.set(tick_s, exactly=True)
 
     def _regions_until(self, t_s: float) -> tuple[tuple[int, ...], float]:
         """Find the regions of measured values at mission time t, and until when they stay the

@@ -12,11 +12,11 @@ from math import inf, isnan
 from pathlib import Path
 from typing import ClassVar, Unpack
 
-import simpy
+import numpy as np
 
 from suave_des import domain
 from suave_des.arguments import check_names
-from suave_des.clock import advance, drop_events, stop_at
+from suave_des.clock import MissionEnvironment, drop_events, stop_at
 from suave_des.compiling import Array
 from suave_des.domain import WATER_VISIBILITY, Task
 from suave_des.draws import Draws
@@ -24,6 +24,7 @@ from suave_des.errors import InputError, MissionError, MissionTimeOut, SuaveDesE
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.destinations import GenerateRechargePath, Surface
 from suave_des.managed.detection import PipelineDetector
+from suave_des.managed.flight import Flight
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
@@ -129,7 +130,7 @@ class Mission:
         self._run, self._seed = run, seed
         self._result: MissionResult | None = None
         revision, loaded = described.revision, prepared.loaded
-        self.env = env = simpy.Environment()
+        self.env = env = MissionEnvironment()
         self.bus = DiagnosticsBus()
         self._draws = draws = Draws(described, seed, run, prepared.runs_per_draw, prepared.numbers)
         self._recorder = recorder = Recorder(env, record, described.reaction_metric)
@@ -150,10 +151,15 @@ class Mission:
         self._visibility = self._measurements[WATER_VISIBILITY]
 
         # The managed subsystem.
-        seen = prepared.detected_points, prepared.bounds_m, prepared.view_tangent
-        self._detector = PipelineDetector(
-            env, self._vehicle, self._visibility.arrays, *seen, recorder.log
+        self._detector = PipelineDetector(env, recorder.log)
+        self._flight = Flight(
+            self._vehicle,
+            prepared.camera,
+            prepared.detected_points,
+            np.array(self._visibility.arrays),
+            prepared.path,
         )
+        env.fly_to = self._flight.fly_to
         mode_latency_s = draws.each_time(
             "latencies.mode_change_s", described.latencies.mode_change_s
         )
@@ -215,7 +221,7 @@ class Mission:
         if until_s == inf:
             self.result()
         elif until_s > self.env.now and not self.is_over:
-            self._guarded(advance, self.env, until_s)
+            self._guarded(self.env.advance, until_s)
 
     def change_mode(self, function: str, mode: str) -> None:
         """Request a mode of a function, which takes effect after the scenario's latency.
@@ -254,7 +260,7 @@ class Mission:
         if vars(self.bus):  # not closed yet
             self._prepared.give_back(self._track)
         drop_events(self.env)
-        for part in (self._vehicle, self._detector, self._host, self.bus):
+        for part in (self._vehicle, self._flight, self._detector, self._host, self.bus):
             vars(
                 part
             ).clear()  # what refers to each other is freed at once then, which saves 5% of a mission's time
@@ -374,17 +380,18 @@ class Mission:
         search = GenerateSearchPath(
             env,
             sender(domain.GENERATE_SEARCH_PATH),
+            self._flight,
             revision.spiral,
             self._origin_m,
             self._prepared.view_tangent,
             draws.phase(domain.GENERATE_SEARCH_PATH, revision.spiral.tick_period_s),
             draws.value("latencies.search_start_s"),
         )
-        path = self._prepared.path
         follow = FollowPipeline(
-            env, sender(domain.FOLLOW_PIPELINE), revision.follow, path, self._detector
+            env, sender(domain.FOLLOW_PIPELINE), self._flight, revision.follow, self._detector
         )
-        self._follow, search.other, follow.other = follow, follow, search
+        self._follow = follow
+        self._flight.begin(self._detector, search, follow)
         nodes: dict[str, FunctionNode] = {
             domain.MAINTAIN_MOTION: MaintainMotion(
                 env, self.bus, revision.recovery, self._thrusters, recovery_s
