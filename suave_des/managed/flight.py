@@ -45,6 +45,9 @@ class FlightRecord(Record):
     loses_search: bool  # whether the message that was lost is the search's
 
 
+_OneRecord = FlightRecord * 1
+
+
 @compiled
 def fly(
     flights: Records,
@@ -119,7 +122,7 @@ class Flight:
         self, vehicle: Vehicle, camera: Camera, points: Array, visibility: Array, path: Array
     ) -> None:
         self.vehicle, self.path = vehicle, path
-        records = (FlightRecord * 1)()
+        records = _OneRecord()
         self.state: FlightRecord = records[0]
         self.state.camera, self.state.next_tick_s = camera, -math.inf
         self._arrays = shared(records), vehicle.records, vehicle.track, path, points, visibility
@@ -147,3 +150,7 @@ class Flight:
             else:
                 self._follow.reaches_end(state.next_tick_s)
                 return
+
+    def close(self) -> None:
+        """Let go of the functions: there is no further flight."""
+        del self._detector, self._search, self._follow

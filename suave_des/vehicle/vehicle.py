@@ -25,6 +25,9 @@ ThrusterState = Literal["works", "frozen", "dead"]
 """A frozen thruster keeps the thrust that it had when it failed; a dead one gives none."""
 
 
+_TwoRecords = VehicleRecord * 2
+
+
 @dataclass(eq=False)
 class Vehicle:
     """The vehicle of one mission.
@@ -76,7 +79,7 @@ class Vehicle:
         self.last_row = rows - 1
         self.track: Array = np.empty((rows, kernel.COLUMNS)) if memory is None else memory
         self.thrusters = ["works"] * len(self.model.thrusters)
-        both = (VehicleRecord * 2)()
+        both = _TwoRecords()
         self.records, self.state = shared(both), both[0]
         constants = vehicle_record(self.model, self.autopilot, self.z_limits_m)
         ctypes.memmove(both, ctypes.byref(constants), ctypes.sizeof(constants))
