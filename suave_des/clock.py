@@ -1,8 +1,8 @@
-"""Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, calls at one,
-alarms.
+"""Additions to SimPy: an environment that flies the vehicle from event to event, ticks of a periodic
+timer, events at a mission time, calls at one, alarms.
 
-Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an
-alarm, and resets it. This module alone uses callbacks and SimPy's private fields.
+Activities are SimPy processes. A call that is often put off is an alarm. This module alone uses
+SimPy's private fields.
 """
 
 from __future__ import annotations
@@ -16,6 +16,58 @@ import simpy
 from simpy.core import StopSimulation
 
 Process = Generator[simpy.Event, Any, None]
+
+
+class MissionEnvironment(simpy.Environment):
+    """A SimPy environment that has the vehicle flown to each event before the event is processed.
+
+    So whatever happens at an event finds the vehicle where it is then. Control changes only at
+    events: what is flown is final.
+
+    Attributes:
+        fly_to: flies to a mission time; it may add events up to then.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(0.0)
+        self.fly_to: Callable[[float], None] = _stay
+
+    def step(self) -> None:
+        """Fly to the next event, and process it, or one that the flight has brought about."""
+        next_s = self.peek()
+        if self._now < next_s < math.inf:
+            self.fly_to(next_s)
+        super().step()
+
+    def schedule(
+        self,
+        event: simpy.Event,
+        priority: simpy.events.EventPriority = simpy.events.NORMAL,
+        delay: float = 0,
+    ) -> None:
+        """Schedule an event.
+
+        Raises:
+            ValueError: the delay is not a number, which would spoil the order of all other events.
+        """
+        if delay != delay:
+            raise ValueError(f"the delay of an event is {delay}")
+        super().schedule(event, priority, delay)
+
+    def advance(self, t_s: float) -> None:
+        """Process all events before mission time t, and go there; stop at the event of the
+        mission's end.
+        """
+        try:
+            while self.peek() < t_s or self._has_flown_into_event(t_s):
+                self.step()
+        except StopSimulation:
+            return
+        self._now = t_s
+
+    def _has_flown_into_event(self, t_s: float) -> bool:
+        self.fly_to(t_s)
+        return self.peek() < t_s
 
 
 def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
@@ -35,7 +87,12 @@ def summed_tick(t_s: float, due_s: float, period_s: float) -> float:
 def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
     """An event at mission time t itself; a delay added to the current time may miss it by
     rounding.
+
+    Raises:
+        ValueError: that is not a number, which would spoil the order of all other events.
     """
+    if t_s != t_s:
+        raise ValueError(f"the time of an event is {t_s}")
     event = simpy.Event(env)
     event._ok, event._value = True, None
     heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
@@ -46,7 +103,7 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Event:
     """An event at mission time t, or now if t has passed: `env.timeout` in half its time."""
     now_s = env._now
     delay_s = t_s - now_s
-    return exactly_at(env, now_s + delay_s if delay_s > 0.0 else now_s)
+    return exactly_at(env, now_s if delay_s <= 0.0 else now_s + delay_s)
 
 
 def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], Any]) -> None:
@@ -64,20 +121,9 @@ def call_next(env: simpy.Environment, callback: Callable[[], None]) -> None:
     env.schedule(event, simpy.events.URGENT)
 
 
-def advance(env: simpy.Environment, t_s: float) -> None:
-    """Process all events before mission time t, and go there; stop at the event of the mission's
-    end.
-
-    This is `env.run(until=t_s)`, which takes 8 us more for its own event: a third of a step of an
-    environment.
-    """
-    queue, step = env._queue, env.step
-    try:
-        while queue and queue[0][0] < t_s:
-            step()
-    except StopSimulation:
-        return
-    env._now = t_s
+def abandon(process: simpy.Process) -> None:
+    """End a process where it waits, so that it lets go of all that it refers to."""
+    process._generator.close()
 
 
 def stop_at(event: simpy.Event) -> None:
@@ -85,13 +131,26 @@ def stop_at(event: simpy.Event) -> None:
     event.callbacks.append(StopSimulation.callback)
 
 
-def drop_events(env: simpy.Environment) -> None:
-    """Drop all that is still to happen."""
+def drop_events(env: MissionEnvironment) -> None:
+    """Drop all that is still to happen, and fly no more."""
     env._queue.clear()
+    env.fly_to = _stay
+
+
+def _stay(t_s: float) -> None:
+    """Fly nowhere."""
 
 
 class Alarm:
-    """Calls a function at a mission time; setting it again replaces the pending call."""
+    """Calls a function at a mission time; setting it again replaces the pending call.
+
+    Example:
+        >>> alarm = Alarm(env, lambda: print(env.now))
+        >>> alarm.set(4.0)
+        >>> alarm.set(6.0)
+        >>> env.run()
+        6.0
+    """
 
     def __init__(self, env: simpy.Environment, callback: Callable[[], None]) -> None:
         self._env = env

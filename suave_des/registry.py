@@ -341,23 +341,20 @@ def _form(root: type, hook: str) -> str:
     return f"{'@classmethod ' if is_of_class else ''}def {hook}({arguments})"
 
 
-def times_of(manager: ManagingSubsystem) -> tuple[float, float, float] | None:
-    """Return a manager's period, first time and least latency; None if it is not called
-    periodically.
+def times_of(manager: ManagingSubsystem) -> tuple[float, float] | None:
+    """Return a manager's period and first time; None if it is not called periodically.
 
     Raises:
         ValueError: they are no such times.
     """
-    period_s, starts_s, latency_s = manager.period_s, manager.starts_s, manager.least_latency_s
+    period_s, starts_s = manager.period_s, manager.starts_s
     if period_s is None:
         return None
     are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
     if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
         problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
         raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
-    if not (isinstance(latency_s, Real) and 0.0 <= latency_s < inf):
-        raise ValueError(f"least_latency_s is {latency_s!r}; it must be a number, from 0")
-    return period_s, starts_s, latency_s
+    return period_s, starts_s
 
 
 def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:

@@ -121,7 +121,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         entries = (
             *((name, *_bounds(loaded, name)) for name in self._attributes),
             *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
-            ("distance_inspected_m", 0.0, 2.0 * sum(self._simulator.path.lengths_m)),
+            ("distance_inspected_m", 0.0, 2.0 * sum(self._simulator.path[:, 2].tolist())),
             ("time_share", 0.0, duration_s / self._limit_s),
             *((function, -1.0, len(modes) - 1.0) for function, modes in self.mode_names.items()),
         )

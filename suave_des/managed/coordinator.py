@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import simpy
 
-from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.clock import Process, abandon, tick_at_or_after, until
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SURFACE, Task
 from suave_des.draws import Draws
 from suave_des.managed.detection import PipelineDetector
@@ -92,6 +92,11 @@ class MissionCoordinator:
         self._request, self._cancel = request, cancel
         self.env.process(self._watch_time_limit())
         self._tasks = self.env.process(self._carry_out_tasks())
+
+    def close(self) -> None:
+        """Let go of those who are told of tasks: there is none any more."""
+        abandon(self._tasks)
+        del self._request, self._cancel, self._tasks
 
     def give_up(self) -> None:
         """Cancel the tasks, because of a leak; the mission ends when the vehicle has surfaced."""

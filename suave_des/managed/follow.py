@@ -6,74 +6,122 @@ Source: node f_follow_pipeline of kas-lab/suave, of 4 February 2023 and of 1.5.0
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from functools import reduce
+from dataclasses import dataclass
 from itertools import pairwise
-from operator import add
-from typing import NamedTuple, Self
 
 import numpy as np
 import simpy
 
-from suave_des.compiling import Array
+from suave_des.clock import exactly_at
+from suave_des.compiling import Array, Record, compiled, record
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.managed.detection import PipelineDetector
-from suave_des.managed.waypoints import WaypointFunction
+from suave_des.managed.waypoints import Does, Timer, WaypointFunction, send
 from suave_des.scenario.models import FollowRevision
-from suave_des.vehicle.vehicle import ArrivalCheck
+from suave_des.vehicle.kernel import VehicleRecord
 
 
-class InspectionPath(NamedTuple):
-    """A path to inspect.
+def there_and_back(points_m: Array) -> Array:
+    """Make the path above all points, shape (n, at least 2), and back.
 
-    Attributes:
-        points_m: positions to visit above the pipeline: x, y, z, shape (points, 3).
-        lengths_m: distance in x and y from the previous point to each; 0 for the first.
+    From its row i on it is the path to follow when point i is seen first: on to the far end, then
+    back along all.
+
+    Returns:
+        x and y of the points to visit, and the distance from the previous point to each, 0 for the
+        first; shape (2 n, 3), m.
     """
+    x_y_m = np.concatenate((points_m[:, :2], points_m[::-1, :2]))
+    lengths_m = [0.0, *(math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))]
+    return np.column_stack((x_y_m, lengths_m))
 
-    points_m: Array
-    lengths_m: tuple[float, ...]
 
-    @classmethod
-    def there_and_back(cls, points_m: Array, altitude_m: float) -> Self:
-        """Make the path above all points, shape (n, at least 2), and back: 2 n points.
+@record
+class Follow(Record):
+    """The follow function's numbers."""
 
-        From its element i on it is the path to follow when point i is seen first: on to the far
-        end, then back along all.
-        """
-        x_y_m = np.concatenate((points_m[:, :2], points_m[::-1, :2]))
-        lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
-        return cls(np.insert(x_y_m, 2, SEA_BED_Z_M + altitude_m, axis=1), (0.0, *lengths_m))
+    timer: Timer
+    z_m: float  # of the set-points
+    acceptance_m: float  # a point is reached when dx and dy are at most this
+    polls_before_resending: int
+    resends_at_each_poll: bool  # from then on
+    next_point: int  # of the path, to be reached
+    has_arrived: bool  # at a point since its activation
+    travelled_m: float
+    published_m: float
+
+
+@compiled
+def tick(follow: Follow, track: Array, row: int, path: Array) -> int:
+    """Look whether the next point is reached, or has to be sent again; return what the node does.
+
+    A point that has been sent is looked for at the same poll: several may be reached at once.
+    """
+    timer: Timer = follow.timer
+    to, acceptance_m = follow.next_point, follow.acceptance_m
+    if timer.is_due:
+        timer.is_due = False
+        timer.waited = 0
+    elif (
+        abs(track[row, 0] - path[to, 0]) <= acceptance_m
+        and abs(track[row, 1] - path[to, 1]) <= acceptance_m
+    ):
+        if follow.has_arrived:  # the distance starts at the first point
+            follow.travelled_m += path[to, 2]
+            follow.published_m = follow.travelled_m
+        follow.has_arrived = True
+        follow.next_point += 1
+        timer.waited = 0
+        if follow.next_point == path.shape[0]:
+            timer.is_active = False
+            return Does.FINISHES.value
+    elif timer.waited < follow.polls_before_resending:
+        timer.waited += 1
+        timer.tick += 1
+        return Does.NOTHING.value
+    else:
+        timer.tick += 1
+        if not follow.resends_at_each_poll:
+            timer.waited = 1
+    return Does.SENDS.value
+
+
+@compiled
+def send_point(follow: Follow, vehicle: VehicleRecord, path: Array) -> None:
+    """Send the next point."""
+    to = follow.next_point
+    send(follow.timer, vehicle, path[to, 0], path[to, 1], follow.z_m)
 
 
 @dataclass(eq=False)
 class FollowPipeline(WaypointFunction):
-    """The follow function: its way-points are the points of the path, each sent when the previous
-    one is reached.
+    """The follow function: its way-points are the points of the flight's path, each sent when the
+    previous one is reached.
 
     Attributes:
-        path: from the start of the pipeline to its end, and back.
         detector: says from which of its points on the path is to be followed.
         finished: triggered when the last point of the path is reached.
     """
 
     revision: FollowRevision
-    path: InspectionPath
     detector: PipelineDetector
-    _next: int = field(default=0, init=False)  # point of the path
-    _has_arrived: bool = field(default=False, init=False)
-    _travelled_m: float = field(default=0.0, init=False)
-    _published_m: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         self.finished: simpy.Event = self.env.event()
+        self.state: Follow = self.flight.state.follow
+        state, revision = self.state, self.revision
+        self.connect(state.timer, revision.poll_period_s)
+        state.z_m = SEA_BED_Z_M + revision.altitude_m
+        state.acceptance_m = revision.acceptance_m
+        state.resends_at_each_poll = revision.resends_at_each_poll
+        # A node that then sends at each poll counts one poll more before the first time.
+        polls = revision.polls_before_resending
+        state.polls_before_resending = polls + 1 if revision.resends_at_each_poll else polls
 
     @property
     def distance_m(self) -> float:
         """Last published distance inspected."""
-        self.catch_up()
-        return self._published_m
+        return float(self.state.published_m)
 
     def activated(self) -> None:
         """Start; the distance restarts at zero, although the published value stays until there is a
@@ -81,12 +129,14 @@ class FollowPipeline(WaypointFunction):
 
         If the revision lets the distance accumulate, only the piece that was interrupted is lost.
         """
-        if not self.revision.keeps_distance_on_activation:
-            self._travelled_m = 0.0
-        self._has_arrived = False
+        state, revision = self.state, self.revision
+        if not revision.keeps_distance_on_activation:
+            state.travelled_m = 0.0
+        state.has_arrived = False
         first = self.detector.first_point
         if first is not None and not self.finished.triggered:
-            self._next = first if self.revision.restarts_on_activation else max(first, self._next)
+            if revision.restarts_on_activation or state.next_point < first:
+                state.next_point = first
             self.start_at(self.env.now)
 
     def deactivated(self) -> None:
@@ -96,40 +146,14 @@ class FollowPipeline(WaypointFunction):
         if self.finished.triggered:
             return
         self.stop()
-        if self.revision.counts_interrupted_piece and self._has_arrived:
+        state = self.state
+        if self.revision.counts_interrupted_piece and state.has_arrived:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-            self._travelled_m += math.dist(
-                self.path.points_m[self._next - 1, :2].tolist(), (x_m, y_m)
-            )
-            self._published_m = self._travelled_m
+            last_m = self.flight.path[state.next_point - 1, :2].tolist()
+            state.travelled_m += math.dist(last_m, (x_m, y_m))
+            state.published_m = state.travelled_m
 
-    def arrival_check(self, start_s: float) -> ArrivalCheck:
-        """Check at each poll, in x and y alone."""
-        period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
-        # Otherwise the poll counter restarts with each resend; here it stays above the limit, so
-        # every later poll resends.
-        polls = self.revision.polls_before_resending
-        waits = (polls + 1, 1) if self.revision.resends_at_each_poll else (polls, polls)
-        return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits)
-
-    def waypoints(self, count: int) -> Array:
-        """Return the current point and those after it; none if the end is reached."""
-        return self.path.points_m[self._next : self._next + count]
-
-    def completed(self) -> None:
-        """Report that the end of the path is reached."""
-        self.finished.succeed()
-
-    def set_point_z_m(self) -> float:
-        """Return the z at which the pipeline is followed."""
-        return SEA_BED_Z_M + self.revision.altitude_m
-
-    def reached(self, count: int) -> None:
-        """Add to the distance, starting at the first point, and publish it at each point after
-        that.
-        """
-        lengths_m = self.path.lengths_m[self._next + (not self._has_arrived) : self._next + count]
-        self._next += count
-        self._has_arrived = True
-        if lengths_m:
-            self._published_m = self._travelled_m = reduce(add, lengths_m, self._travelled_m)
+    def reaches_end(self, t_s: float) -> None:
+        """Report at mission time t that the end of the path is reached."""
+        end = exactly_at(self.env, t_s)
+        end.callbacks.append(self.finished.trigger)

@@ -43,16 +43,8 @@ class MaintainMotion(ProcessNode):
 
     def activity(self) -> Process:
         """Recover the thrusters."""
-        vehicle, period_s = self.thrusters.vehicle, self.revision.thruster_period_s
-        vehicle.expected_changes_s["recovery"] = self.env.now + (delay_s := self.delay_s())
-        yield self.env.timeout(delay_s)
+        yield self.env.timeout(self.delay_s())
         for number, name in enumerate(THRUSTER_NAMES, start=1):
-            if failed := [
-                periods
-                for periods, state in enumerate(vehicle.thrusters[number:], 1)
-                if state != "works"
-            ]:
-                vehicle.expected_changes_s["recovery"] = self.env.now + failed[0] * period_s
             if self.thrusters.recover(number):
                 self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))
-            yield self.env.timeout(period_s)
+            yield self.env.timeout(self.revision.thruster_period_s)

@@ -14,10 +14,9 @@ from typing import Any
 import simpy
 
 from suave_des.clock import Process
-from suave_des.compiling import Array
 from suave_des.monitor.diagnostics import DiagnosticsBus
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import ArrivalCheck, Course, Point, Ticks, Vehicle
+from suave_des.vehicle.vehicle import Point, Vehicle
 
 Log = Callable[[str, str, str], None]
 """Called with source, event and detail of something to record."""
@@ -98,12 +97,10 @@ class SetPointSender:
     frame_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     loss_probability: float = 0.0
     stream: random.Random | None = None
-    _before_loss: float = field(
-        init=False
-    )  # how many messages arrive before the next one that is lost
+    messages_before_loss: float = field(init=False)  # that arrive before the next one is lost
 
     def __post_init__(self) -> None:
-        self._before_loss = self._draw()
+        self.messages_before_loss = self.draw_messages_before_loss()
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
         """Send a set-point in the world frame; there is no acknowledgement.
@@ -117,27 +114,16 @@ class SetPointSender:
             x_error_m, y_error_m, z_error_m = self.frame_error_m
             self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
 
-    def course(
-        self, waypoints: Array, z_m: float, check: ArrivalCheck, ticks: Ticks, most: int
-    ) -> Course:
-        """Make a course (see there) that ends with the first set-point whose message will be
-        lost.
-        """
-        x_error_m, y_error_m, z_error_m = self.frame_error_m
-        sent_as_m = x_error_m, y_error_m, z_m + z_error_m + self.vehicle.altitude_error_m
-        return Course(check, waypoints, sent_as_m, ticks, int(min(most, self._before_loss)))
-
-    def queued_were_sent(self, count: int) -> None:
-        """Count set-points that were sent from the queue."""
-        self._before_loss -= count
-
     def is_lost(self) -> bool:
         """Say whether the next message is lost, which counts as sent then."""
-        is_lost = self._before_loss == 0
-        self._before_loss = self._draw() if is_lost else self._before_loss - 1
+        is_lost = self.messages_before_loss == 0
+        if is_lost:
+            self.messages_before_loss = self.draw_messages_before_loss()
+        else:
+            self.messages_before_loss -= 1
         return is_lost
 
-    def _draw(self) -> float:
+    def draw_messages_before_loss(self) -> float:
         """Draw the number of messages that arrive before one is lost, from the geometric
         distribution, by inversion.
         """

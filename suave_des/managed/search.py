@@ -8,47 +8,86 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from suave_des.clock import tick_at_or_after
-from suave_des.compiling import Array, compiled
+from suave_des.compiling import Array, Record, compiled, record
 from suave_des.domain import SEA_BED_Z_M
-from suave_des.managed.waypoints import WaypointFunction
+from suave_des.managed.waypoints import Does, Timer, WaypointFunction, send
 from suave_des.scenario.models import SpiralRevision
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import ArrivalCheck
+from suave_des.vehicle.kernel import VehicleRecord
+
+
+@record
+class Search(Record):
+    """The search function's numbers."""
+
+    timer: Timer
+    altitude_m: float  # above the sea bed, the node's parameter
+    last_altitude_m: float  # at the tick before; nan: there was none
+    below_m: float  # how far the set-point is below that altitude
+    centre_x_m: float  # of the spiral
+    centre_y_m: float
+    angle_step_rad: float  # from one way-point to the next
+    view_tangent: float  # of half the camera's field of view
+    acceptance_m: float  # a way-point is reached when dx, dy and dz are at most this
+    ticks_before_resending: int
+    workaround_step_m: float  # by which the set-point is lowered when only z is not reached
+    has_begun: bool  # whether there is a way-point
+    step: int  # of the next way-point
+    radius_m: float  # of the spiral at the current one
+    x_m: float  # the current way-point
+    y_m: float
+    z_m: float
 
 
 @compiled
-def spiral(
-    step: int,
-    radius_m: float,
-    altitude_m: float,
-    form: tuple[float, float],
-    centre_m: tuple[float, float],
-    waypoints: Array,
-) -> None:
-    """Generate way-points of the spiral.
+def go_on(search: Search) -> None:
+    """Generate the next way-point; a turn widens the spiral by what the camera sees."""
+    turn_width_m = 2.0 * search.altitude_m * search.view_tangent
+    search.radius_m += turn_width_m * search.angle_step_rad / (2.0 * math.pi)
+    angle_rad = search.angle_step_rad * search.step
+    search.x_m = search.centre_x_m + search.radius_m * math.cos(angle_rad)
+    search.y_m = search.centre_y_m + search.radius_m * math.sin(angle_rad)
+    search.z_m = SEA_BED_Z_M + search.altitude_m
+    search.step += 1
+    search.has_begun = True
 
-    Args:
-        step, radius_m: step counter and radius before the first of them.
-        altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees
-            from there.
-        form: angle from one way-point to the next, rad, and the tangent of half the camera's field
-            of view.
-        centre_m: x and y of its centre.
-        waypoints: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
-    """
-    angle_step, view_tangent = form
-    for n in range(waypoints.shape[0]):
-        if step > 0:
-            turn_width = 2.0 * altitude_m * view_tangent
-            radius_m += turn_width * angle_step / (2.0 * math.pi)
-        angle = angle_step * step
-        waypoints[n, 0] = centre_m[0] + radius_m * math.cos(angle)
-        waypoints[n, 1] = centre_m[1] + radius_m * math.sin(angle)
-        waypoints[n, 2], waypoints[n, 3] = SEA_BED_Z_M + altitude_m, radius_m
-        step += 1
+
+@compiled
+def tick(search: Search, track: Array, row: int) -> int:
+    """Look whether the way-point is reached, or has to be sent again; return what the node does."""
+    timer: Timer = search.timer
+    timer.tick += 1
+    if search.altitude_m != search.last_altitude_m:  # the exemplar's node counts a step then
+        search.step += 1
+        search.last_altitude_m = search.altitude_m
+    is_above = (
+        abs(track[row, 0] - search.x_m) <= search.acceptance_m
+        and abs(track[row, 1] - search.y_m) <= search.acceptance_m
+    )
+    if timer.is_due:
+        timer.is_due = False
+        timer.waited = 0
+        if not search.has_begun:
+            go_on(search)
+    elif is_above and abs(track[row, 2] - search.z_m) <= search.acceptance_m:
+        timer.waited = 0
+        go_on(search)
+    elif timer.waited <= search.ticks_before_resending:
+        timer.waited += 1
+        return Does.NOTHING.value
+    else:
+        timer.waited = 1  # the exemplar's node counts this tick, too
+        if is_above:  # its work-around for an autopilot that stops short of its altitude set-point
+            search.below_m += search.workaround_step_m
+    return Does.SENDS.value
+
+
+@compiled
+def send_waypoint(search: Search, vehicle: VehicleRecord) -> None:
+    """Send the way-point, at the present altitude; it is reached at its own z."""
+    z_m = SEA_BED_Z_M + search.altitude_m - search.below_m
+    send(search.timer, vehicle, search.x_m, search.y_m, z_m)
 
 
 @dataclass(eq=False)
@@ -61,7 +100,6 @@ class GenerateSearchPath(WaypointFunction):
         view_tangent: tangent of half the camera's field of view.
         phase_s: mission time of a tick of the node's timer.
         start_latency_s: from the first activation to the first tick.
-        altitude_m: the node's altitude parameter.
     """
 
     revision: SpiralRevision
@@ -69,114 +107,50 @@ class GenerateSearchPath(WaypointFunction):
     view_tangent: float
     phase_s: float
     start_latency_s: float = 0.0
-    altitude_m: float = field(init=False)
-    _below_m: float = field(default=0.0, init=False)  # how far below the altitude the set-point is
     _ready_s: float | None = field(
         default=None, init=False
     )  # earliest mission time of the first tick
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        self.altitude_m = self.revision.initial_altitude_m
+        self.state: Search = self.flight.state.search
+        state, revision = self.state, self.revision
+        self.connect(state.timer, revision.tick_period_s)
+        state.altitude_m = revision.initial_altitude_m
+        state.centre_x_m, state.centre_y_m = self.centre_m
+        state.angle_step_rad, state.view_tangent = revision.angle_step_rad, self.view_tangent
+        state.acceptance_m = revision.acceptance_m
+        state.ticks_before_resending = revision.ticks_before_resending
+        state.workaround_step_m = revision.workaround_step_m
         self._restart()
 
     def _restart(self) -> None:
-        self._step = 0
-        self._last_altitude_m: float | None = None  # at the last tick
-        self._ahead: Array | None = (
-            None  # the current way-point and some that follow it; None before the first
-        )
+        state = self.state
+        state.has_begun, state.step, state.radius_m = False, 0, 0.0
+        state.last_altitude_m = math.nan
 
     def configure(self, mode: Mode) -> None:
         """Apply the mode's spiral_altitude; the spiral itself continues."""
         altitude = mode.parameters.get("spiral_altitude")
-        if altitude is not None and altitude != self.altitude_m:
-            self.catch_up()
-            self.altitude_m = float(altitude)
-            self._keep_current()
-            self.waypoints_changed()
+        if altitude is not None:
+            self.state.altitude_m = float(altitude)
 
     def activated(self) -> None:
         """Start ticking; revision 1.5 begins a new spiral here."""
-        if self.revision.restarts_on_activation:
+        state, revision = self.state, self.revision
+        if revision.restarts_on_activation:
             self._restart()
-        if self.revision.workaround_cleared_on_activation:
-            self._below_m = 0.0
-        is_first = self._ahead is None
-        if self.revision.centre == "activation" or (
-            self.revision.centre == "first_activation" and is_first
-        ):
-            self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
-            self._keep_current()
+        if revision.workaround_cleared_on_activation:
+            state.below_m = 0.0
+        is_first = not state.has_begun
+        if revision.centre == "activation" or (revision.centre == "first_activation" and is_first):
+            state.centre_x_m, state.centre_y_m, _ = self.sender.vehicle.position(self.env.now)
         if self._ready_s is None:
             self._ready_s = self.env.now + self.start_latency_s
         first_s = tick_at_or_after(
-            max(self.env.now, self._ready_s), self.phase_s, self.revision.tick_period_s
+            max(self.env.now, self._ready_s), self.phase_s, revision.tick_period_s
         )
-        self.start_at(first_s, resumes=not (is_first or self.revision.resends_on_activation))
+        self.start_at(first_s, resumes=not (is_first or revision.resends_on_activation))
 
     def deactivated(self) -> None:
         """Stop ticking."""
         self.stop()
-
-    def _keep_current(self) -> None:
-        """Have the way-points after the current one generated anew."""
-        self._ahead = None if self._ahead is None else self._ahead[:1]
-
-    def ticked(self) -> None:
-        """At another altitude than at the tick before, the spiral is a step on."""
-        if self.altitude_m != self._last_altitude_m:
-            self._step += 1
-            self._last_altitude_m = self.altitude_m
-
-    def waypoints(self, count: int) -> Array:
-        """Return the current way-point and those that follow it."""
-        if self._ahead is not None and len(self._ahead) > count:
-            return self._ahead[:count]
-        waypoints = np.empty((count + 1, 4))  # the last one is current when all others are reached
-        step = self._step + (self.altitude_m != self._last_altitude_m)
-        form = self.revision.angle_step_rad, self.view_tangent
-        if self._ahead is None:
-            spiral(step, 0.0, self.altitude_m, form, self.centre_m, waypoints)
-            self._step += 1
-        else:
-            waypoints[0] = self._ahead[0]
-            spiral(step, waypoints.item(0, 3), self.altitude_m, form, self.centre_m, waypoints[1:])
-        self._ahead = waypoints
-        return waypoints[:count]
-
-    def set_point_z_m(self) -> float:
-        """Return the z of the altitude, lowered by the work-around; arrival is checked at the
-        way-point's own z.
-        """
-        return SEA_BED_Z_M + self.altitude_m - self._below_m
-
-    def reached(self, count: int) -> None:
-        """Advance to the next way-point."""
-        assert self._ahead is not None  # it was one of the way-points
-        self._ahead = self._ahead[count:]
-        self._step += count
-
-    def not_reached(self) -> None:
-        """Command a lower altitude if only z is not reached.
-
-        This is the exemplar's work-around for an autopilot that stops short of its altitude
-        set-point.
-        """
-        x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-        waypoint = self.waypoints(1)
-        if (
-            max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1)))
-            <= self.revision.acceptance_m
-        ):
-            self._below_m += self.revision.workaround_step_m
-
-    def arrival_check(self, start_s: float) -> ArrivalCheck:
-        """Check at each tick, from the one after the way-point's on."""
-        # The exemplar resends when its wait counter exceeds 10. Sending resets the counter; a
-        # resend also counts in the same tick, hence one tick less.
-        node = self.revision
-        first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
-        return ArrivalCheck(
-            start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again
-        )

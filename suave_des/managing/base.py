@@ -169,8 +169,6 @@ class ManagingSubsystem:
         period_s: time between calls of `adapt`; None: never called.
         starts_s: mission time of the first call of `adapt`.
         reasoning_time_s: mission time that reasoning took before adaptations; a further metric.
-        least_latency_s: time from a call of `adapt` to a request at the earliest; only serves the
-            simulation's speed.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the
             first one, and a reasoner runs beside the simulator, which slows it down
             (`calibration.reasoning_slowdown`).
@@ -202,7 +200,6 @@ class ManagingSubsystem:
     period_s: float | None = None
     starts_s: float = 0.0
     reasoning_time_s: float = 0.0
-    least_latency_s: float = 0.0
 
     @classmethod
     def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:

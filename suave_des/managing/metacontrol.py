@@ -90,7 +90,7 @@ class Metacontrol(ManagingSubsystem):
             else frozenset[str]()
         )
         self._awaited = expected.intersection(system.measurements, scenario.signals)
-        self.least_latency_s, self._longest_s = support(scenario.latencies.inference_s)
+        self._longest_s = support(scenario.latencies.inference_s)[1]
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_tick_s("metacontrol", self.period_s)
         bridge_s = revision.task_bridge_period_s

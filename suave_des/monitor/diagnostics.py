@@ -83,3 +83,8 @@ class DiagnosticsBus:
         """Pass a diagnostic to the subscribers to its kind."""
         for subscriber in self._subscribers[diagnostic.kind]:
             subscriber(diagnostic)
+
+    def close(self) -> None:
+        """Pass nothing on any more."""
+        self._subscribers.clear()
+        self._waiting.clear()

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import inf
 
 import simpy
 
@@ -102,13 +101,8 @@ def thruster_monitor(
         earliest_s = tick_s + timing.period_s
         if after_previous:
             counted_from_s = tick_s
-    expected_s = thrusters.vehicle.expected_changes_s
-    for (event, _), tick_s, next_s in zip(schedule, ticks_s, [*ticks_s[1:], inf], strict=False):
-        expected_s.setdefault("thrusters", tick_s)
+    for (event, _), tick_s in zip(schedule, ticks_s, strict=True):
         yield until(env, tick_s)
-        expected_s["thrusters"] = (
-            next_s  # known before the vehicle is affected, and looked ahead for
-        )
         thrusters.apply(event)
         if is_lost is None or not is_lost(env.now):
             status = FAILED if event.event == "failure" else RECOVERED

@@ -14,6 +14,7 @@ from typing import Any, Final
 from suave_des import __version__
 from suave_des.api import run_mission
 from suave_des.campaign.campaign import opened_campaign
+from suave_des.compiling import Array
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.explain import LEFT_OUT, Derivation, verdicts
@@ -25,7 +26,7 @@ from suave_des.knowledge.rdf import local_name
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import write_rule
 from suave_des.knowledge.state import Reasoning
-from suave_des.managed.follow import InspectionPath
+from suave_des.managed.follow import there_and_back
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.page import page
@@ -178,27 +179,25 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
         "adaptations": sorted({each.t_s for each in adaptations(mission)}),
         "events": [(round(t_s, 2), *words) for t_s, *words in events],
         "inspected": _inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
-        "way": [] if way is None else way.points_m[:, :2].round(_DECIMALS).tolist(),
+        "way": [] if way is None else way[:, :2].round(_DECIMALS).tolist(),
         "seen": None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
         "cycles": explain_cycles(mission),
     }
 
 
-def _way(mission: MissionRecord) -> InspectionPath | None:
-    """The way along the pipeline from the point that was seen first."""
+def _way(mission: MissionRecord) -> Array | None:
+    """The way along the pipeline from the point that was seen first, see `there_and_back`."""
     pipeline = mission.settings.pipeline
-    altitude_m = mission.settings.revision.follow.altitude_m
     points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
     for _, detail in details(mission, "pipeline_detected"):
         number = detail.rpartition(" ")[2]
         if number.isdecimal() and int(number) < len(points):
-            path = InspectionPath.there_and_back(points, altitude_m)
-            return InspectionPath(path.points_m[int(number) :], path.lengths_m[int(number) :])
+            return there_and_back(points)[int(number) :]
     return None
 
 
 def _inspected(
-    mission: MissionRecord, way: InspectionPath | None, modes: Sequence[tuple[float, str]]
+    mission: MissionRecord, way: Array | None, modes: Sequence[tuple[float, str]]
 ) -> list[tuple[float, int, float]]:
     """The points of the way that the vehicle reached while it followed the pipeline, each after the
     one before.
@@ -207,8 +206,8 @@ def _inspected(
         return []
     follow = mission.settings.revision.follow
     mode_times = [t_s for t_s, _ in modes]
-    lengths_m = list(accumulate(way.lengths_m))
-    points = way.points_m[:, :2].tolist()
+    lengths_m = list(accumulate(way[:, 2].tolist()))
+    points = way[:, :2].tolist()
     track = mission.trajectory
     found: list[tuple[float, int, float]] = []
     next_point, was_following, start_m = 0, False, 0.0

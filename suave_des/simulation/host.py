@@ -4,30 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
-from math import inf
 from typing import Any, TypeVar
 
-import simpy
-
-from suave_des.clock import Alarm, Process, summed_tick
 from suave_des.domain import Task
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
-from suave_des.managing.base import AdaptationProcess, ManagingSubsystem, System
+from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.monitor.measurements import Measurements, Thresholds
 from suave_des.registry import dependencies_of, measured_somewhere, names_in, times_of
-from suave_des.scenario.models import support
-
-RAISED = (Exception, SystemExit)
-"""Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an
-error.
-"""
+from suave_des.simulation.calls import RAISED, Adaptation, CallTimes
 
 _T = TypeVar("_T")
 _MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
-_MAX_YIELDS_AT_ONE_TIME = 10_000
-"""How often `adapt` may yield while mission time stands still."""
 
 
 @dataclass(eq=False)
@@ -54,21 +42,11 @@ class ManagerHost:
     learned: Mapping[str, Any]
     training: bool
     manager: ManagingSubsystem = field(init=False)
-    _is_waiting: bool = field(default=False, init=False)  # for a change
-    _due_s: float = field(
-        default=inf, init=False
-    )  # next time of `adapt`; while it waits, the earliest
-    _effect_after_s: float = field(
-        default=inf, init=False
-    )  # a call of `adapt`; inf: too often to be expected
-    _idle_regions: set[tuple[int, ...]] = field(
-        default_factory=set, init=False
-    )  # in which calls change nothing
-    _depends_on: list[tuple[Measurements, Thresholds]] = field(default_factory=list, init=False)
+    _times: CallTimes | None = field(default=None, init=False)  # None: `adapt` is never called
 
     def __post_init__(self) -> None:
         self.system.state_changed = self.state_changed
-        kind, measurements = self.manager_type, self.system.measurements
+        kind = self.manager_type
         try:
             self.manager = kind(self.system)
             if not hasattr(self.manager, "system"):
@@ -82,28 +60,17 @@ class ManagerHost:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
             raise self.error_of(error) from error
-        is_event_triggered = (
-            declared is not None and not self.system.recorded
-        )  # a recorded mission makes every call
-        if declared is not None and is_event_triggered:
-            self._depends_on = [
-                (measurements[name], declared[name]) for name in measurements if name in declared
-            ]
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
-        if times is not None:
-            (self._period_s, self._due_s, latency_s), self._is_event_triggered = (
-                times,
-                is_event_triggered,
-            )
-            if (
-                is_event_triggered or self._period_s >= 15.0
-            ):  # to look ahead anew takes as long as to fly 15 s in vain
-                self._effect_after_s = (
-                    latency_s + support(self.system.scenario.latencies.mode_change_s)[0]
-                )
-            self._alarm = Alarm(self.system.env, self._adapt)
-            self._set_alarm(self._due_s)
+        if times is None:
+            return
+        depends_on = None
+        if declared is not None and not self.system.recorded:  # a recorded mission makes every call
+            measurements = self.system.measurements
+            depends_on = [
+                (measurements[name], declared[name]) for name in measurements if name in declared
+            ]
+        self._times = CallTimes(self.system.env, self._adapt, *times, depends_on)
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""
@@ -137,11 +104,15 @@ class ManagerHost:
         self.state_changed()
 
     def state_changed(self) -> None:
-        """Make the next periodic call of a manager that waits for a change."""
-        self._idle_regions.clear()
-        if self._is_waiting:
-            self._is_waiting = False
-            self._set_alarm(summed_tick(self.system.env.now, self._due_s, self._period_s))
+        """Note that something has changed that `adapt` depends on."""
+        if self._times is not None:
+            self._times.wake()
+
+    def close(self) -> None:
+        """Let go of the manager's calls: there is none any more."""
+        self.system.state_changed = _nothing
+        if self._times is not None:
+            self._times.close()
 
     def _diagnostic(self, diagnostic: Diagnostic) -> None:
         self._guarded(self.manager.diagnostic, diagnostic)
@@ -149,91 +120,28 @@ class ManagerHost:
 
     def _adapt(self) -> None:
         """Call `adapt`, at one of its times."""
-        self._is_waiting, requests = False, self.system.modes.requests
+        times, modes, began_s = self._times, self.system.modes, self.system.env.now
+        assert times is not None  # it is they that call
+        requests = modes.requests
         adaptation = self._guarded(self.manager.adapt)
+
+        def over(result: object) -> None:
+            in_time = self.system.env.now - began_s < times.period_s  # no call was due meanwhile
+            times.go_on(changed=True, may_sleep=in_time and result is True)
+
         if adaptation is None:
-            self._go_on(
-                changed=self.system.modes.requests > requests, waits=self._is_event_triggered
-            )
+            times.go_on(changed=modes.requests > requests, may_sleep=True)
         elif isinstance(adaptation, Generator):
-            self.system.env.process(self._guarded_process(adaptation))
+            Adaptation(self.system.env, adaptation, over, self.error_of).resume()
         else:
             raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
-
-    def _go_on(self, *, changed: bool, waits: bool) -> None:
-        """Set the alarm to the next time of `adapt`, or, if it waits, to the next one that may
-        change something.
-        """
-        now_s, period_s = self.system.env.now, self._period_s
-        while self._due_s <= now_s:
-            self._due_s += period_s
-        if changed:
-            self._idle_regions.clear()
-        if not waits or now_s < period_s:
-            self._set_alarm(self._due_s)
-            return
-        self._is_waiting, next_due_s = True, self._due_s
-        regions, event_s = self._regions_until(now_s)
-        self._idle_regions.add(regions)
-        while regions in self._idle_regions:
-            if event_s == inf:
-                return
-            tick_s = summed_tick(event_s, next_due_s, period_s)
-            next_due_s = tick_s + period_s
-            regions, event_s = self._regions_until(tick_s)
-        self._set_alarm(tick_s, exactly=True)
-
-    def _set_alarm(self, t_s: float, *, exactly: bool = False) -> None:
-        """Have `adapt` called at a mission time, and its effect expected."""
-        self._alarm.set(t_s, exactly=exactly)
-        self.system._vehicle.expected_changes_s["manager"] = t_s + self._effect_after_s
-
-    def _regions_until(self, t_s: float) -> tuple[tuple[int, ...], float]:
-        """Find the regions of measured values at mission time t, and until when they stay the
-        same.
-        """
-        found = [each.region_until(t_s, thresholds) for each, thresholds in self._depends_on] or [
-            (0, inf)
-        ]
-        regions, untils_s = zip(*found, strict=True)
-        return regions, min(untils_s)
-
-    def _guarded_process(self, adaptation: AdaptationProcess) -> Process:
-        resume: Callable[[Any], object] = adaptation.send
-        outcome, yields, since_s = None, 0, (began_s := self.system.env.now)
-        while True:
-            yields, since_s = (
-                (yields + 1, since_s)
-                if self.system.env.now == since_s
-                else (0, self.system.env.now)
-            )
-            try:
-                if yields > _MAX_YIELDS_AT_ONE_TIME:
-                    raise RuntimeError(
-                        f"adapt yielded {_MAX_YIELDS_AT_ONE_TIME} events, and no mission time passed"
-                    )
-                event = resume(outcome)
-                if not isinstance(event, simpy.Event):
-                    raise TypeError(
-                        f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)"
-                    )
-            except StopIteration as end:
-                in_time = (
-                    self.system.env.now - began_s < self._period_s
-                )  # no call was due meanwhile
-                self._go_on(
-                    changed=True, waits=in_time and self._is_event_triggered and end.value is True
-                )
-                return
-            except RAISED as error:
-                raise self.error_of(error) from error
-            try:
-                outcome, resume = (yield event), adaptation.send
-            except Exception as error:  # the event has failed, which `adapt` may handle
-                outcome, resume = error, adaptation.throw
 
     def _guarded(self, hook: Callable[..., _T], *arguments: Any) -> _T:
         try:
             return hook(*arguments)
         except RAISED as error:
             raise self.error_of(error) from error
+
+
+def _nothing() -> None:
+    """Stand in for what is no longer called."""

@@ -17,14 +17,14 @@ from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.draws import Draws, stream_name
 from suave_des.learned import read_learned
-from suave_des.managed.follow import InspectionPath
+from suave_des.managed.follow import there_and_back
 from suave_des.registry import custom_functions, declared_files, manager_class
 from suave_des.scenario.loader import LoadedScenario, value_at
 from suave_des.scenario.models import Calibration, CurrentWaveDescription, VehicleDescription
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
 from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle, track_rows
-from suave_des.world.pipeline import sample_points
+from suave_des.world.pipeline import Camera, sample_points
 
 if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
     from suave_des.knowledge.reasoner import Reasoner
@@ -60,15 +60,12 @@ class PreparedScenario:
         self.points = sample_points(
             scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece
         )
-        self.path = InspectionPath.there_and_back(self.points, scenario.revision.follow.altitude_m)
+        self.path = there_and_back(self.points)
         detected = self.points + np.array(
             [0.0, 0.0, scenario.revision.monitors.detected_point_height_m]
         )
         self.detected_points, self.view_tangent = detected, scenario.vehicle.camera.tangent
-        self.bounds_m: tuple[Point, Point] = (
-            tuple(detected.min(axis=0).tolist()),
-            tuple(detected.max(axis=0).tolist()),
-        )
+        self.camera = Camera(True, self.view_tangent, *detected.min(axis=0), *detected.max(axis=0))
         self.duration_s = (
             scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         )

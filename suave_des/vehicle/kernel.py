@@ -1,90 +1,117 @@
 """The vehicle's motion: rigid body, thrusters and guided autopilot, stepped on a fixed grid by one
 compiled loop.
 
-One row of the track holds everything that the next step needs. Attitude is a quaternion (Fossen,
-Handbook of Marine Craft Hydrodynamics and Motion Control, 2.2.2): no trigonometry in the loop, and
-no singularity for a vehicle that tumbles. The other numbers after "Handbook" are sections or
-equations of that book.
+Attitude is a quaternion (Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2.2.2):
+no trigonometry in the loop, and no singularity for a vehicle that tumbles. The other numbers after
+"Handbook" are sections or equations of that book.
 """
 
 import math
+from typing import Annotated
 
-import numpy as np
+from suave_des.compiling import Array, Record, Records, compiled, record
 
-from suave_des.compiling import Array, IntArray, compiled
-
-# Columns of the track; the world frame has x east, y north, z up.
+# Columns of the track: the pose at each row; the world frame has x east, y north, z up.
 POSITION = slice(0, 3)  # p, world frame, m
 ATTITUDE = slice(3, 7)  # unit quaternion (w, x, y, z), body to world
-VELOCITY = slice(7, 13)  # nu, body frame, m/s and rad/s
-VELOCITY_INTEGRAL = slice(13, 16)  # of the velocity error, world frame, as an acceleration, m/s^2
-HEADING_INTEGRAL = 16  # of the heading error, as an angular acceleration, rad/s^2
-LEG_START = slice(17, 20)  # of the leg that the autopilot flies, world frame, m
-LEG_END = slice(20, 23)  # the set-point, world frame, m
-LEG_TIME = 23  # since the leg began, s
-LEG_QUARTER = 24  # a quarter of the leg's duration, s
-SET_POINT_NUMBER = 25  # of the set-point that the leg leads to; the one at the start is number 0
-COLUMNS = 26
-
-# Places in the set-point vector, after x, y and z of its position, world frame, m.
-HALF_HEADING_COS, HALF_HEADING_SIN = 3, 4  # cosine and sine of half the heading
-NUMBER = 5  # how many set-points were given before
-
-# Places in the parameter vector, see `autopilot.kernel_parameters`.
-MASS = 0  # kg
-IXX, IYY, IZZ = 1, 2, 3  # principal moments of inertia, kg m^2
-NET_BUOYANCY = 4  # buoyancy less weight, N
-RIGHTING = 5  # buoyancy times its height above the centre of mass, N m
-DRAG = 6  # six coefficients of -c |nu| nu, each divided by its mass or moment of inertia, 1/m and 1/rad
-POSITION_GAIN, POSITION_GAIN_Z = 12, 13  # velocity for a position error, 1/s
-JERK = 14  # of a leg, m/s^3
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = (
-    15,
-    16,
-)  # acceleration for a horizontal velocity error, 1/s; its integral, 1/s^2
-VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z = 17, 18  # the same for a vertical one
-INTEGRAL_LIMIT = 19  # of each velocity integral, m/s^2
-ROLL_GAIN, ROLL_RATE_GAIN = (
-    20,
-    21,
-)  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
-HEADING_GAIN, HEADING_RATE_GAIN = 22, 23  # the same for the heading
-HEADING_INTEGRAL_GAIN = 24  # 1/s^3
-HEADING_INTEGRAL_LIMIT = 25  # rad/s^2
-CURRENT = 26  # constant velocity of the water, world frame, three components, m/s
-FLOOR, CEILING = 29, 30  # z of sea bed and surface, m
-WAVE_X, WAVE_Y = 31, 32  # amplitude of the varying part of the current, east and north, m/s
-WAVE_RATE, WAVE_PHASE = 33, 34  # its angle per row and at row 0, rad
-
-# Columns of the thrusters' array: what each can give, equal for one that has failed, and gave in
-# the last step, N.
-LEAST, GREATEST, LAST = 0, 1, 2
+COLUMNS = 7
 
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to
 its end.
 """
 
-# Columns of a course: a timer's start and period, s; half the width and height of the box around a
-# way-point in which it counts as reached, m; ticks from sending it to its first check, to sending
-# it again, and again; what is added to x and y in its set-point, and the set-point's z, m; the next
-# tick that checks it, the one that sends it again, the last to look at; its row, the first, the one
-# after the last; how many set-points can be sent; time between rows, s.
-START, PERIOD, HALF_WIDTH, HALF_HEIGHT, FEWEST, MOST, MOST_AGAIN = range(7)
-SENT_X, SENT_Y, SENT_Z, TICK, AGAIN, UNTIL, PLACE, FIRST, END, ROOM, GRID = range(7, 18)
 
-UNCHECKED = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 1.0), -1
-"""A box, a timer and a tick before row 0, for `advance` without checks."""
-Dynamics = tuple[float, Array, Array, Array, Array, Array]
-"""What moves the vehicle, besides its state:
+@record
+class VehicleRecord(Record):
+    """A vehicle: its constants, how it is controlled, and its state, which is all that the next
+    step needs.
+    """
 
-- the time between rows, as the simulated world counts it, s;
-- set-point: position, heading and number, shape (6,);
-- parameters: constants, shape (35,);
-- allocation: thrusts for a demanded wrench, shape (6 thrusters, 6), in Fortran's order;
-- wrenches: wrench for thrusts, shape (6, 6 thrusters), in Fortran's order;
-- thrusters: what each can give and gave last, shape (6 thrusters, 3), in Fortran's order.
-"""
+    # Constants of the body, and of the water around it.
+    step_s: float  # time between rows, as the simulated world counts it
+    mass_kg: float
+    inertia_x_kg_m2: float  # principal moments
+    inertia_y_kg_m2: float
+    inertia_z_kg_m2: float
+    net_buoyancy_n: float  # buoyancy less weight
+    righting_n_m: float  # buoyancy times its height above the centre of mass
+    drag: Annotated[Array, (6,)]  # c / mass or moment of inertia of -c |nu| nu, 1/m and 1/rad
+    allocation: Annotated[Array, (6, 6)]  # column i: of wrench component i to each thruster
+    wrenches: Annotated[Array, (6, 6)]  # its transpose: row i is the wrench of thruster i at 1 N
+    current_x_m_per_s: float  # constant velocity of the water, world frame
+    current_y_m_per_s: float
+    current_z_m_per_s: float
+    wave_x_m_per_s: float  # amplitude of the varying part of the current
+    wave_y_m_per_s: float
+    wave_rate_rad: float  # its angle per row
+    wave_phase_rad: float  # its angle at row 0
+    floor_z_m: float  # sea bed
+    ceiling_z_m: float  # surface
+
+    # Constants of the autopilot.
+    position_gain_per_s: float  # velocity for a horizontal position error
+    position_gain_z_per_s: float
+    jerk_m_per_s3: float  # of a leg
+    velocity_gain_per_s: float  # acceleration for a horizontal velocity error
+    velocity_gain_z_per_s: float
+    velocity_integral_gain_per_s2: float  # acceleration for its integral
+    velocity_integral_gain_z_per_s2: float
+    integral_limit_m_per_s2: float  # of each velocity integral
+    roll_gain_per_s2: float  # angular acceleration for a roll error
+    roll_rate_gain_per_s: float
+    heading_gain_per_s2: float
+    heading_rate_gain_per_s: float
+    heading_integral_gain_per_s3: float
+    heading_integral_limit_rad_per_s2: float
+
+    # How it is controlled: the set-point, and what each thruster can give, equal for one that has
+    # failed.
+    set_point_x_m: float
+    set_point_y_m: float
+    set_point_z_m: float
+    half_heading_cos: float
+    half_heading_sin: float
+    set_point_number: int  # how many set-points were given before
+    least_n: Annotated[Array, (6,)]
+    greatest_n: Annotated[Array, (6,)]
+
+    # Its state at a row of the track.
+    row: int
+    x_m: float  # p, world frame
+    y_m: float
+    z_m: float
+    qw: float  # attitude
+    qx: float
+    qy: float
+    qz: float
+    u_m_per_s: float  # nu, body frame
+    v_m_per_s: float
+    w_m_per_s: float
+    p_rad_per_s: float
+    q_rad_per_s: float
+    r_rad_per_s: float
+    integral_x_m_per_s2: float  # of the velocity error, world frame, as an acceleration
+    integral_y_m_per_s2: float
+    integral_z_m_per_s2: float
+    heading_integral_rad_per_s2: float  # of the heading error, as an angular acceleration
+    thrust_n: Annotated[Array, (6,)]  # what the thrusters gave in the last step
+
+    # The leg that the autopilot flies.
+    leg_number: int  # of the set-point that it leads to; the one at the start is number 0
+    leg_start_x_m: float  # world frame
+    leg_start_y_m: float
+    leg_start_z_m: float
+    leg_end_x_m: float
+    leg_end_y_m: float
+    leg_end_z_m: float
+    leg_along_x: float  # its direction, a unit vector
+    leg_along_y: float
+    leg_along_z: float
+    leg_length_m: float
+    leg_top_speed_m_per_s: float
+    leg_quarter_s: float  # a quarter of its duration
+    leg_time_s: float  # since it began
 
 
 @compiled
@@ -94,103 +121,62 @@ def clamp(value: float, limit: float) -> float:
 
 
 @compiled
-def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, float, float]:
+def begin_leg(vehicle: VehicleRecord) -> None:
     """Begin the leg to a new set-point, as ArduPilot's waypoint controller does (AC_WPNav,
     set_wp_destination).
 
     If the leg before is completed, the new one starts at its end. If not, the controller starts
     from the stopping point of the vehicle, without the integral that it had built up.
-
-    Returns:
-        Where the leg starts, x, y and z in m; the integral in x and y.
     """
-    x, y, z = track[row, 0], track[row, 1], track[row, 2]
-    to_x, to_y, to_z = track[row, 20], track[row, 21], track[row, 22]
-    is_over = track[row, LEG_TIME] >= 4.0 * track[row, LEG_QUARTER]
+    x, y, z = vehicle.x_m, vehicle.y_m, vehicle.z_m
+    to_x, to_y, to_z = vehicle.leg_end_x_m, vehicle.leg_end_y_m, vehicle.leg_end_z_m
+    is_over = vehicle.leg_time_s >= 4.0 * vehicle.leg_quarter_s
     if is_over and (to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2 <= ARRIVED_M * ARRIVED_M:
-        return to_x, to_y, to_z, track[row, 13], track[row, 14]
-    qw, qx, qy, qz = track[row, 3], track[row, 4], track[row, 5], track[row, 6]
-    u, v, w = track[row, 7], track[row, 8], track[row, 9]
-    # R nu as q nu q*: nu + 2 qw (e x nu) + 2 e x (e x nu), with the vector part e of q (Handbook,
-    # 2.2.2).
-    cx, cy, cz = qy * w - qz * v, qz * u - qx * w, qx * v - qy * u
-    wx = u + 2.0 * (qw * cx + qy * cz - qz * cy)
-    wy = v + 2.0 * (qw * cy + qz * cx - qx * cz)
-    wz = w + 2.0 * (qw * cz + qx * cy - qy * cx)
-    from_x, from_y = x + wx / prm[POSITION_GAIN], y + wy / prm[POSITION_GAIN]
-    return from_x, from_y, z + wz / prm[POSITION_GAIN_Z], 0.0, 0.0
-
-
-@compiled
-def row_of(tick: int, timer: tuple[float, float, float]) -> int:
-    """Find the row nearest to a tick of a timer: time of tick 0, time between ticks, and time
-    between rows, s.
-    """
-    start_s, period_s, grid_s = timer
-    return int(np.rint((start_s + tick * period_s) / grid_s))
-
-
-@compiled
-def is_in_box(track: Array, row: int, box: tuple[float, float, float, float, float]) -> bool:
-    """Say whether a row's position is in a box: x, y and z of its centre, half its width and half
-    its height, m.
-    """
-    x, y, z, half_width, half_height = box
-    off_x, off_y, off_z = abs(track[row, 0] - x), abs(track[row, 1] - y), abs(track[row, 2] - z)
-    return bool(off_x <= half_width and off_y <= half_width and off_z <= half_height)
-
-
-@compiled
-def advance(
-    track: Array,
-    first: int,
-    last: int,
-    dynamics: Dynamics,
-    box: tuple[float, float, float, float, float],
-    timer: tuple[float, float, float],
-    tick: int,
-) -> int:
-    """Fill rows first + 1 .. last of the track from row `first`, with one set-point, and no
-    thruster failing.
-
-    Args:
-        track: shape (rows, COLUMNS); written in place.
-        first: row to start from.
-        last: last row to fill; or the first row at a tick that finds the vehicle in the box.
-        dynamics: time step, set-point and constants.
-        box, timer, tick: see `is_in_box` and `row_of`; the first tick that is checked.
-
-    Returns:
-        The tick that finds the vehicle in the box; -1 if none does.
-    """
-    check_row = row_of(tick, timer)
-    h, set_point, prm, allocation, wrenches, thrusters = dynamics
-    mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
-    heading_w, heading_z, number = (
-        set_point[HALF_HEADING_COS],
-        set_point[HALF_HEADING_SIN],
-        set_point[NUMBER],
-    )
-    # Unpacking a slice would create an array, which takes as long as a step.
-    x, y, z = track[first, 0], track[first, 1], track[first, 2]
-    qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
-    u, v, w = track[first, 7], track[first, 8], track[first, 9]
-    p, q, r = track[first, 10], track[first, 11], track[first, 12]
-    ix, iy, iz, ir = track[first, 13], track[first, 14], track[first, 15], track[first, 16]
-    from_x, from_y, from_z = track[first, 17], track[first, 18], track[first, 19]
-    to_x, to_y, to_z = track[first, 20], track[first, 21], track[first, 22]
-    leg_time, quarter = track[first, LEG_TIME], track[first, LEG_QUARTER]
-    is_new_leg = track[first, SET_POINT_NUMBER] != set_point[NUMBER]
-    if is_new_leg:
-        from_x, from_y, from_z, ix, iy = begin_leg(track, first, prm)
-        to_x, to_y, to_z, leg_time = set_point[0], set_point[1], set_point[2], 0.0
+        from_x, from_y, from_z = to_x, to_y, to_z
+    else:
+        qw, qx, qy, qz = vehicle.qw, vehicle.qx, vehicle.qy, vehicle.qz
+        u, v, w = vehicle.u_m_per_s, vehicle.v_m_per_s, vehicle.w_m_per_s
+        # R nu as q nu q*: nu + 2 qw (e x nu) + 2 e x (e x nu), with the vector part e of q
+        # (Handbook, 2.2.2).
+        cx, cy, cz = qy * w - qz * v, qz * u - qx * w, qx * v - qy * u
+        wx = u + 2.0 * (qw * cx + qy * cz - qz * cy)
+        wy = v + 2.0 * (qw * cy + qz * cx - qx * cz)
+        wz = w + 2.0 * (qw * cz + qx * cy - qy * cx)
+        from_x = x + wx / vehicle.position_gain_per_s
+        from_y = y + wy / vehicle.position_gain_per_s
+        from_z = z + wz / vehicle.position_gain_z_per_s
+        vehicle.integral_x_m_per_s2 = vehicle.integral_y_m_per_s2 = 0.0
+    to_x, to_y, to_z = vehicle.set_point_x_m, vehicle.set_point_y_m, vehicle.set_point_z_m
     along_x, along_y, along_z = to_x - from_x, to_y - from_y, to_z - from_z
     length = math.sqrt(along_x * along_x + along_y * along_y + along_z * along_z)
-    if is_new_leg:  # from rest to rest at constant jerk with two sign changes
-        quarter = (length / (2.0 * prm[JERK])) ** (1.0 / 3.0)
+    # From rest to rest at constant jerk with two sign changes.
+    quarter = (length / (2.0 * vehicle.jerk_m_per_s3)) ** (1.0 / 3.0)
     if length > 0.0:
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
-    top_speed = prm[JERK] * quarter * quarter
+    vehicle.leg_start_x_m, vehicle.leg_start_y_m, vehicle.leg_start_z_m = from_x, from_y, from_z
+    vehicle.leg_end_x_m, vehicle.leg_end_y_m, vehicle.leg_end_z_m = to_x, to_y, to_z
+    vehicle.leg_along_x, vehicle.leg_along_y, vehicle.leg_along_z = along_x, along_y, along_z
+    vehicle.leg_length_m = length
+    vehicle.leg_top_speed_m_per_s = vehicle.jerk_m_per_s3 * quarter * quarter
+    vehicle.leg_quarter_s = quarter
+    vehicle.leg_time_s = 0.0
+    vehicle.leg_number = vehicle.set_point_number
+
+
+@compiled
+def advance(vehicles: Records, track: Array, last: int) -> None:
+    """Fly a vehicle up to a row, with one set-point, and no thruster failing.
+
+    Args:
+        vehicles: its record is the first; it is updated.
+        track: shape (rows, COLUMNS); the rows after the vehicle's, up to `last`, are filled.
+        last: a row after the vehicle's.
+    """
+    vehicle: VehicleRecord = vehicles[0]
+    if vehicle.leg_number != vehicle.set_point_number:
+        begin_leg(vehicle)
+    h, mass = vehicle.step_s, vehicle.mass_kg
+    ixx, iyy, izz = vehicle.inertia_x_kg_m2, vehicle.inertia_y_kg_m2, vehicle.inertia_z_kg_m2
     # A multiplication takes a fraction of the time of a division.
     inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = (
         1.0 / mass,
@@ -198,7 +184,27 @@ def advance(
         1.0 / iyy,
         1.0 / izz,
     )
-    for row in range(first + 1, last + 1):
+    drag, allocation, wrenches = vehicle.drag, vehicle.allocation, vehicle.wrenches
+    least_n, greatest_n, thrust_n = vehicle.least_n, vehicle.greatest_n, vehicle.thrust_n
+    gain, gain_z = vehicle.velocity_gain_per_s, vehicle.velocity_gain_z_per_s
+    integral_gain = vehicle.velocity_integral_gain_per_s2
+    integral_gain_z = vehicle.velocity_integral_gain_z_per_s2
+    jerk, heading_w, heading_z = (
+        vehicle.jerk_m_per_s3,
+        vehicle.half_heading_cos,
+        vehicle.half_heading_sin,
+    )
+    from_x, from_y, from_z = vehicle.leg_start_x_m, vehicle.leg_start_y_m, vehicle.leg_start_z_m
+    along_x, along_y, along_z = vehicle.leg_along_x, vehicle.leg_along_y, vehicle.leg_along_z
+    length, top_speed = vehicle.leg_length_m, vehicle.leg_top_speed_m_per_s
+    quarter, leg_time = vehicle.leg_quarter_s, vehicle.leg_time_s
+    x, y, z = vehicle.x_m, vehicle.y_m, vehicle.z_m
+    qw, qx, qy, qz = vehicle.qw, vehicle.qx, vehicle.qy, vehicle.qz
+    u, v, w = vehicle.u_m_per_s, vehicle.v_m_per_s, vehicle.w_m_per_s
+    p, q, r = vehicle.p_rad_per_s, vehicle.q_rad_per_s, vehicle.r_rad_per_s
+    ix, iy = vehicle.integral_x_m_per_s2, vehicle.integral_y_m_per_s2
+    iz, ir = vehicle.integral_z_m_per_s2, vehicle.heading_integral_rad_per_s2
+    for row in range(vehicle.row + 1, last + 1):
         # Rotation matrix R, body to world (Handbook, 2.69).
         r00 = 1.0 - 2.0 * (qy * qy + qz * qz)
         r01 = 2.0 * (qx * qy - qz * qw)
@@ -222,11 +228,11 @@ def advance(
         left = min(leg_time, 4.0 * quarter - leg_time)  # time to the nearer end
         if left > 0.0:
             if left < quarter:
-                speed = 0.5 * prm[JERK] * left * left
+                speed = 0.5 * jerk * left * left
                 distance = speed * left / 3.0
             else:
                 left = 2.0 * quarter - left  # time to the middle
-                slower = 0.5 * (left * left * prm[JERK])
+                slower = 0.5 * (left * left * jerk)
                 speed = top_speed - slower
                 distance = 0.5 * length - left * (top_speed - slower / 3.0)
             if leg_time > 2.0 * quarter:
@@ -239,16 +245,16 @@ def advance(
         # Outer loop: position error to velocity, besides the target's own. Inner loop:
         # proportional-integral on the velocity's error in the world frame, demanded as a force in
         # the body frame.
-        ex = prm[POSITION_GAIN] * ex + along_x * speed - wx
-        ey = prm[POSITION_GAIN] * ey + along_y * speed - wy
-        ez = prm[POSITION_GAIN_Z] * ez + along_z * speed - wz
-        bound = prm[INTEGRAL_LIMIT]
-        ix = clamp(ix + h * prm[VELOCITY_INTEGRAL_GAIN] * ex, bound)
-        iy = clamp(iy + h * prm[VELOCITY_INTEGRAL_GAIN] * ey, bound)
-        iz = clamp(iz + h * prm[VELOCITY_INTEGRAL_GAIN_Z] * ez, bound)
-        fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
-        fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
-        fz = mass * (prm[VELOCITY_GAIN_Z] * ez + iz)
+        ex = vehicle.position_gain_per_s * ex + along_x * speed - wx
+        ey = vehicle.position_gain_per_s * ey + along_y * speed - wy
+        ez = vehicle.position_gain_z_per_s * ez + along_z * speed - wz
+        bound = vehicle.integral_limit_m_per_s2
+        ix = clamp(ix + h * integral_gain * ex, bound)
+        iy = clamp(iy + h * integral_gain * ey, bound)
+        iz = clamp(iz + h * integral_gain_z * ez, bound)
+        fx = mass * (gain * ex + ix)
+        fy = mass * (gain * ey + iy)
+        fz = mass * (gain_z * ez + iz)
         d0 = r00 * fx + r10 * fy + r20 * fz
         d1 = r01 * fx + r11 * fy + r21 * fz
         d2 = r02 * fx + r12 * fy + r22 * fz
@@ -259,44 +265,42 @@ def advance(
         sign = 2.0 if ew >= 0.0 else -2.0
         e_roll = sign * (-qx * heading_w - qy * heading_z)
         e_yaw = sign * (-qz * heading_w + qw * heading_z)
-        bound = prm[HEADING_INTEGRAL_LIMIT]
-        ir = clamp(ir + h * prm[HEADING_INTEGRAL_GAIN] * e_yaw, bound)
-        d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
-        d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
+        bound = vehicle.heading_integral_limit_rad_per_s2
+        ir = clamp(ir + h * vehicle.heading_integral_gain_per_s3 * e_yaw, bound)
+        d3 = ixx * (vehicle.roll_gain_per_s2 * e_roll - vehicle.roll_rate_gain_per_s * p)
+        d5 = izz * (vehicle.heading_gain_per_s2 * e_yaw - vehicle.heading_rate_gain_per_s * r + ir)
 
         # Thrusters: allocate as if all worked, limit each. One loop, min and max, or C's order: 4
         # to 13% slower.
         for i in range(6):
-            thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
-            thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
-            least, greatest = thrusters[i, LEAST], thrusters[i, GREATEST]
-            thrusters[i, LAST] = (
-                least if thrust < least else greatest if thrust > greatest else thrust
-            )
+            thrust = allocation[0, i] * d0 + allocation[1, i] * d1 + allocation[2, i] * d2
+            thrust = thrust + allocation[3, i] * d3 + allocation[5, i] * d5
+            least, greatest = least_n[i], greatest_n[i]
+            thrust_n[i] = least if thrust < least else greatest if thrust > greatest else thrust
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
         for i in range(6):
-            thrust = thrusters[i, LAST]
-            t0 += wrenches[0, i] * thrust
-            t1 += wrenches[1, i] * thrust
-            t2 += wrenches[2, i] * thrust
-            t3 += wrenches[3, i] * thrust
-            t4 += wrenches[4, i] * thrust
-            t5 += wrenches[5, i] * thrust
+            thrust = thrust_n[i]
+            t0 += wrenches[i, 0] * thrust
+            t1 += wrenches[i, 1] * thrust
+            t2 += wrenches[i, 2] * thrust
+            t3 += wrenches[i, 3] * thrust
+            t4 += wrenches[i, 4] * thrust
+            t5 += wrenches[i, 5] * thrust
 
         # Buoyancy above the centre of mass: a net force, and a moment that rights roll and pitch
         # (Handbook, 4.1).
-        t0 += prm[NET_BUOYANCY] * r20
-        t1 += prm[NET_BUOYANCY] * r21
-        t2 += prm[NET_BUOYANCY] * r22
-        t3 -= prm[RIGHTING] * r21
-        t4 += prm[RIGHTING] * r20
+        t0 += vehicle.net_buoyancy_n * r20
+        t1 += vehicle.net_buoyancy_n * r21
+        t2 += vehicle.net_buoyancy_n * r22
+        t3 -= vehicle.righting_n_m * r21
+        t4 += vehicle.righting_n_m * r20
 
         # M nu' = tau - C(nu) nu - D(nu_r) nu_r, drag taken implicitly: it stays stable at any
         # speed.
-        cx, cy, cz = prm[CURRENT], prm[CURRENT + 1], prm[CURRENT + 2]
-        if prm[WAVE_RATE] != 0.0:  # the current varies over time, which the row counts
-            wave = math.sin(prm[WAVE_RATE] * row + prm[WAVE_PHASE])
-            cx, cy = cx + prm[WAVE_X] * wave, cy + prm[WAVE_Y] * wave
+        cx, cy, cz = vehicle.current_x_m_per_s, vehicle.current_y_m_per_s, vehicle.current_z_m_per_s
+        if vehicle.wave_rate_rad != 0.0:  # the current varies over time, which the row counts
+            wave = math.sin(vehicle.wave_rate_rad * row + vehicle.wave_phase_rad)
+            cx, cy = cx + vehicle.wave_x_m_per_s * wave, cy + vehicle.wave_y_m_per_s * wave
         cu = r00 * cx + r10 * cy + r20 * cz
         cv = r01 * cx + r11 * cy + r21 * cz
         cw = r02 * cx + r12 * cy + r22 * cz
@@ -306,12 +310,12 @@ def advance(
         ap = (t3 - (izz - iyy) * q * r) * inverse_ixx
         aq = (t4 - (ixx - izz) * r * p) * inverse_iyy
         ar = (t5 - (iyy - ixx) * p * q) * inverse_izz
-        u = cu + (u + h * au - cu) / (1.0 + h * prm[DRAG] * abs(u - cu))
-        v = cv + (v + h * av - cv) / (1.0 + h * prm[DRAG + 1] * abs(v - cv))
-        w = cw + (w + h * aw - cw) / (1.0 + h * prm[DRAG + 2] * abs(w - cw))
-        p = (p + h * ap) / (1.0 + h * prm[DRAG + 3] * abs(p))
-        q = (q + h * aq) / (1.0 + h * prm[DRAG + 4] * abs(q))
-        r = (r + h * ar) / (1.0 + h * prm[DRAG + 5] * abs(r))
+        u = cu + (u + h * au - cu) / (1.0 + h * drag[0] * abs(u - cu))
+        v = cv + (v + h * av - cv) / (1.0 + h * drag[1] * abs(v - cv))
+        w = cw + (w + h * aw - cw) / (1.0 + h * drag[2] * abs(w - cw))
+        p = (p + h * ap) / (1.0 + h * drag[3] * abs(p))
+        q = (q + h * aq) / (1.0 + h * drag[4] * abs(q))
+        r = (r + h * ar) / (1.0 + h * drag[5] * abs(r))
 
         # Kinematics with the new velocity (semi-implicit Euler): p' = R v, q' = T_q(q) omega
         # (Handbook, 2.86).
@@ -320,11 +324,11 @@ def advance(
         z += h * (r20 * u + r21 * v + r22 * w)
         # Neither into the sea bed nor out of the water; like ArduSub's, the controller does not
         # wind up against it.
-        if z < prm[FLOOR] or z > prm[CEILING]:
-            z = min(max(z, prm[FLOOR]), prm[CEILING])
+        if z < vehicle.floor_z_m or z > vehicle.ceiling_z_m:
+            z = min(max(z, vehicle.floor_z_m), vehicle.ceiling_z_m)
             through = r20 * u + r21 * v + r22 * w
             u, v, w = u - r20 * through, v - r21 * through, w - r22 * through
-            iz = max(iz, 0.0) if z == prm[FLOOR] else min(iz, 0.0)
+            iz = max(iz, 0.0) if z == vehicle.floor_z_m else min(iz, 0.0)
         dw = -qx * p - qy * q - qz * r
         dx = qw * p + qy * r - qz * q
         dy = qw * q + qz * p - qx * r
@@ -342,109 +346,12 @@ def advance(
 
         track[row, 0], track[row, 1], track[row, 2] = x, y, z
         track[row, 3], track[row, 4], track[row, 5], track[row, 6] = qw, qx, qy, qz
-        track[row, 7], track[row, 8], track[row, 9] = u, v, w
-        track[row, 10], track[row, 11], track[row, 12] = p, q, r
-        track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir
-        track[row, 17], track[row, 18], track[row, 19] = from_x, from_y, from_z
-        track[row, 20], track[row, 21], track[row, 22] = to_x, to_y, to_z
-        track[row, LEG_TIME], track[row, LEG_QUARTER], track[row, SET_POINT_NUMBER] = (
-            leg_time,
-            quarter,
-            number,
-        )
-        while row == check_row:
-            if is_in_box(track, row, box):
-                return tick
-            tick += 1
-            check_row = row_of(tick, timer)
-    return -1
 
-
-@compiled
-def fly_waypoints(
-    track: Array,
-    computed: int,
-    end: int,
-    dynamics: Dynamics,
-    waypoints: Array,
-    courses: Array,
-    sends: IntArray,
-) -> tuple[int, bool, int]:
-    """Fly along one course or two: a tick that finds a way-point reached, or not in time, sends a
-    set-point.
-
-    Args:
-        track, computed, dynamics: as for `advance`, and the last row that is filled; the set-point
-        given last remains.
-        end: the row up to which to fill, after the first course's last tick.
-        waypoints: x, y and z in the first columns, m, shape (n, at least 3).
-        courses: shape (courses, 18), see `START` and the others.
-        sends: shape (m, 4), with one more than the courses' room in all; receives for each
-            set-point its tick, its course, how many of the course's way-points are reached by then,
-            and the tick that sends it again. The last of them is not given if there is no room for
-            more, if it leads to no way-point, or if the one before is reached but for its height.
-
-    Returns:
-        How many set-points there are; whether the last of them is left to the caller; and the last
-        row of the track that is now filled. Ticks beyond the track do not count.
-    """
-    set_point, sent, last_row, courses = dynamics[1], 0, track.shape[0] - 1, courses.copy()
-    while True:
-        course = 0
-        if courses.shape[0] > 1:
-            first_s = courses[0, START] + courses[0, TICK] * courses[0, PERIOD]
-            course = int(courses[1, START] + courses[1, TICK] * courses[1, PERIOD] < first_s)
-        this = courses[course]
-        timer, until = (this[START], this[PERIOD], this[GRID]), this[UNTIL]
-        tick, again, place = int(this[TICK]), int(this[AGAIN]), int(this[PLACE])
-        if tick > until or row_of(tick, timer) > last_row:
-            break
-        box = (
-            waypoints[place, 0],
-            waypoints[place, 1],
-            waypoints[place, 2],
-            this[HALF_WIDTH],
-            this[HALF_HEIGHT],
-        )
-        if row_of(tick, timer) > computed:
-            goal = again if courses.shape[0] == 1 else tick
-            last = min(row_of(int(min(goal, until)), timer), last_row)
-            found = advance(track, computed, last, dynamics, box, timer, tick)
-            is_reached = 0 <= found <= min(goal, until)
-            tick = found if is_reached else goal
-            computed = row_of(tick, timer) if is_reached else last
-            if tick > until or row_of(tick, timer) > last_row:
-                break
-        else:
-            is_reached = is_in_box(track, row_of(tick, timer), box)
-        if not is_reached and tick < again:
-            this[TICK] = tick + 1
-            continue
-        row = row_of(tick, timer)
-        is_level = is_reached or not is_in_box(track, row, (*box[:4], np.inf))
-        place += is_reached
-        again = tick + int(this[MOST] if is_reached else this[MOST_AGAIN])
-        sends[sent, 0], sends[sent, 1], sends[sent, 2], sends[sent, 3] = (
-            tick,
-            course,
-            place - int(this[FIRST]),
-            again,
-        )
-        sent += 1
-        if place == this[END] or this[ROOM] == 0.0 or not is_level:
-            return sent, True, computed
-        set_point[0], set_point[1] = (
-            waypoints[place, 0] + this[SENT_X],
-            waypoints[place, 1] + this[SENT_Y],
-        )
-        set_point[2] = this[SENT_Z]
-        set_point[NUMBER] += 1.0
-        computed = row  # rows beyond it were flown to another set-point
-        this[TICK], this[AGAIN], this[PLACE], this[ROOM] = (
-            tick + this[FEWEST],
-            again,
-            place,
-            this[ROOM] - 1.0,
-        )
-    advance(track, computed, end, dynamics, *UNCHECKED)
-    return sent, False, max(computed, end)
+    vehicle.row = last
+    vehicle.x_m, vehicle.y_m, vehicle.z_m = x, y, z
+    vehicle.qw, vehicle.qx, vehicle.qy, vehicle.qz = qw, qx, qy, qz
+    vehicle.u_m_per_s, vehicle.v_m_per_s, vehicle.w_m_per_s = u, v, w
+    vehicle.p_rad_per_s, vehicle.q_rad_per_s, vehicle.r_rad_per_s = p, q, r
+    vehicle.integral_x_m_per_s2, vehicle.integral_y_m_per_s2 = ix, iy
+    vehicle.integral_z_m_per_s2, vehicle.heading_integral_rad_per_s2 = iz, ir
+    vehicle.leg_time_s = leg_time

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suave_des.compiling import Array
+from suave_des.vehicle.kernel import VehicleRecord
 
 GRAVITY_M_PER_S2 = 9.80665
 
@@ -149,33 +150,48 @@ class Autopilot(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def kernel_parameters(
+def vehicle_record(
     model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]
-) -> Array:
-    """Put the constants of vehicle and autopilot into the places that `kernel` names, in water at
-    rest.
-    """
-    ap = autopilot
+) -> VehicleRecord:
+    """Make the record of a healthy vehicle at rest in water at rest; to be copied."""
+    record = VehicleRecord()
+    _describe_body(record, model)
+    _describe_autopilot(record, autopilot)
     # The integral is limited to the force that the four horizontal thrusters together give along
     # one axis.
-    integral_limit = 4.0 * model.thrust_limit_n * sqrt(0.5) / model.mass_kg
-    inertia = (model.mass_kg,) * 3 + model.inertia_kg_m2
-    drag = [
-        coefficient / inert
-        for coefficient, inert in zip(model.quadratic_drag, inertia, strict=True)
-    ]
+    record.integral_limit_m_per_s2 = 4.0 * model.thrust_limit_n * sqrt(0.5) / model.mass_kg
+    record.floor_z_m, record.ceiling_z_m = z_limits_m
+    return record
+
+
+def _describe_body(record: VehicleRecord, model: VehicleModel) -> None:
+    record.mass_kg = model.mass_kg
+    record.inertia_x_kg_m2, record.inertia_y_kg_m2, record.inertia_z_kg_m2 = model.inertia_kg_m2
     buoyancy_n = model.water_density_kg_per_m3 * model.displaced_volume_m3 * GRAVITY_M_PER_S2
-    net_n = buoyancy_n - model.mass_kg * GRAVITY_M_PER_S2
-    forces = net_n, buoyancy_n * model.centre_of_buoyancy_m, *drag
-    legs = ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
-    horizontal = ap.velocity_gain_per_s, ap.velocity_integral_gain_per_s2
-    vertical = ap.vertical_velocity_gain_per_s, ap.vertical_velocity_integral_gain_per_s2
-    roll, heading = ap.roll_frequency_rad_per_s, ap.heading_frequency_rad_per_s
-    attitude = roll * roll, 2.0 * roll, heading * heading, 2.0 * heading
-    turning = ap.heading_integral_gain_per_s3, 4.0 * heading * heading
-    body = model.mass_kg, *model.inertia_kg_m2, *forces
-    loops = *horizontal, *vertical, integral_limit, *attitude, *turning
-    return _read_only((*body, *legs, *loops, *[0.0] * 3, *z_limits_m, *[0.0] * 4))
+    record.net_buoyancy_n = buoyancy_n - model.mass_kg * GRAVITY_M_PER_S2
+    record.righting_n_m = buoyancy_n * model.centre_of_buoyancy_m
+    inertia = (model.mass_kg,) * 3 + model.inertia_kg_m2
+    record.drag[:] = np.divide(model.quadratic_drag, inertia).tolist()
+    np.asarray(record.allocation)[:] = model.allocation.T
+    np.asarray(record.wrenches)[:] = model.wrenches.T
+    limits_n = [model.thrust_limit_n] * len(model.thrusters)
+    record.least_n[:], record.greatest_n[:] = [-limit_n for limit_n in limits_n], limits_n
+
+
+def _describe_autopilot(record: VehicleRecord, autopilot: Autopilot) -> None:
+    record.position_gain_per_s = autopilot.position_gain_per_s
+    record.position_gain_z_per_s = autopilot.vertical_position_gain_per_s
+    record.jerk_m_per_s3 = autopilot.jerk_m_per_s3
+    record.velocity_gain_per_s = autopilot.velocity_gain_per_s
+    record.velocity_gain_z_per_s = autopilot.vertical_velocity_gain_per_s
+    record.velocity_integral_gain_per_s2 = autopilot.velocity_integral_gain_per_s2
+    record.velocity_integral_gain_z_per_s2 = autopilot.vertical_velocity_integral_gain_per_s2
+    roll, heading = autopilot.roll_frequency_rad_per_s, autopilot.heading_frequency_rad_per_s
+    record.roll_gain_per_s2, record.roll_rate_gain_per_s = roll * roll, 2.0 * roll
+    record.heading_gain_per_s2, record.heading_rate_gain_per_s = heading * heading, 2.0 * heading
+    record.heading_integral_gain_per_s3 = autopilot.heading_integral_gain_per_s3
+    record.heading_integral_limit_rad_per_s2 = 4.0 * heading * heading
+    record.half_heading_cos = 1.0  # the vehicle is to look east
 
 
 def _read_only(values: ArrayLike) -> Array:

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from suave_des.compiling import Array, compiled
+from suave_des.compiling import Array, Record, compiled, record
 
 
 @cache
@@ -48,43 +48,65 @@ def first_point_in_view(
     return -1
 
 
+@record
+class Camera(Record):
+    """What the camera looks for, and how far it has looked.
+
+    The bounds are the least and the greatest coordinates of the points as the detection places
+    them.
+    """
+
+    is_open: bool  # until a point is seen
+    tangent: float  # of half the camera's field of view
+    low_x_m: float
+    low_y_m: float
+    low_z_m: float
+    high_x_m: float
+    high_y_m: float
+    high_z_m: float
+    next_row: int  # of the track, that is to be looked at
+    measured: int  # how many measurements of the visibility there are by then
+    point: int  # index of the point that is seen first
+
+
 @compiled
 def first_detection(
-    track: Array,
-    rows: tuple[int, int],
-    row_s: float,
-    visibility: tuple[Array, Array],
-    points: Array,
-    bounds_m: tuple[tuple[float, float, float], tuple[float, float, float]],
-    view_tangent: float,
-) -> tuple[int, int]:
-    """Find the first row from which a point is seen, and the point's index; (-1, -1) if none.
+    camera: Camera, track: Array, last: int, row_s: float, visibility: Array, points: Array
+) -> bool:
+    """Look from the rows of a track up to `last` for a point; stop at the first row from which one
+    is seen.
 
     Args:
+        camera: `next_row` becomes the row from which the point is seen, or that after the last.
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
-        rows: the first and the last row that count.
         row_s: time between rows.
-        visibility: measured water visibility: the times, s, ascending, of the values, m; none
-            before the first one.
-        points, bounds_m: points as the detection places them, shape (n, 3), m; the least and the
-        greatest coordinates.
-        view_tangent: tangent of half the camera's field of view.
+        visibility: measured water visibility: the times, s, ascending, of the values, m, shape
+            (2, n); none before the first one.
+        points: points as the detection places them, shape (n, 3), m.
+
+    Returns:
+        Whether a point is seen.
     """
-    (low_x, low_y, low_z), (high_x, high_y, high_z) = (
-        bounds_m  # finding them here would take 2 s to compile
-    )
-    (times_s, visibility_m), measured = visibility, 0
-    for row in range(rows[0], rows[1] + 1):
+    low_z, high_z, tangent = camera.low_z_m, camera.high_z_m, camera.tangent
+    for row in range(camera.next_row, last + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
         # Far from the pipeline's bounding box no point can be in view: most rows of a search end
         # here.
-        widest = max(abs(z - low_z), abs(z - high_z)) * view_tangent
-        if x < low_x - widest or x > high_x + widest or y < low_y - widest or y > high_y + widest:
+        widest = max(abs(z - low_z), abs(z - high_z)) * tangent
+        if x < camera.low_x_m - widest or x > camera.high_x_m + widest:
             continue
-        while measured < times_s.shape[0] and np.rint(times_s[measured] / row_s) <= row:
-            measured += 1
-        if measured > 0:
-            index = first_point_in_view(x, y, z, visibility_m[measured - 1], points, view_tangent)
-            if index >= 0:
-                return row, index
-    return -1, -1
+        if y < camera.low_y_m - widest or y > camera.high_y_m + widest:
+            continue
+        while (
+            camera.measured < visibility.shape[1]
+            and np.rint(visibility[0, camera.measured] / row_s) <= row
+        ):
+            camera.measured += 1
+        if camera.measured > 0:
+            visibility_m = visibility[1, camera.measured - 1]
+            camera.point = first_point_in_view(x, y, z, visibility_m, points, tangent)
+            if camera.point >= 0:
+                camera.next_row = row
+                return True
+    camera.next_row = last + 1
+    return False

@@ -45,7 +45,7 @@ def test_a_command_s_time_and_memory_are_measured(tmp_path):
     [
         ("interfaces.py", ("--windows", 1), "gym, another action after 1 steps"),
         ("chaos.py", ("--kills", 1, "--runs", 200), "the bytes are the same"),
-        ("kernel.py", (3, 1), "mission_over_kernel"),
+        ("kernel.py", (3, 1), "mission_over_flight"),
         ("stock_reasoner.py", (1,), "inference_s"),
         ("reasoning.py", ("--help",), "over the same random states"),
     ],

@@ -3,84 +3,77 @@ vehicle.
 """
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
-import simpy
+import numpy as np
 
+from suave_des.clock import MissionEnvironment
+from suave_des.compiling import Array
+from suave_des.managed.flight import Flight
 from suave_des.managed.node import SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Revision
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.prepared import vehicle_model
-from suave_des.vehicle import kernel
-from suave_des.vehicle.model import GRAVITY_M_PER_S2
-from suave_des.vehicle.vehicle import Vehicle, row_at
+from suave_des.vehicle.model import GRAVITY_M_PER_S2, Autopilot, Pose
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from suave_des.world.pipeline import Camera
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
+NOTHING_TO_SEE = Camera(), np.empty((0, 3)), np.empty((2, 0))
 
 
 class PlacedVehicle:
-    """A vehicle that is where the test puts it, and keeps its commands.
+    """A real vehicle in a flight, with a track that the test has written: it is where the test puts
+    it, or goes its way over time, whatever it is commanded; and its commands.
 
     With `obeys` it is at each set-point at once, `rise_m` above it.
     """
 
-    def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
-        self.control_listeners: list[Callable[[], None]] = []
-        self.duration_s, self.expected_changes_s, self.thrusters = (
-            1000.0,
-            dict[str, float](),
-            list[str](),
-        )
-        self._place, self.obeys = place, obeys
-        self.sends = False  # whether a way-point is being sent
-        self.rise_m, self.altitude_error_m = rise_m, 0.0
+    def __init__(
+        self,
+        place: Place | Callable[[float], Place] = START,
+        *,
+        path: Array = np.empty((0, 3)),  # noqa: B008 - which nothing changes
+        obeys: bool = False,
+        rise_m: float = 0.0,
+    ) -> None:
+        self.env = MissionEnvironment()
+        self.vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(*START, 0.0, 0.0, 0.0), 200.0)
+        self.vehicle.state.row = self.vehicle.last_row  # all is flown
+        self.vehicle._fly_to_control = lambda t_s: None  # and can be commanded all the same
+        camera, points, visibility = NOTHING_TO_SEE
+        self.flight = Flight(self.vehicle, camera, points, visibility, path)
+        self.flight.state.next_tick_s = float("inf")
+        self.env.fly_to = self.flight.fly_to
+        self.obeys, self.rise_m = obeys, rise_m
         self.commands: list[tuple[float, Place]] = []
+        self.put(place)
 
-    @property
-    def place(self) -> Place:
-        return self._place
+    def put(self, place: Place | Callable[[float], Place]) -> None:
+        """Put it elsewhere, or on another way, from now on."""
+        now = row_at(self.env.now)
+        for row in range(now, len(self.vehicle.track)):
+            self.vehicle.track[row, :3] = place(row * STEP_S) if callable(place) else place
 
-    @place.setter
-    def place(self, place: Place) -> None:
-        """Put it elsewhere: like a change of control, this invalidates what was looked ahead."""
-        self._place = place
-        if not self.sends:
-            self.cancel_waypoints(0.0)
+    def run(self, until_s: float) -> None:
+        """Let mission time pass, a step of the track at a time, and note each command."""
+        self._note()
+        for row in range(row_at(self.env.now) + 1, row_at(until_s) + 1):
+            self.env.advance(row * STEP_S)
+            self._note()
 
-    def position(self, t_s: float) -> Place:
-        return self.place
-
-    def queue_waypoints(self, t_s, courses, until_s, *, send):
-        """Look at the first way-point only: where a later set-point takes the vehicle cannot be
-        known beforehand.
-        """
-        ((check, waypoints, sent_as_m, (first, again, _), _),) = courses
-        if send:
-            self.sends = True
-            self.command(t_s, *(waypoints[0, :2] + sent_as_m[:2]).tolist(), sent_as_m[2])
-            self.sends = False
-        halves_m = check.half_width_m, check.half_width_m, check.half_height_m
-        for tick in range(first, again + 1):
-            errors_m = [
-                abs(a - b)
-                for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)
-            ]
-            if all(error_m <= half_m for error_m, half_m in zip(errors_m, halves_m, strict=True)):
-                return [[tick, 0, 1, tick + check.resend_ticks]], True
-        return [[again, 0, 0, again]], True
-
-    def cancel_waypoints(self, t_s: float) -> None:
-        """Tell the listeners, although no set-point is ever queued."""
-        for listener in self.control_listeners:
-            listener()
-
-    def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
-        self.commands.append((t_s, (x_m, y_m, z_m)))
+    def _note(self) -> None:
+        state = self.vehicle.state
+        if state.set_point_number == len(self.commands):
+            return
+        place = state.set_point_x_m, state.set_point_y_m, state.set_point_z_m
+        while len(self.commands) < state.set_point_number:  # in between there were others
+            self.commands.append((round(self.env.now, 6), place))
         if self.obeys:
-            self.place = (x_m, y_m, z_m + self.rise_m)
+            self.put((*place[:2], place[2] + self.rise_m))
 
     @property
     def commanded(self) -> list[Place]:
@@ -88,18 +81,12 @@ class PlacedVehicle:
 
     @property
     def times_s(self) -> list[float]:
-        return [round(t_s, 6) for t_s, _ in self.commands]
+        return [t_s for t_s, _ in self.commands]
 
-
-class MovingVehicle(PlacedVehicle):
-    """A vehicle that goes its way over time whatever it is commanded."""
-
-    def __init__(self, way: Callable[[float], Place]) -> None:
-        super().__init__()
-        self._way = way
-
-    def position(self, t_s: float) -> Place:
-        return self._way(t_s)
+    @property
+    def sender(self) -> SetPointSender:
+        """A connection to the autopilot without losses and frame errors."""
+        return SetPointSender(self.vehicle, self.env, stream=random.Random(0))
 
 
 @cache
@@ -108,11 +95,6 @@ def revision(name: str) -> Revision:
     return load_scenario(
         {"2023": "seams2023", "2025": "planta_exp1", "1.5": "release15"}[name]
     ).scenario.revision
-
-
-def sender(env: simpy.Environment, vehicle: PlacedVehicle) -> SetPointSender:
-    """A connection to the autopilot without losses and frame errors."""
-    return SetPointSender(vehicle, env, stream=random.Random(0))
 
 
 def spiral_at(altitude_m: float) -> Mode:
@@ -136,6 +118,16 @@ VIEW_TANGENT = VEHICLE.camera.tangent
 
 
 def nu(vehicle: Vehicle, t_s: float) -> tuple[float, ...]:
-    """The velocity nu at time t: body frame, six components in m/s and rad/s."""
+    """The velocity nu at time t, at which the vehicle is then: six components in m/s and rad/s."""
     vehicle.position(t_s)
-    return tuple(vehicle.track[row_at(t_s), kernel.VELOCITY].tolist())
+    state = vehicle.state
+    assert state.row == row_at(t_s)
+    linear = state.u_m_per_s, state.v_m_per_s, state.w_m_per_s
+    return *linear, state.p_rad_per_s, state.q_rad_per_s, state.r_rad_per_s
+
+
+def set_nu(vehicle: Vehicle, nu: Sequence[float]) -> None:
+    """Set the velocity nu."""
+    state = vehicle.state
+    state.u_m_per_s, state.v_m_per_s, state.w_m_per_s = nu[:3]
+    state.p_rad_per_s, state.q_rad_per_s, state.r_rad_per_s = nu[3:]

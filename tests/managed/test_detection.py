@@ -6,42 +6,45 @@ import math
 
 import numpy as np
 import pytest
-import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from suave_des.clock import MissionEnvironment
 from suave_des.managed.detection import PipelineDetector
+from suave_des.managed.flight import Flight
 from suave_des.scenario.models import Pipeline
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
-from suave_des.world.pipeline import first_point_in_view, sample_points
-from tests.helpers.stand_ins import BLUEROV2, VIEW_TANGENT, silent
+from suave_des.world.pipeline import Camera, first_point_in_view, sample_points
+from tests.helpers.stand_ins import BLUEROV2, VIEW_TANGENT
 
 POINTS = sample_points(Pipeline().vertices_m)
-BOUNDS_M = tuple(POINTS.min(axis=0).tolist()), tuple(POINTS.max(axis=0).tolist())
 DURATION_S = 120.0
+BESIDE = Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0)
 
 
 class Sight:
     """A vehicle that is sent to places at given times, and a detector."""
 
     def __init__(
-        self, commands: list, visibility_m: float = 3.0, readings: tuple[float, ...] = ()
+        self,
+        commands: list,
+        visibility_m: float = 3.0,
+        readings: tuple[float, ...] = (),
+        start: Pose = BESIDE,
     ) -> None:
-        self.env = simpy.Environment()
-        autopilot = Autopilot()
-        self.vehicle = Vehicle(
-            BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S
-        )
+        self.env = MissionEnvironment()
+        self.vehicle = Vehicle(BLUEROV2, Autopilot(), start, DURATION_S)
         self.visibility_m = visibility_m
         self.logged: list[tuple[float, str]] = []
         self.detector = PipelineDetector(
-            self.env,
-            self.vehicle,
-            (np.array([0.0]), np.array([visibility_m])),
-            *(POINTS, BOUNDS_M, VIEW_TANGENT),
-            lambda source, event, detail: self.logged.append((self.env.now, event)),
+            self.env, lambda source, event, detail: self.logged.append((self.env.now, event))
         )
+        camera = Camera(True, VIEW_TANGENT, *POINTS.min(axis=0), *POINTS.max(axis=0))
+        always = np.array([[0.0], [visibility_m]])
+        flight = Flight(self.vehicle, camera, POINTS, always, np.empty((0, 3)))
+        self.env.fly_to = flight.fly_to
+        flight.begin(self.detector, None, None)
         for t_s, place in commands:
             self.env.process(
                 self._at(t_s, lambda place=place: self.vehicle.command(self.env.now, *place))
@@ -64,7 +67,7 @@ TO_THE_PIPELINE = [(5.0, (-17.0, -4.0, -18.0))]
 def first_sight(sight: Sight) -> tuple[float, int]:
     """The same found by looking at every row of the finished track."""
     track = sight.vehicle.track
-    for row in range(sight.vehicle.computed_row + 1):
+    for row in range(sight.vehicle.state.row + 1):
         point = first_point_in_view(*track[row, :3], sight.visibility_m, POINTS, VIEW_TANGENT)
         if point >= 0:
             return row * STEP_S, point
@@ -78,22 +81,8 @@ def test_detection_is_the_first_row_of_the_way_with_a_point_in_view():
     assert sight.logged == [(detected_s, "pipeline_detected")]
 
 
-def test_no_row_is_looked_at_that_a_change_of_control_may_still_replace():
-    sight = Sight([])
-    checked = sight.vehicle.computed_row
-    sight.env.run(until=(checked + 0.49) * STEP_S)  # a command now would act from that row on
-    assert sight.vehicle.computed_row == checked
-    sight.env.run(until=(checked + 0.7) * STEP_S)
-    assert sight.vehicle.computed_row > checked
-
-
 def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once():
-    env = simpy.Environment()
-    vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
-    always_3_m = np.array([0.0]), np.array([3.0])
-    detector = PipelineDetector(env, vehicle, always_3_m, POINTS, BOUNDS_M, VIEW_TANGENT, silent)
-    env.run(until=1.0)
-    assert detector.detected_s == 0.0
+    assert Sight([], start=Pose(-17.0, 0.0, -18.0, 0, 0, 0)).run()[0] == 0.0
 
 
 def test_a_command_in_time_turns_the_vehicle_away_before_it_sees_anything():

@@ -12,7 +12,7 @@ from suave_des.managed.motion import MaintainMotion
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryMeasurements, Timing
 from suave_des.scenario.models import Battery
-from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, revision, sender
+from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, revision
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 
@@ -26,7 +26,7 @@ class Motion:
         self.published: list[Diagnostic] = []
         self.restored: list[tuple[float, int]] = []
         bus.subscribe(self.published.append)
-        thrusters = SimpleNamespace(recover=self.recover, vehicle=PlacedVehicle())
+        thrusters = SimpleNamespace(recover=self.recover)
         self.node = MaintainMotion(self.env, bus, revision(name).recovery, thrusters, lambda: 10.0)
 
     def recover(self, thruster: int) -> bool:
@@ -97,33 +97,34 @@ def test_a_second_recovery_can_follow_the_first(name):
     assert [t_s for t_s, thruster in motion.restored if thruster == 1] == [10.0, 30.0]
 
 
-def recharging() -> tuple[simpy.Environment, PlacedVehicle, GenerateRechargePath]:
-    env, vehicle = simpy.Environment(), PlacedVehicle()
+def recharging() -> tuple[PlacedVehicle, GenerateRechargePath]:
+    vehicle = PlacedVehicle()
     level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 1000.0)
-    node = GenerateRechargePath(env, sender(env, vehicle), Battery(), level, phase_s=0.5)
+    node = GenerateRechargePath(vehicle.env, vehicle.sender, Battery(), level, phase_s=0.5)
     node.apply(ACTIVE)
-    return env, vehicle, node
+    return vehicle, node
 
 
 def test_active_it_sends_the_vehicle_to_the_station():
-    env, vehicle, _ = recharging()
-    env.run(until=11.0)
-    assert vehicle.commands == [(t_s, (-3.0, -2.0, -18.75)) for t_s in (0.5, 5.5, 10.5)]
+    vehicle, _ = recharging()
+    vehicle.run(11.0)
+    assert vehicle.commanded == [(-3.0, -2.0, -18.75)] * 3
+    assert vehicle.times_s == pytest.approx([0.5, 5.5, 10.5], abs=0.051)
 
 
 def test_docking_is_checked_when_the_station_is_sent():
-    env, vehicle, node = recharging()
-    env.run(until=151.0)
-    vehicle.place = (-3.4, -1.6, -18.75)
-    env.run(until=155.4)
+    vehicle, node = recharging()
+    vehicle.run(151.0)
+    vehicle.put((-3.4, -1.6, -18.75))
+    vehicle.run(155.4)
     assert node.level.recharges == 0
-    env.run(until=156.0)
+    vehicle.run(156.0)
     assert (node.level.recharges, node.level.level(155.5), node.level.value(155.5)) == (1, 1.0, 1.0)
 
 
 def test_inactive_it_leaves_the_autopilot_to_others():
-    env, vehicle, node = recharging()
-    env.run(until=1.0)
+    vehicle, node = recharging()
+    vehicle.run(1.0)
     node.apply(INACTIVE)
-    env.run(until=100.0)
+    vehicle.run(100.0)
     assert len(vehicle.commanded) == 1

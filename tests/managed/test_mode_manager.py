@@ -5,6 +5,7 @@ autopilot.
 import itertools
 import random
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 import simpy
@@ -13,7 +14,7 @@ from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
-from tests.helpers.stand_ins import Place, PlacedVehicle, silent
+from tests.helpers.stand_ins import Place, silent
 
 SEARCH, FOLLOW = "f_generate_search_path", "f_follow_pipeline"
 TABLE = load_scenario("seams2023").modes
@@ -184,13 +185,13 @@ def sent(
     count: int, loss_probability: float, frame_error_m: Place = (0.0, 0.0, 0.0)
 ) -> list[Place]:
     """What arrives of so many set-points."""
-    vehicle = PlacedVehicle()
-    sender = SetPointSender(
-        vehicle, simpy.Environment(), frame_error_m, loss_probability, random.Random(1)
-    )
+    arrived: list[Place] = []
+    vehicle = SimpleNamespace(command=lambda t_s, *place: arrived.append(place))
+    chance = random.Random(1)
+    sender = SetPointSender(vehicle, simpy.Environment(), frame_error_m, loss_probability, chance)
     for n in range(count):
         sender.send(float(n), 0.0, -18.0)
-    return vehicle.commanded
+    return arrived
 
 
 def test_without_loss_every_set_point_arrives():

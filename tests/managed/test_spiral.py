@@ -3,7 +3,6 @@
 import math
 
 import pytest
-import simpy
 
 from suave_des.managed.search import GenerateSearchPath
 from tests.helpers.stand_ins import (
@@ -12,7 +11,6 @@ from tests.helpers.stand_ins import (
     VIEW_TANGENT,
     PlacedVehicle,
     revision,
-    sender,
     spiral_at,
 )
 
@@ -26,11 +24,11 @@ class Search:
     """A search node with its vehicle and clock; its ticks come at 0.25, 1.25, 2.25, ... s."""
 
     def __init__(self, name: str, vehicle: PlacedVehicle) -> None:
-        self.env = simpy.Environment()
-        self.vehicle = vehicle
+        self.env, self.vehicle = vehicle.env, vehicle
         self.node = GenerateSearchPath(
             self.env,
-            sender(self.env, vehicle),
+            vehicle.sender,
+            vehicle.flight,
             revision(name).spiral,
             ORIGIN,
             VIEW_TANGENT,
@@ -39,7 +37,7 @@ class Search:
 
     def ticks(self, count: int) -> None:
         """Let a number of ticks pass."""
-        self.env.run(until=self.env.now + count)
+        self.vehicle.run(self.env.now + count)
 
     @property
     def last(self) -> tuple[float, float, float]:
@@ -84,10 +82,9 @@ def test_the_first_set_point_comes_some_time_after_the_first_activation_and_late
     assert len(search.vehicle.commanded) == 1
     search.node.apply(INACTIVE)
     search.ticks(10)
-    search.vehicle.commands.clear()
     search.node.apply(spiral_at(1.0))
     search.ticks(1)
-    assert len(search.vehicle.commanded) == 1
+    assert len(search.vehicle.commanded) == 2
 
 
 @BOTH
@@ -133,7 +130,7 @@ def test_reached_means_within_0_4_m_in_x_y_and_z(name, error_m, goes_on):
     search = searching(name)
     search.ticks(1)
     x, y, z = search.last
-    search.vehicle.place = (x + error_m[0], y + error_m[1], z + error_m[2])
+    search.vehicle.put((x + error_m[0], y + error_m[1], z + error_m[2]))
     search.ticks(1)
     assert (len(search.vehicle.commanded) == 2) is goes_on
 
@@ -142,7 +139,7 @@ def test_reached_means_within_0_4_m_in_x_y_and_z(name, error_m, goes_on):
 def test_a_set_point_not_reached_is_sent_again_at_ticks_12_and_23(name):
     search = searching(name)
     search.ticks(1)
-    search.vehicle.place = (0.0, 0.0, -19.0)
+    search.vehicle.put((0.0, 0.0, -19.0))
     search.ticks(30)
     assert search.vehicle.commands[1:] == [(12.25, search.last), (23.25, search.last)]
 
@@ -169,7 +166,7 @@ def test_offset_after_a_new_activation(name, z_m):
     search = searching(name, obeys=True, rise_m=0.5 if name == "2023" else 0.45)
     search.ticks(13)
     search.node.apply(INACTIVE)
-    search.vehicle.place = (*search.last[:2], -19.0)
+    search.vehicle.put((*search.last[:2], -19.0))
     search.node.apply(spiral_at(1.0))
     search.ticks(1)
     assert search.last[2] == pytest.approx(z_m)
@@ -204,7 +201,7 @@ def test_activated_again_revision_2023_goes_on_with_its_spiral_and_15_starts_afr
     search.node.apply(INACTIVE)
     search.ticks(5)
     if origin != ORIGIN:
-        search.vehicle.place = (*origin, -19.0)
+        search.vehicle.put((*origin, -19.0))
     search.node.apply(spiral_at(1.0))
     search.ticks(1)
     assert search.spiral(origin)[-1] == point(reached, reached)

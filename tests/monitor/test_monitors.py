@@ -25,7 +25,6 @@ from suave_des.monitor.thrusters import Thrusters, thruster_monitor
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Monitor, ThrusterEvent, ThrusterFailureRevision
 from suave_des.world.signals import constant, sinusoid, step
-from tests.helpers.stand_ins import PlacedVehicle
 
 VISIBILITY = sinusoid(80.0, 1.25, 3.75)
 
@@ -272,10 +271,8 @@ def publish_events(
 ) -> list:
     """Run a schedule to its end; the events, with the times at which they happened."""
     happened: list[tuple[float, ThrusterEvent]] = []
-    env, vehicle = subscriber.env, PlacedVehicle()
-    thrusters = SimpleNamespace(
-        env=env, vehicle=vehicle, apply=lambda event: happened.append((env.now, event))
-    )
+    env = subscriber.env
+    thrusters = SimpleNamespace(env=env, apply=lambda event: happened.append((env.now, event)))
     env.process(
         thruster_monitor(thrusters, subscriber.bus, schedule, Timing(1.0, phase_s), after_previous)
     )

@@ -1,4 +1,6 @@
-"""Missions that look ahead and leave calls out are the plain ones: see `tests.helpers.polling`."""
+"""Missions that fly from event to event and leave calls out are the plain ones: see
+`tests.helpers.polling`.
+"""
 
 from functools import cache
 
@@ -15,16 +17,11 @@ MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
 
 
 class Restless(RandomManager):
-    """Picks modes of both functions at all times: often both send set-points; and is wrong about
-    its latency.
-    """
+    """Picks modes of both functions at all times: often both send set-points."""
 
     def __init__(self, system):
         super().__init__(system)
-        self._functions, self.least_latency_s = (
-            ("f_generate_search_path", "f_follow_pipeline"),
-            20.0,
-        )
+        self._functions = ("f_generate_search_path", "f_follow_pipeline")
 
     task_requested = task_cancelled = diagnostic = lambda self, _: None
 
@@ -119,7 +116,7 @@ def assert_same(simulator: Simulator, manager: str | type[RandomManager], run: i
 @pytest.mark.parametrize(
     ("name", "condition", "manager"), each_pair(sorted(LOADED), CONDITIONS, MANAGERS)
 )
-def test_looking_ahead_changes_nothing(name, condition, manager):
+def test_missions_are_those_in_which_all_is_polled(name, condition, manager):
     """Each cell has a run of its own, so that there are as many different missions."""
     run = 1 + 10 * list(CONDITIONS).index(condition) + MANAGERS.index(manager)
     assert_same(simulator(name, condition), manager, run)
@@ -138,7 +135,7 @@ def test_looking_ahead_changes_nothing(name, condition, manager):
     slower=st.floats(0.0, 1.0),
 )
 @settings(max_examples=12)
-def test_looking_ahead_changes_nothing_whatever_the_scenario(
+def test_missions_are_those_in_which_all_is_polled_whatever_the_scenario(
     name, manager, run, loss, period_s, latency_s, failures_s, poll_s, error_m, slower
 ):
     values = {
@@ -162,9 +159,7 @@ def test_set_points_may_be_sent_more_often_than_there_are_way_points_left():
     "values", [CONDITIONS["all of it"], IN_STEP, MOVED], ids=["all of it", "in step", "moved"]
 )
 @pytest.mark.parametrize("name", sorted(LOADED))
-def test_two_functions_that_fly_the_vehicle_at_once_do_not_disturb_each_others_looking_ahead(
-    name, values
-):
+def test_two_functions_that_fly_the_vehicle_in_turn_send_as_if_polled(name, values):
     restless = Simulator(with_values(LOADED[name], values))
     for run in range(1, 21):
         assert_same(restless, Restless, run)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.managed.follow import InspectionPath
+from suave_des.managed.follow import there_and_back
 from suave_des.managing.bt import BehaviourTree
 from suave_des.metrics.result import MissionResult, TrajectoryPoint
 from suave_des.simulation.mission import Mission
@@ -110,7 +110,7 @@ def test_distance_of_an_undisturbed_inspection_is_the_way_along_some_of_the_path
     metrics = simulator(scenario, **NO_ERRORS).run(manager, 1, 1).metrics
     points = simulator(scenario).points
     first = int(np.argmin(np.abs(points[:, 0] - metrics.detection_x_m)))
-    path = InspectionPath.there_and_back(points, 1.25).points_m[first:, :2].tolist()
+    path = there_and_back(points)[first:, :2].tolist()
     ways_m = np.cumsum([math.dist(here, there) for here, there in pairwise(path)])
     assert np.min(np.abs(ways_m - metrics.distance_inspected_m)) < 1e-9
 

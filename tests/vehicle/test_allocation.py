@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.vehicle import kernel
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
-from tests.helpers.stand_ins import BLUEROV2, NET_BUOYANCY_N
+from tests.helpers.stand_ins import BLUEROV2, NET_BUOYANCY_N, nu, set_nu
 
 B = BLUEROV2.wrenches
 S = np.sqrt(0.5)
@@ -44,9 +43,8 @@ def test_healthy_thrusters_give_any_demand_but_pitch(demand):
 
 def first_wrench(vehicle: Vehicle) -> np.ndarray:
     """What pushed the vehicle in its first step from rest: M nu' (no drag at rest)."""
-    vehicle.look_ahead(1)
     inertia = np.array([BLUEROV2.mass_kg] * 3 + list(BLUEROV2.inertia_kg_m2))
-    return inertia * vehicle.track[1, kernel.VELOCITY] / STEP_S
+    return inertia * nu(vehicle, STEP_S) / STEP_S
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3, 4, 5, 6])
@@ -62,14 +60,11 @@ def test_autopilot_commands_a_lost_thruster_as_if_it_worked(make_vehicle, lost):
 
 def test_thrust_is_limited(make_vehicle):
     vehicle = make_vehicle()
-    vehicle.track[0, kernel.VELOCITY][
-        SURGE
-    ] = -40.0  # the velocity loop asks for far more than there is
+    set_nu(vehicle, (-40.0, 0, 0, 0, 0, 0))  # the velocity loop asks for far more than there is
     vehicle.command(0.0, 10.0, 0.0, -18.0)
-    vehicle.look_ahead(1)
     drag_alone = -40.0 / (1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg)
     push = 4.0 * S * BLUEROV2.thrust_limit_n / BLUEROV2.mass_kg * STEP_S
     with_push = (-40.0 + push) / (
         1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg
     )
-    assert drag_alone < vehicle.track[1, kernel.VELOCITY][SURGE] == pytest.approx(with_push)
+    assert drag_alone < nu(vehicle, STEP_S)[SURGE] == pytest.approx(with_push)

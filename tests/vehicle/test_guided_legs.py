@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.vehicle import kernel
 from suave_des.vehicle.model import Autopilot, Pose, euler_angles, quaternion
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 from tests.helpers.stand_ins import BLUEROV2, nu
@@ -24,7 +23,8 @@ TO_HALF_A_METRE = (0.5, 0.0, -18.0)
 
 def leg_start(vehicle: Vehicle, t_s: float) -> tuple[float, float, float]:
     vehicle.position(t_s)
-    return tuple(vehicle.track[row_at(t_s), kernel.LEG_START].tolist())
+    state = vehicle.state
+    return state.leg_start_x_m, state.leg_start_y_m, state.leg_start_z_m
 
 
 @pytest.mark.parametrize(("distance_m", "time_s"), [(0.1, 1.474), (0.3, 2.125), (0.5, 2.520)])
@@ -38,9 +38,7 @@ def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over
     vehicle.command(0.0, distance_m, 0.0, -18.0)
     assert vehicle.position(time_s / 2)[0] == pytest.approx(distance_m / 2, rel=0.2)
     assert vehicle.position(time_s + 1.0)[0] == pytest.approx(distance_m, rel=0.06)
-    assert 4.0 * vehicle.track[row_at(time_s), kernel.LEG_QUARTER] == pytest.approx(
-        time_s, abs=1e-3
-    )
+    assert 4.0 * vehicle.state.leg_quarter_s == pytest.approx(time_s, abs=1e-3)
 
 
 def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point():
@@ -49,7 +47,7 @@ def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point():
     """
     vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
     vehicle.command(0.0, *TO_HALF_A_METRE)
-    vehicle.look_ahead(row_at(5.0))
+    vehicle.fly_to_row(row_at(5.0))
     way_m = vehicle.track[: row_at(5.0), 0]
     speed_m_per_s = np.diff(way_m) / STEP_S
     assert np.abs(np.diff(speed_m_per_s)).max() < 0.06  # no more than an acceleration of 1.2 m/s^2
@@ -71,11 +69,11 @@ def test_an_interrupted_leg_starts_anew_from_the_stopping_point():
 def test_an_interrupted_leg_loses_the_integral():
     vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0, current_m_per_s=(-0.3, 0.0, 0.0))
     vehicle.command(0.0, 3.0, 0.0, -18.0)
-    vehicle.position(2.5)
-    assert vehicle.track[row_at(2.0), kernel.VELOCITY_INTEGRAL][0] > 0.1
+    vehicle.position(2.0)
+    assert vehicle.state.integral_x_m_per_s2 > 0.1
     vehicle.command(2.0, 3.0, 1.0, -18.0)
-    vehicle.position(2.5)
-    assert abs(vehicle.track[row_at(2.0) + 1, kernel.VELOCITY_INTEGRAL][0]) < 0.05
+    vehicle.position(2.0 + STEP_S)
+    assert abs(vehicle.state.integral_x_m_per_s2) < 0.05
 
 
 def test_sending_the_set_point_of_a_completed_leg_again_changes_nothing_of_its_motion():
@@ -90,12 +88,23 @@ def test_a_new_leg_is_the_same_in_whatever_pieces_the_track_is_filled():
     at_once, in_pieces = (Vehicle(BLUEROV2, Autopilot(), START, 20.0) for _ in range(2))
     for vehicle in (at_once, in_pieces):
         vehicle.command(0.0, *TO_HALF_A_METRE)
-    for n in range(40):
+    for n in range(10):
         in_pieces.position(0.1 * n)
     for vehicle in (at_once, in_pieces):
         vehicle.command(1.0, 0.6, 0.2, -17.0)
-        vehicle.look_ahead(row_at(15.0))
+    for n in range(10, 151):
+        in_pieces.position(0.1 * n)
+    at_once.fly_to_row(row_at(15.0))
     assert np.array_equal(at_once.track[: row_at(15.0)], in_pieces.track[: row_at(15.0)])
+
+
+def test_control_of_what_is_already_flown_is_refused():
+    vehicle = Vehicle(BLUEROV2, Autopilot(), START, 20.0)
+    vehicle.position(5.0)
+    with pytest.raises(ValueError, match="flown up to 5 s"):
+        vehicle.command(4.9, *TO_HALF_A_METRE)
+    with pytest.raises(ValueError, match="flown up to 5 s"):
+        vehicle.set_thruster(4.9, 1, "dead")
 
 
 DURATION_S = 40.0
@@ -116,7 +125,7 @@ def carry_out(vehicle: Vehicle, plan: list[tuple], readings: list[float]) -> np.
             vehicle.command(t_s, *entry[1])
         else:
             vehicle.set_thruster(*entry)
-    vehicle.look_ahead(vehicle.last_row)
+    vehicle.fly_to_row(vehicle.last_row)
     return vehicle.track
 
 
@@ -124,26 +133,6 @@ def carry_out(vehicle: Vehicle, plan: list[tuple], readings: list[float]) -> np.
 def test_reading_at_any_times_changes_no_bit(make_vehicle, plan, readings):
     unread = carry_out(make_vehicle(duration_s=DURATION_S), plan, [])
     assert np.array_equal(unread, carry_out(make_vehicle(duration_s=DURATION_S), plan, readings))
-
-
-@given(st.lists(commands | faults, max_size=5), st.integers(0, 800))
-def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan, ahead):
-    foresighted = make_vehicle(duration_s=DURATION_S)
-    foresighted.track_listeners.append(
-        lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row))
-    )
-    assert np.array_equal(
-        carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, [])
-    )
-
-
-def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle):
-    vehicle, rows = make_vehicle(), []
-    vehicle.track_listeners.append(rows.append)
-    vehicle.set_thruster(1.0, 2, "works")
-    vehicle.set_thruster(2.0, 2, "frozen")
-    vehicle.set_thruster(3.0, 2, "frozen")
-    assert rows == [row_at(2.0)]
 
 
 @given(st.integers(0, 10_000), st.floats(-0.49, 0.49))

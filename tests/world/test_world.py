@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from suave_des.compiling import shared
 from suave_des.scenario.models import Pipeline
-from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points
+from suave_des.world.pipeline import Camera, first_detection, first_point_in_view, sample_points
 from suave_des.world.signals import sinusoid, step, table
 
 POINTS = sample_points(Pipeline().vertices_m)
-BOUNDS = tuple(POINTS.min(axis=0).tolist()), tuple(POINTS.max(axis=0).tolist())
 HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
 
 
@@ -74,31 +74,28 @@ def line_of_positions(y_m: float) -> np.ndarray:
     return np.column_stack([x, np.full_like(x, y_m), np.full_like(x, -18.0)])
 
 
+def detected(track: np.ndarray, times_s: list[float], visibility_m: list[float]) -> tuple[int, int]:
+    """The first row with a point in view, and the point."""
+    camera = Camera(True, HALF_WIDTH_AT_1_M, *POINTS.min(axis=0), *POINTS.max(axis=0))
+    cameras = shared((Camera * 1)(camera))
+    visibility = np.array([times_s, visibility_m])
+    last = len(track) - 1
+    assert first_detection(cameras[0], track, last, 1.0, visibility, POINTS)
+    return int(cameras["next_row"][0]), int(cameras["point"][0])
+
+
 def test_first_detection_is_the_first_row_with_a_point_in_view():
     track = line_of_positions(0.5)
-    visibility = np.array([0.0]), np.array([3.0])
     expected = next(
         (row, point)
         for row, position in enumerate(track)
         if (point := first_point_in_view(*position, 3.0, POINTS, HALF_WIDTH_AT_1_M)) >= 0
     )
-    assert (
-        first_detection(
-            track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M
-        )
-        == expected
-    )
+    assert detected(track, [0.0], [3.0]) == expected
 
 
 def test_first_detection_waits_for_the_visibility():
-    track = line_of_positions(0.0)
-    visibility = np.array([3.0, 250.0]), np.array([1.0, 2.5])
-    assert (
-        first_detection(
-            track, (0, len(track) - 1), 1.0, visibility, POINTS, BOUNDS, HALF_WIDTH_AT_1_M
-        )[0]
-        == 250
-    )
+    assert detected(line_of_positions(0.0), [3.0, 250.0], [1.0, 2.5])[0] == 250
 
 
 PAPER = sinusoid(80.0, 1.25, 3.75)

@@ -1,0 +1,160 @@
+"""When a manager's `adapt` is called, and how a call goes on that takes mission time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf
+
+import simpy
+
+from suave_des.clock import Alarm, summed_tick
+from suave_des.errors import SuaveDesError
+from suave_des.managing.base import AdaptationProcess
+from suave_des.monitor.measurements import Measurements, Thresholds
+
+RAISED = (Exception, SystemExit)
+"""Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an
+error.
+"""
+_MAX_YIELDS_AT_ONE_TIME = 10_000
+"""How often `adapt` may yield while mission time stands still."""
+
+
+class CallTimes:
+    """Calls a manager at its times: once a period, or, if it is event-triggered, only at those at
+    which something may be different.
+
+    After a call that changed nothing, an event-triggered manager sleeps. It wakes when its state
+    changes, and at the first of its times at which the measured values are in regions (between
+    which thresholds each of them is) in which it has not been called since the last change.
+
+    Args:
+        call: the call.
+        period_s, first_s: the manager's times.
+        depends_on: the measurements that an event-triggered manager depends on, with its
+            thresholds; None: it is called at each of its times.
+    """
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        call: Callable[[], None],
+        period_s: float,
+        first_s: float,
+        depends_on: Sequence[tuple[Measurements, Thresholds]] | None,
+    ) -> None:
+        self._env, self.period_s, self._depends_on = env, period_s, depends_on
+        self._next_s = first_s  # the first of its times after the last call
+        self._sleeps = False
+        self._known: set[tuple[int, ...]] = set()  # regions in which a call has changed nothing
+        self._alarm = Alarm(env, call)
+        self._alarm.set(first_s)
+
+    def wake(self) -> None:
+        """Note that the manager's state has changed; if it sleeps, it is called at its next time."""
+        self._known.clear()
+        if self._sleeps:
+            self._sleeps = False
+            self._alarm.set(summed_tick(self._env.now, self._next_s, self.period_s))
+
+    def go_on(self, *, changed: bool, may_sleep: bool) -> None:
+        """Plan the next call when one is over.
+
+        Args:
+            changed: whether the call has changed anything.
+            may_sleep: whether another one right now would change nothing.
+        """
+        now_s = self._env.now
+        while self._next_s <= now_s:
+            self._next_s += self.period_s
+        if changed:
+            self._known.clear()
+        if self._depends_on is not None and may_sleep and now_s >= self.period_s:
+            self._sleep(self._depends_on, now_s)
+        else:
+            self._alarm.set(self._next_s)
+
+    def _sleep(self, depends_on: Sequence[tuple[Measurements, Thresholds]], now_s: float) -> None:
+        self._sleeps, earliest_s = True, self._next_s
+        regions, until_s = _regions_at(depends_on, now_s)
+        self._known.add(regions)
+        while regions in self._known:
+            if until_s == inf:
+                return
+            call_s = summed_tick(until_s, earliest_s, self.period_s)
+            earliest_s = call_s + self.period_s
+            regions, until_s = _regions_at(depends_on, call_s)
+        self._alarm.set(call_s, exactly=True)
+
+    def close(self) -> None:
+        """Call no more."""
+        self._alarm.cancel()
+        del self._alarm
+
+
+def _regions_at(
+    depends_on: Sequence[tuple[Measurements, Thresholds]], t_s: float
+) -> tuple[tuple[int, ...], float]:
+    """Find the regions of measured values at mission time t, and until when they stay the same."""
+    regions, until_s = [], inf
+    for measured, thresholds in depends_on:
+        region, ends_s = measured.region_until(t_s, thresholds)
+        regions.append(region)
+        until_s = min(until_s, ends_s)
+    return tuple(regions), until_s
+
+
+class Adaptation:
+    """A call of `adapt` that takes mission time: it goes on at each event that it yields.
+
+    A SimPy process would do the same with two events more.
+
+    Args:
+        steps: what `adapt` returned.
+        over: called with its result.
+        error_of: makes the error that ends the mission from one that `adapt` raised.
+    """
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        steps: AdaptationProcess,
+        over: Callable[[object], None],
+        error_of: Callable[[BaseException], SuaveDesError],
+    ) -> None:
+        self._env, self._steps, self._over, self._error_of = env, steps, over, error_of
+        self._yields, self._since_s = 0, env.now
+
+    def resume(self, event: simpy.Event | None = None) -> None:
+        """Go on after an event has happened, or begin."""
+        while event is None or event.callbacks is None:  # it need not be waited for
+            try:
+                event = self._next(event)
+            except StopIteration as end:
+                self._over(end.value)
+                return
+            except RAISED as error:
+                raise self._error_of(error) from error
+        event.callbacks.append(self.resume)
+
+    def _next(self, event: simpy.Event | None) -> simpy.Event:
+        if self._env.now > self._since_s:
+            self._yields, self._since_s = 0, self._env.now
+        self._yields += 1
+        if self._yields > _MAX_YIELDS_AT_ONE_TIME:
+            raise RuntimeError(
+                f"adapt yielded {_MAX_YIELDS_AT_ONE_TIME} events, and no mission time passed"
+            )
+        if event is None:
+            found = next(self._steps)
+        elif event.ok:
+            found = self._steps.send(event.value)
+        else:  # which `adapt` may handle
+            event.defused = True
+            assert isinstance(event.value, BaseException)
+            found = self._steps.throw(event.value)
+        if not isinstance(found, simpy.Event):
+            raise TypeError(
+                f"adapt yielded {found!r}; it may yield events, such as system.env.timeout(1.0)"
+            )
+        return found
