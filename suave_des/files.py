@@ -118,14 +118,28 @@ def check_own(paths: Iterable[Path]) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file that the user named; raises as `opened`, and if it is not JSON."""
-    content = decode(path, read_bytes(path))
+    """Read a JSON file that the user named; raises as `opened`, and as parse_json does."""
+    return parse_json(decode(path, read_bytes(path)), path)
+
+
+def parse_json(text: str, path: Path, place: str | None = None) -> Any:
+    """Return what a JSON text stands for, which is from a file or a place in it.
+
+    Raises:
+        InputError: it is not JSON, or has a number that is not finite.
+    """
     try:
-        return json.loads(content)
+        return json.loads(text, parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         raise InputError(
-            f"is not JSON: {error}", file=path, remedy="restore it, or make it anew"
+            f"is not JSON: {error}", file=path, place=place, remedy="restore it, or make it anew"
         ) from None
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"{text} is not a finite number")
+    return number
 
 
 def decode(path: Path, content: bytes) -> str:

@@ -63,11 +63,7 @@ class CampaignResult:
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
-        return (
-            *COLUMNS,
-            *self.campaign.variation.columns,
-            *self.campaign.loaded.scenario.further_columns,
-        )
+        return self.campaign.columns
 
     def _kept(self) -> Iterator[tuple[MissionKey, Row]]:
         for key, outcome in self.outcomes():
