@@ -31,9 +31,8 @@ from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
     RecordedMission,
-    read_knowledge,
     read_missions,
-    read_scenario,
+    read_states,
 )
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml, validated
@@ -414,8 +413,7 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
     for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
         if (each / KNOWLEDGE_FILE).is_file():
             is_any_found = True
-            scenario = read_scenario(each)
-            yield each, RecordedMission("", 0, 0, scenario, read_knowledge(each / KNOWLEDGE_FILE))
+            yield each, RecordedMission("", 0, 0, *read_states(each))
         if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
             is_any_found = True
             yield from (

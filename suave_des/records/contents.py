@@ -100,6 +100,7 @@ class MissionFile(Recorded):
     scenario: Scenario
     inputs_sha256: dict[FileName, str] = {}
     search_altitudes_m: dict[str, Number] = {}
+    files_sha256: dict[FileName, str] = {}
 
 
 # Knowledge

@@ -24,7 +24,19 @@ from pydantic import BaseModel, ValidationError
 
 import suave_des
 from suave_des.errors import InputError, line_error, number_of, shown
-from suave_des.files import LIMIT_BYTES, csv_text, json_text, opened, parse_json, read_csv
+from suave_des.files import (
+    FAMILIES,
+    LIMIT_BYTES,
+    LISTED,
+    Content,
+    Listing,
+    csv_text,
+    json_text,
+    opened,
+    parse_json,
+    read_csv,
+    sha256_of,
+)
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import Event, KnowledgeRecord, MissionResult, TrajectoryPoint
 from suave_des.records import contents
@@ -125,9 +137,9 @@ def provenance(
 
 def mission_files(
     result: MissionResult, loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
-) -> dict[str, str]:
-    """Return the content of each file of a mission's folder by its name; `inputs` and `command` as
-    of provenance.
+) -> dict[str, Content | Listing]:
+    """Return the content of each file of a mission's folder by its name, mission.json as a listing
+    of the others; `inputs` and `command` as of provenance.
     """
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
     points = (
@@ -140,8 +152,8 @@ def mission_files(
         "search_altitudes_m": loaded.modes.search_altitudes_m,
         **provenance(loaded, inputs, command),
     }
-    files = {
-        MISSION_FILE: json_text(mission),
+    files: dict[str, Content | Listing] = {
+        MISSION_FILE: lambda hashes: json_text({**mission, LISTED: dict(hashes)}),
         EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
         TRAJECTORY_FILE: csv_text((*TRAJECTORY_COLUMNS, *further), points),
     }
@@ -180,14 +192,30 @@ def read_mission(folder: Path) -> MissionRecord:
     trajectory = trajectory.assign(**{name: 0.0 for name in _ANGLES if name not in trajectory})
     states = folder / KNOWLEDGE_FILE
     knowledge = read_knowledge(states) if states.is_file() else ()
+    _check_listed(folder, mission)
     metrics = mission.metrics.model_dump(exclude_unset=True)
     others = knowledge, mission.inputs_sha256, mission.search_altitudes_m
     return MissionRecord(metrics, mission.scenario, events, trajectory, *others)
 
 
-def read_scenario(folder: Path) -> Scenario:
-    """Read the scenario of a mission's folder; raises as read_mission does."""
-    return contents.read(contents.MissionFile, folder / MISSION_FILE, _REMEDY).scenario
+def read_states(folder: Path) -> tuple[Scenario, tuple[KnowledgeRecord, ...]]:
+    """Read the scenario of a mission's folder, and its states of knowledge; raises as read_mission
+    does.
+    """
+    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _REMEDY)
+    states = read_knowledge(folder / KNOWLEDGE_FILE)
+    _check_listed(folder, mission)
+    return mission.scenario, states
+
+
+def _check_listed(folder: Path, mission: contents.MissionFile) -> None:
+    """Check that the files are those of the mission, not of an earlier one, as a kill leaves."""
+    for name, digest in mission.files_sha256.items():
+        if name in FAMILIES["mission"] and sha256_of(folder / name) != digest:
+            problem = (
+                f"is not as {MISSION_FILE} beside it says: it was changed, or is of another mission"
+            )
+            raise InputError(problem, file=folder / name, remedy="run the mission again")
 
 
 def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:

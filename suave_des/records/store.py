@@ -12,7 +12,7 @@ import json
 import sqlite3
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,9 +20,15 @@ from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.files import (
+    DERIVED,
+    LISTED,
+    Content,
+    Listing,
     check_own,
     csv_pieces,
+    json_text,
     make_output_folder,
+    own_files,
     remove_results,
     write_files,
 )
@@ -95,7 +101,6 @@ class MissionFailure(NamedTuple):
 
 
 Outcome = tuple[MissionKey, Row | MissionFailure]
-Content = str | bytes | Iterable[str]
 
 
 class StoreError(SuaveDesError):
@@ -466,10 +471,13 @@ def _crc(*parts: object) -> int:
 
 
 def write_campaign(
-    folder: Path, files: Mapping[str, Content], suave: Mapping[str, Content]
+    folder: Path,
+    about: Mapping[str, Any],
+    files: Mapping[str, Content],
+    suave: Mapping[str, Content],
 ) -> None:
-    """Write a campaign's files, of those in FILES, into its folder, replacing those of an earlier
-    campaign.
+    """Write a campaign's manifest, which lists all others, and its files, of those in FILES, into
+    its folder, replacing those of an earlier campaign.
 
     The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a
     folder, or compare one file with the others, find what they expect.
@@ -477,14 +485,29 @@ def write_campaign(
     Raises:
         InputError: they cannot be written; nothing half-written stays.
     """
-    write_files(folder, files, stale=FILES)
+    before = own_files(folder, MANIFEST_FILE)
+    derived = {name: digest for name, digest in before.items() if name in DERIVED}
     inner = folder / SUAVE_FOLDER
     if suave:
         make_output_folder(inner)
-    if inner.is_dir():
-        write_files(inner, suave, stale=[path.name for path in inner.glob("*.csv")])
+
+    def manifest(hashes: Mapping[str, str]) -> str:
+        return json_text({**about, LISTED: {**derived, **hashes}})
+
+    all_files: dict[str, Content | Listing] = {
+        **files,
+        **{f"{SUAVE_FOLDER}/{name}": content for name, content in suave.items()},
+        MANIFEST_FILE: manifest,
+    }
+    write_files(folder, all_files, stale=before.keys() - derived.keys())
+    _leave_empty(folder, before)
+
+
+def _leave_empty(folder: Path, removed: Collection[str]) -> None:
+    """Remove the folder of the exemplar's files if only its files that were removed were in it."""
+    if any(name.startswith(f"{SUAVE_FOLDER}/") for name in removed):
         with suppress(OSError):  # something is in it
-            inner.rmdir()
+            (folder / SUAVE_FOLDER).rmdir()
 
 
 def tidy(folder: Path, *, is_new: bool) -> None:
@@ -498,7 +521,11 @@ def tidy(folder: Path, *, is_new: bool) -> None:
         raise InputError(
             "is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it"
         )
-    remove_results(folder, FILES, parts_only=not is_new)
+    own = own_files(folder, MANIFEST_FILE) if is_new else {}
+    if own:
+        own[MANIFEST_FILE] = ""
+    remove_results(folder, FILES, own)
+    _leave_empty(folder, own)
 
 
 def is_left_over(name: str) -> bool:
