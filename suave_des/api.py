@@ -15,9 +15,9 @@ from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.progress import OnProgress, is_live, shown
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range
-from suave_des.files import check_output_folder, make_output_folder, write_files
+from suave_des.files import check_output_folder, make_output_folder, own_files, write_files
 from suave_des.metrics.result import MissionResult
-from suave_des.records.mission_folder import KNOWLEDGE_FILE, mission_files, record_of
+from suave_des.records.mission_folder import MISSION_FILE, mission_files, record_of
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 
@@ -106,7 +106,7 @@ def run_mission(
     if folder is not None:
         make_output_folder(folder)
         files = mission_files(result, loaded, inputs, command)
-        write_files(folder, files, stale=(KNOWLEDGE_FILE,))
+        write_files(folder, files, stale=own_files(folder, MISSION_FILE))
     return RecordedMission(
         **{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded
     )

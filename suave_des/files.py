@@ -5,6 +5,7 @@ at all.
 from __future__ import annotations
 
 import csv
+import errno
 import hashlib
 import io
 import json
@@ -49,8 +50,15 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
 misread.
 """
 
+LISTINGS = {"mission": "mission.json", "campaign": "manifest.json"}
+"""Names of the files that list the others, by kind."""
+
 DECIMALS = 6
 """Digits after the point in result files."""
+LISTED = "files_sha256"
+"""Key of a listing of files that the project has written, with their SHA-256, in hex."""
+Content = str | bytes | Iterable[str]
+Listing = Callable[[Mapping[str, str]], str]
 _Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None")
 
 
@@ -118,14 +126,28 @@ def check_own(paths: Iterable[Path]) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file that the user named; raises as `opened`, and if it is not JSON."""
-    content = decode(path, read_bytes(path))
+    """Read a JSON file that the user named; raises as `opened`, and as parse_json does."""
+    return parse_json(decode(path, read_bytes(path)), path)
+
+
+def parse_json(text: str, path: Path, place: str | None = None) -> Any:
+    """Return what a JSON text stands for, which is from a file or a place in it.
+
+    Raises:
+        InputError: it is not JSON, or has a number that is not finite.
+    """
     try:
-        return json.loads(content)
+        return json.loads(text, parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         raise InputError(
-            f"is not JSON: {error}", file=path, remedy="restore it, or make it anew"
+            f"is not JSON: {error}", file=path, place=place, remedy="restore it, or make it anew"
         ) from None
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"{text} is not a finite number")
+    return number
 
 
 def decode(path: Path, content: bytes) -> str:
@@ -247,6 +269,8 @@ def check_output_folder(
             raise InputError(
                 problem, file=folder, remedy="give another folder, or remove them first"
             )
+    if overwrite and is_there:
+        _check_replaced(folder, family, entries)
     may_be_written = os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK)
     not_empty = f"the output folder is not empty: it has {found}"
     _check(
@@ -270,6 +294,23 @@ def check_output_folder(
     )
 
 
+def _check_replaced(folder: Path, family: str, entries: Collection[str]) -> None:
+    """Check that all that would be replaced in a folder is the project's, and unchanged."""
+    listing = LISTINGS[family]
+    own = own_files(folder, listing)
+    about: Any = {LISTED: {}}
+    if listing in entries:
+        about = read_json(folder / listing)
+    problem = f"has {listing}, which suave-des did not write"
+    if isinstance(about, dict) and LISTED in about:
+        known = (*own, *DERIVED, listing, "campaign.sqlite")
+        others = [name for name in FAMILIES[family] if name in entries and name not in known]
+        if not others:
+            return
+        problem = f"has {others[0]}, which is not as suave-des wrote it"
+    raise InputError(problem, file=folder, remedy="move it, or give another folder")
+
+
 def check_output_file(file: Path, *, overwrite: bool) -> None:
     """Check that a file can be written, without changing anything.
 
@@ -279,19 +320,24 @@ def check_output_file(file: Path, *, overwrite: bool) -> None:
     """
     _check(
         file,
-        (not file.name or file.is_dir(), "is a folder", "name a file in it"),
+        (not file.name or os.path.isdir(file), "is a folder", "name a file in it"),  # noqa: PTH112
+        (_is_circle(file), "is a link in a circle", "remove it"),
+    )
+    final = file if _is_written_into(file) else file.resolve()
+    _check(
+        file,
         (
-            not file.parent.is_dir(),
-            f"there is no folder {file.parent} to write it in",
+            not final.parent.is_dir(),
+            f"there is no folder {final.parent} to write it in",
             "make it first",
         ),
         (
-            not os.access(file.parent, os.W_OK | os.X_OK),
+            final != file and not os.access(final.parent, os.W_OK | os.X_OK),
             "its folder cannot be written",
             "give one that is yours",
         ),
         (
-            file.exists() and not overwrite,
+            os.path.exists(file) and not overwrite,  # noqa: PTH110
             "exists already",
             "give another name, or --overwrite to replace it",
         ),
@@ -313,22 +359,34 @@ def make_output_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
 
 
-def remove_results(folder: Path, names: Collection[str], *, parts_only: bool = False) -> None:
-    """Remove the unfinished files of these names that a process left when it was killed; and all
-    files of a campaign.
+def own_files(folder: Path, listing: str) -> dict[str, str]:
+    """Return the SHA-256 of the files in a folder that are as the project has written them, by
+    their names: those that the listing, a JSON file in it, has under `files_sha256`, unchanged.
+    """
+    try:
+        listed = read_json(folder / listing)[LISTED]
+        return {
+            name: digest
+            for name, digest in listed.items()
+            if ".." not in Path(name).parts and sha256_of(folder / name) == digest
+        }
+    except (InputError, KeyError, TypeError, AttributeError, ValueError):
+        return {}  # it lists nothing
 
-    These are the ones named, and those made from them; they stay if `parts_only`.
+
+def remove_results(folder: Path, names: Collection[str], own: Collection[str] = ()) -> None:
+    """Remove the unfinished files of these names that a process left when it was killed, and the
+    project's own files.
 
     Raises:
         InputError: one cannot be removed.
     """
     with _user_errors(folder):
-        parts = (part for name in names for part in folder.glob(f".{name}.*{_PART}"))
-        for path in (
-            *parts,
-            *(() if parts_only else (folder / name for name in (*names, *DERIVED))),
-        ):
-            path.unlink(missing_ok=True)
+        for name in names:
+            for part in folder.glob(f".{name}.*{_PART}"):
+                part.unlink(missing_ok=True)
+        for name in own:
+            (folder / name).unlink(missing_ok=True)
 
 
 def _utf8(text: str) -> bytes:
@@ -339,36 +397,98 @@ def _utf8(text: str) -> bytes:
 
 
 def write_files(
-    folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()
+    folder: Path, files: Mapping[str, Content | Listing], *, stale: Collection[str] = ()
 ) -> None:
     """Write files under temporary names, and rename them when all are complete.
 
     Args:
         files: content by name, in an existing folder; text is written as UTF-8, pieces of it one
-            after the other.
+            after the other. A listing is made from the SHA-256 of all others by their names, and is
+            renamed first: what a kill leaves is then not as it says.
         stale: names of files of an earlier use of the folder, removed unless they are written anew.
 
     Raises:
-        InputError: the disk is full, or the folder cannot be written; nothing half-written stays.
+        InputError: the disk is full, the folder cannot be written, or a file of that name is no
+            regular one; nothing half-written stays.
     """
-    written = {folder / name: folder / f".{name}.{os.getpid()}{_PART}" for name in files}
+    finals = {name: folder / name for name in sorted(files, key=lambda name: callable(files[name]))}
+    parts = {
+        name: final.with_name(f".{final.name}.{os.getpid()}{_PART}")
+        for name, final in finals.items()
+    }
+    hashes = dict[str, str]()
     try:
         with _user_errors(folder):
-            for content, temporary in zip(files.values(), written.values(), strict=True):
-                temporary.unlink(missing_ok=True)
-                with temporary.open("xb") as file:  # x: a link of that name is not followed
-                    if isinstance(content, str | bytes):
-                        file.write(content if isinstance(content, bytes) else _utf8(content))
-                    else:
-                        file.writelines(map(_utf8, content))
-            for final, temporary in written.items():
-                temporary.replace(final)
+            for name, final in finals.items():
+                if final.exists() and not final.is_file():
+                    raise InputError("is not a regular file", file=final, remedy="remove it")
+                content = files[name]
+                written = content(hashes) if callable(content) else content
+                hashes[name] = _write(parts[name], written)
+            for name, final in reversed(finals.items()):
+                parts[name].replace(final)
             for name in set(stale) - set(files):
                 (folder / name).unlink(missing_ok=True)
     finally:
-        for temporary in written.values():
+        for part in parts.values():
             with suppress(OSError):  # what could not be written has been told of
-                temporary.unlink(missing_ok=True)
+                part.unlink(missing_ok=True)
+
+
+def _write(path: Path, content: Content) -> str:
+    """Write a new file, and return its SHA-256, in hex."""
+    total = hashlib.sha256()
+    path.unlink(missing_ok=True)
+    with path.open("xb") as file:  # x: a link of that name is not followed
+        for piece in [content] if isinstance(content, str | bytes) else content:
+            encoded = piece if isinstance(piece, bytes) else _utf8(piece)
+            total.update(encoded)
+            file.write(encoded)
+    return total.hexdigest()
+
+
+def write_file(file: Path, content: str | bytes) -> None:
+    """Write a file that the user named: links are followed, and what is no regular file, such as a
+    pipe or standard output, is written into; a regular file is replaced when all is written.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with _user_errors(file.parent):
+        if _is_written_into(file):
+            with file.open("ab") as stream:
+                stream.write(content if isinstance(content, bytes) else _utf8(content))
+            return
+        final = file.resolve()
+    write_files(final.parent, {final.name: content})
+
+
+def _is_circle(file: Path) -> bool:
+    try:
+        file.stat()
+    except OSError as error:
+        return error.errno == errno.ELOOP
+    return False
+
+
+def _is_written_into(file: Path) -> bool:
+    is_there = os.path.exists(file)  # noqa: PTH110 - Path.exists raises for a circle of links
+    return is_there and (not file.is_file() or Path("/dev") in file.absolute().parents)
+
+
+def write_beside(folder: Path, files: Mapping[str, str], listing: str) -> None:
+    """Write files that were made from a folder's results, and note them in its listing, if it has
+    one, so that they go when the results are replaced; raises as write_files does.
+    """
+    about = read_json(folder / listing) if (folder / listing).is_file() else None
+    if not isinstance(about, dict) or not isinstance(about.get(LISTED), dict):
+        write_files(folder, files)
+        return
+
+    def noted(hashes: Mapping[str, str]) -> str:
+        return json_text({**about, LISTED: {**about[LISTED], **hashes}})
+
+    write_files(folder, {**files, listing: noted})
 
 
 @contextmanager

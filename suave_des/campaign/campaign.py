@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -43,6 +44,8 @@ from suave_des.records.store import (
     StoreError,
     has_campaign,
     is_left_over,
+    read_note,
+    store_read,
     tidy,
 )
 from suave_des.registry import ManagerLike, name_of
@@ -185,18 +188,22 @@ def _stored(
         raise InputError(
             "there is no campaign in it", file=folder, remedy="give the --out folder of a campaign"
         )
-    with closing(Store(folder / STORE_FILE)) as store:
-        with store.reading():
-            stored = CampaignSpec.model_validate(store.about("request"))
-            request = CampaignSpec.read({**stored.stored(), **changed})
-            file = read_campaign_file(request.scenario)
-            campaign = inputs.read_campaign(request, file)
-        known = {*campaign.spec.managers, *campaign.code()}
-        if unknown := [name for name in named if name not in known]:
-            problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
-            remedy = f"{did_you_mean(unknown[0], sorted(known), 'its managers')}; {_MORE_MANAGERS}"
-            raise InputError(problem, file=folder, remedy=remedy)
-        inputs.check_trusted(campaign, named, folder, confirmed=confirmed)
+    path = folder / STORE_FILE
+    with store_read(path):
+        noted = read_note(path, "request")
+        stored = CampaignSpec.model_validate(noted)
+        request = CampaignSpec.read({**stored.stored(), **changed})
+        file = read_campaign_file(request.scenario)
+        campaign = inputs.read_campaign(request, file)
+    known = {*campaign.spec.managers, *campaign.code()}
+    if unknown := [name for name in named if name not in known]:
+        problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
+        remedy = f"{did_you_mean(unknown[0], sorted(known), 'its managers')}; {_MORE_MANAGERS}"
+        raise InputError(problem, file=folder, remedy=remedy)
+    inputs.check_trusted(campaign, named, folder, confirmed=confirmed)
+    with closing(Store(path)) as store:
+        if store.about("request") != noted:
+            raise InputError("changed while it was read", file=path, remedy="try it again")
         yield store, campaign
 
 
@@ -315,7 +322,8 @@ def _result(checked: _Checked, store: Store, remarks: Sequence[Remark]) -> Campa
     try:
         with store.reading():
             told = (*map(str, remarks), *inputs.trained_on(campaign))
-            result = gather(campaign, store.outcomes, told)
+            outcomes = partial(store.outcomes, campaign.problem_of)
+            result = gather(campaign, outcomes, told)
             if folder is not None:
                 of_file = campaign.file.inputs if campaign.file else {}
                 hashes = {**checked.decided_by, **of_file}
@@ -373,7 +381,7 @@ def _work(
     stopped: KeyboardInterrupt | SuaveDesError | None = None
     try:
         with store.reading():
-            for _, each in store.outcomes():
+            for _, each in store.outcomes(campaign.problem_of):
                 done += 1
                 failed += isinstance(each, MissionFailure)
         if left := campaign.planned - done:

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain, product
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
@@ -29,9 +29,9 @@ from suave_des.errors import (
 )
 from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
-from suave_des.records.metrics import Row, further_of, row_of
+from suave_des.records.metrics import COLUMNS, Row, further_of, row_of
 from suave_des.records.mission_folder import mission_line
-from suave_des.records.store import MissionFailure, MissionKey
+from suave_des.records.store import MissionFailure, MissionKey, Outcome
 from suave_des.registry import is_built_in, is_installed, place_of
 from suave_des.scenario.loader import LoadedScenario
 
@@ -102,6 +102,28 @@ class Campaign:
     def planned(self) -> int:
         """Number of missions."""
         return self.variation.sweep.points * len(self.spec.managers) * self.spec.runs
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of runs.csv."""
+        return (*COLUMNS, *self.variation.columns, *self.loaded.scenario.further_columns)
+
+    def problem_of(self, outcome: Outcome) -> str:
+        """Say why an outcome, which may come from elsewhere, cannot be one of this campaign; empty
+        if it can.
+        """
+        key, found = outcome
+        names = self.spec.managers
+        is_planned = 0 <= key.point < self.variation.sweep.points and 1 <= key.run <= self.spec.runs
+        if not (is_planned and 0 <= key.manager < len(names)):
+            return f"it has run {key.run} of manager {key.manager + 1}, which was not to be run"
+        own = names[key.manager], key.run
+        if isinstance(found, MissionFailure):
+            is_own = (found.manager, found.run, found.point) == (*own, key.point)
+        else:
+            width = len(self.columns) + self.spec.record_knowledge
+            is_own = found[1:4] == (*own, self.spec.seed) and len(found) == width
+        return "" if is_own else f"the outcome of run {key.run} is that of another mission"
 
     def missions(self, settled: Callable[[int, int], Collection[int]]) -> Iterator[MissionKey]:
         """Yield the missions that have yet to be run, in order.

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
-from suave_des.files import csv_text, json_text
+from suave_des.files import Content, csv_text
 from suave_des.records import store
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
-from suave_des.records.store import Content, MissionFailure, MissionKey, Outcome
+from suave_des.records.store import MissionFailure, MissionKey, Outcome
 
 if TYPE_CHECKING:
     import pandas
@@ -63,11 +63,7 @@ class CampaignResult:
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
-        return (
-            *COLUMNS,
-            *self.campaign.variation.columns,
-            *self.campaign.loaded.scenario.further_columns,
-        )
+        return self.campaign.columns
 
     def _kept(self) -> Iterator[tuple[MissionKey, Row]]:
         for key, outcome in self.outcomes():
@@ -156,9 +152,6 @@ class CampaignResult:
         files: dict[str, Content] = {
             store.RUNS_FILE: store.runs_pieces(self.columns, self.stream()),
             store.SUMMARY_FILE: csv_text(columns, [(*row.values(),) for row in self.summary]),
-            store.MANIFEST_FILE: json_text(
-                {**about, **self._varied(), **self.report(), **provenance}
-            ),
         }
         if self.campaign.variation.ensemble is not None:
             columns = (*ENSEMBLE_COLUMNS, *sweep.parameters)
@@ -166,8 +159,9 @@ class CampaignResult:
             files[store.ENSEMBLE_FILE] = csv_text(columns, rows)
         if spec.record_knowledge:
             files[CAMPAIGN_KNOWLEDGE_FILE] = self._knowledge_lines()
+        about |= {**self._varied(), **self.report(), **provenance}
         store.write_campaign(
-            self.folder, files, dict(self._suave_files()) if spec.suave_format else {}
+            self.folder, about, files, dict(self._suave_files()) if spec.suave_format else {}
         )
 
     def _varied(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from suave_des.cli.options import (
     manager_options,
 )
 from suave_des.errors import InputError, number_of
-from suave_des.files import FAMILIES, write_files
+from suave_des.files import FAMILIES, LISTINGS, write_beside
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
 
@@ -265,7 +265,7 @@ def reproduce(
     if result.folder is None:
         console.print("\nNo files were written; --out DIR keeps each mission's figures.")
     else:
-        write_files(result.folder, {PAPER_FILE: comparison.markdown()})
+        write_beside(result.folder, {PAPER_FILE: comparison.markdown()}, LISTINGS["campaign"])
         console.print(
             f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{PAPER_FILE}"
         )

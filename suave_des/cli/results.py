@@ -27,7 +27,14 @@ from suave_des.cli.options import (
     managers_option,
 )
 from suave_des.errors import InputError
-from suave_des.files import check_output_file, check_output_folder, make_output_folder, write_files
+from suave_des.files import (
+    LISTINGS,
+    check_output_file,
+    check_output_folder,
+    make_output_folder,
+    write_beside,
+    write_file,
+)
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
@@ -138,7 +145,7 @@ def compare(
     if out is None:
         print(comparison.written(as_format, min(output().width, TEXT_WIDTH)), end="")
     else:
-        write_files(out.parent, {out.name: comparison.written(_ENDINGS[out.suffix.lower()])})
+        write_file(out, comparison.written(_ENDINGS[out.suffix.lower()]))
         print(f"compared in {out}")
 
 
@@ -208,7 +215,6 @@ def validate(
         read_real,
         targets_of,
     )
-    from suave_des.results.validation import FILES
     from suave_des.results.validation import validate as compare
 
     name = scenario or DEFAULT_SCENARIO
@@ -266,7 +272,7 @@ def validate(
         console.print("\nNo files were written; --out DIR keeps the tables.")
     else:
         about = {"version": __version__, "command": command_line(), **sources}
-        write_files(out, validation.texts(about), stale=FILES)
+        write_beside(out, validation.texts(about), LISTINGS["campaign"])
         console.print(f"\nTables and validation.json are in {out}")
     if result is not None:
         exit_telling_failures(result)

@@ -14,7 +14,6 @@ from pydantic import BaseModel, ConfigDict
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
-from suave_des.files import read_json
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
 from suave_des.knowledge.reasoner import triggers_adaptation
@@ -32,8 +31,8 @@ from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
     RecordedMission,
-    read_knowledge,
     read_missions,
+    read_states,
 )
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml, validated
@@ -414,8 +413,7 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
     for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
         if (each / KNOWLEDGE_FILE).is_file():
             is_any_found = True
-            scenario = _scenario(each / "mission.json")
-            yield each, RecordedMission("", 0, 0, scenario, read_knowledge(each / KNOWLEDGE_FILE))
+            yield each, RecordedMission("", 0, 0, *read_states(each))
         if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
             is_any_found = True
             yield from (
@@ -425,15 +423,6 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
         problem = f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it"
         remedy = "record with run --manager metacontrol --out, or campaign --record-knowledge"
         raise InputError(problem, file=folder, remedy=remedy)
-
-
-def _scenario(path: Path) -> Scenario:
-    try:
-        return Scenario.model_validate(read_json(path)["scenario"])
-    except (ValueError, KeyError, TypeError):
-        raise InputError(
-            "is not a mission's record", file=path, remedy="run the mission again"
-        ) from None
 
 
 def recorded_state(folder: Path, time: str | float, run: int = 0) -> KnowledgeState:

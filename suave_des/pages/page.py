@@ -16,7 +16,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from suave_des.files import write_files
+from suave_des.files import DERIVED, LISTINGS, write_beside, write_file
 
 
 @cache
@@ -66,6 +66,9 @@ def write_page(file: Path, text: str, *, show: bool) -> None:
     Raises:
         InputError: it cannot be written.
     """
-    write_files(file.parent, {file.name: text})
+    if file.name in DERIVED and (file.is_file() or not file.exists()):
+        write_beside(file.parent, {file.name: text}, LISTINGS["campaign"])
+    else:
+        write_file(file, text)
     if show:
         webbrowser.open(file.resolve().as_uri())

@@ -21,12 +21,13 @@ from suave_des.campaign.campaign import opened_campaign
 from suave_des.campaign.missions import MissionRunner
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.files import read_json
 from suave_des.metrics.result import MissionResult
 from suave_des.pages.page import compressed, page
 from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
 from suave_des.records.mission_folder import record_of
 from suave_des.records.missions import Missions, read_missions
-from suave_des.records.store import read_manifest
+from suave_des.records.store import MANIFEST_FILE, read_manifest
 from suave_des.results.compare import compare_groups
 from suave_des.results.groups import grouped
 from suave_des.results.horizon import at_horizons
@@ -179,17 +180,14 @@ def _plain(column: pandas.Series) -> list[Any]:
 
 def _made(folder: Path) -> dict[str, Any]:
     """Read how the campaign in a folder was made; little is known of other folders."""
-    try:
-        manifest = read_manifest(folder)
-    except InputError:
-        manifest = {}
-    command = manifest.pop("command", ())
+    about, path = read_manifest(folder), folder / MANIFEST_FILE
     return {
         "folder": str(folder),
-        "command": shlex.join(map(str, command)) if isinstance(command, list) else "",
+        "command": shlex.join(about.command),
         "manifest": {
             key: value if isinstance(value, dict) else json.dumps(value).strip('"')
-            for key, value in manifest.items()
+            for key, value in (read_json(path) if path.exists() else {}).items()
+            if key != "command"
         },
     }
 

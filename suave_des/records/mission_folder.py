@@ -10,25 +10,36 @@ values are text in both, so that they stay exact.
 
 from __future__ import annotations
 
-import io
 import json
 import platform
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, field, fields
-from functools import cached_property
 from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 import suave_des
-from suave_des.errors import InputError
-from suave_des.files import csv_text, json_text, opened, read_json
+from suave_des.errors import InputError, line_error, number_of, shown
+from suave_des.files import (
+    FAMILIES,
+    LIMIT_BYTES,
+    LISTED,
+    Content,
+    Listing,
+    csv_text,
+    json_text,
+    opened,
+    parse_json,
+    read_csv,
+    sha256_of,
+)
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import Event, KnowledgeRecord, MissionResult, TrajectoryPoint
+from suave_des.records import contents
 from suave_des.records.metrics import COLUMNS, further_of, row_of
 from suave_des.scenario.loader import LoadedScenario, holder_of
 from suave_des.scenario.models import Scenario
@@ -44,17 +55,8 @@ TRAJECTORY_COLUMNS = tuple(
     field.name for field in fields(TrajectoryPoint) if field.name != "further"
 )
 """Columns that every trajectory.csv has."""
-_METRICS = (
-    "scenario",
-    "manager",
-    "run",
-    "seed",
-    "search_time_s",
-    "pipeline_found",
-    "detection_x_m",
-    "detection_y_m",
-)
-"""Those that every mission.json must have."""
+_NEEDED = ("x_m", "y_m", "z_m")
+"""Columns of numbers that are in each row, besides the time."""
 _ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
 """Columns of trajectory.csv that may be missing."""
 LIBRARIES = (
@@ -70,6 +72,7 @@ LIBRARIES = (
 )
 """Distributions whose version can decide a result."""
 _REMEDY = "give the --out folder of suave-des run"
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class MissionRecord:
 
     Attributes:
         metrics: its row of runs.csv, by column.
-        scenario: in full, as mission.json has it.
+        settings: its scenario.
         events, trajectory: the files' content; mode is empty before the first one, other missing
         values are nan.
         knowledge: the states that its manager reasoned about.
@@ -88,7 +91,7 @@ class MissionRecord:
     """
 
     metrics: Mapping[str, Any]
-    scenario: Mapping[str, Any]
+    settings: Scenario
     events: pandas.DataFrame
     trajectory: pandas.DataFrame
     knowledge: tuple[KnowledgeRecord, ...] = ()
@@ -101,19 +104,6 @@ class MissionRecord:
         """Scenario, manager, run and seed."""
         metrics = self.metrics
         return f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
-
-    @cached_property
-    def settings(self) -> Scenario:
-        """The scenario, validated.
-
-        Raises:
-            InputError: it is of another version.
-        """
-        try:
-            return Scenario.model_validate(self.scenario)
-        except ValidationError:
-            problem = f"the scenario of {self.name} is one that this suave-des does not read"
-            raise InputError(problem, file=MISSION_FILE, remedy="run the mission again") from None
 
     @property
     def end_s(self) -> float:
@@ -147,9 +137,9 @@ def provenance(
 
 def mission_files(
     result: MissionResult, loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
-) -> dict[str, str]:
-    """Return the content of each file of a mission's folder by its name; `inputs` and `command` as
-    of provenance.
+) -> dict[str, Content | Listing]:
+    """Return the content of each file of a mission's folder by its name, mission.json as a listing
+    of the others; `inputs` and `command` as of provenance.
     """
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
     points = (
@@ -162,8 +152,8 @@ def mission_files(
         "search_altitudes_m": loaded.modes.search_altitudes_m,
         **provenance(loaded, inputs, command),
     }
-    files = {
-        MISSION_FILE: json_text(mission),
+    files: dict[str, Content | Listing] = {
+        MISSION_FILE: lambda hashes: json_text({**mission, LISTED: dict(hashes)}),
         EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
         TRAJECTORY_FILE: csv_text((*TRAJECTORY_COLUMNS, *further), points),
     }
@@ -181,9 +171,10 @@ def _metrics(result: MissionResult) -> dict[str, Any]:
 def record_of(result: MissionResult, loaded: LoadedScenario) -> MissionRecord:
     """Return the record of a mission that was just run, as its folder would have it."""
     frames = result.events_frame(), result.trajectory_frame()
-    scenario, altitudes_m = loaded.scenario.model_dump(mode="json"), loaded.modes.search_altitudes_m
+    altitudes_m = loaded.modes.search_altitudes_m
     return MissionRecord(
-        _metrics(result), scenario, *frames, result.knowledge, loaded.inputs, altitudes_m, loaded
+        *(_metrics(result), loaded.scenario, *frames),
+        *(result.knowledge, loaded.inputs, altitudes_m, loaded),
     )
 
 
@@ -193,25 +184,7 @@ def read_mission(folder: Path) -> MissionRecord:
     Raises:
         InputError: one of its files is missing, or is not what a mission writes.
     """
-    import numpy as np
-
-    path = folder / MISSION_FILE
-    mission = read_json(path)
-    try:
-        metrics, scenario, inputs = (
-            mission["metrics"],
-            mission["scenario"],
-            dict(mission.get("inputs_sha256", {})),
-        )
-        altitudes_m = {
-            mode: float(value) for mode, value in mission.get("search_altitudes_m", {}).items()
-        }
-        np.array(scenario["pipeline"]["vertices_m"], dtype=float)
-        _check_columns(path, _METRICS, metrics)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"is not the record of a mission: {error}", file=path, remedy=_REMEDY
-        ) from None
+    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _REMEDY)
     events = _read_table(folder / EVENTS_FILE, EVENT_COLUMNS)
     trajectory = _read_table(
         folder / TRAJECTORY_FILE, [name for name in TRAJECTORY_COLUMNS if name not in _ANGLES]
@@ -219,7 +192,30 @@ def read_mission(folder: Path) -> MissionRecord:
     trajectory = trajectory.assign(**{name: 0.0 for name in _ANGLES if name not in trajectory})
     states = folder / KNOWLEDGE_FILE
     knowledge = read_knowledge(states) if states.is_file() else ()
-    return MissionRecord(metrics, scenario, events, trajectory, knowledge, inputs, altitudes_m)
+    _check_listed(folder, mission)
+    metrics = mission.metrics.model_dump(exclude_unset=True)
+    others = knowledge, mission.inputs_sha256, mission.search_altitudes_m
+    return MissionRecord(metrics, mission.scenario, events, trajectory, *others)
+
+
+def read_states(folder: Path) -> tuple[Scenario, tuple[KnowledgeRecord, ...]]:
+    """Read the scenario of a mission's folder, and its states of knowledge; raises as read_mission
+    does.
+    """
+    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _REMEDY)
+    states = read_knowledge(folder / KNOWLEDGE_FILE)
+    _check_listed(folder, mission)
+    return mission.scenario, states
+
+
+def _check_listed(folder: Path, mission: contents.MissionFile) -> None:
+    """Check that the files are those of the mission, not of an earlier one, as a kill leaves."""
+    for name, digest in mission.files_sha256.items():
+        if name in FAMILIES["mission"] and sha256_of(folder / name) != digest:
+            problem = (
+                f"is not as {MISSION_FILE} beside it says: it was changed, or is of another mission"
+            )
+            raise InputError(problem, file=folder / name, remedy="run the mission again")
 
 
 def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:
@@ -230,29 +226,35 @@ def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> 
 
 def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
     """Read a table that must have some columns: source, event, detail and mode are text, all others
-    finite numbers.
+    numbers, of which those that were not measured may be missing; times do not decrease.
     """
     import numpy as np
     import pandas
 
     texts = ("source", "event", "detail", "mode")
-    try:
-        with opened(path) as stream:
-            # "none" and "nan" may be words here, so that only numbers have something that counts as
-            # missing.
-            frame = pandas.read_csv(stream, dtype=str, keep_default_na=False)
-    except ValueError as error:
-        raise InputError(f"cannot be read: {error}", file=path, remedy=_REMEDY) from None
-    _check_columns(path, columns, frame.columns)
-    if frame.empty:
-        raise InputError("is empty", file=path, remedy=_REMEDY)
+    header, rows, _ = read_csv(path, LIMIT_BYTES, _REMEDY)
+    numbered = list(rows)
+    _check_columns(path, columns, header)
+    for line, row in numbered:
+        if len(row) != len(header):
+            problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
+            raise line_error(path, line, problem, _REMEDY)
+    if not numbered or len(set(header)) < len(header):
+        problem = "has a column twice" if numbered else "is empty"
+        raise InputError(problem, file=path, remedy=_REMEDY)
+    frame = pandas.DataFrame([row for _, row in numbered], columns=header, dtype=str)
     for name in frame.columns.difference(list(texts)):
-        numbers = pandas.to_numeric(frame[name], errors="coerce").astype(float)
-        for row in np.flatnonzero(~np.isfinite(numbers) & ((frame[name] != "") | (name == "t_s")))[
-            :1
-        ]:
-            problem = f"{name}: expected a finite number, got {str(frame[name].iloc[row])!r}"
-            raise InputError(problem, file=path, place=f"line {row + 2}", remedy=_REMEDY)
+        cells = frame[name]
+        numbers = pandas.to_numeric(cells, errors="coerce").astype(float)
+        is_right = np.abs(numbers) <= contents.GREATEST
+        if name == "t_s":
+            is_right &= numbers.diff().fillna(0.0) >= 0.0
+        elif name not in _NEEDED:
+            is_right |= cells == ""
+        for at in np.flatnonzero(~is_right)[:1]:
+            wanted = "a finite number" + (" that is not before the last" if name == "t_s" else "")
+            problem = f"{name}: expected {wanted}, got {shown(cells.iloc[at])}"
+            raise line_error(path, numbered[at][0], problem, _REMEDY)
         frame[name] = numbers
     return frame
 
@@ -339,8 +341,12 @@ def read_knowledge(path: Path) -> tuple[KnowledgeRecord, ...]:
     Raises:
         InputError: it cannot be read, or a line of it is damaged.
     """
-    with _lines(path, "mission") as lines:
-        return tuple(_record(line["t_s"], line, line["measurements"]) for line in lines)
+    records = []
+    for line in _lines(path, "mission"):
+        with line.located():
+            cycle = line.checked(contents.Cycle)
+            records.append(KnowledgeRecord(cycle.t_s, _state(cycle, cycle.measurements)))
+    return tuple(records)
 
 
 def read_missions(path: Path) -> Iterator[RecordedMission]:
@@ -349,60 +355,71 @@ def read_missions(path: Path) -> Iterator[RecordedMission]:
     Raises:
         InputError: it cannot be read, or a line of it is damaged.
     """
-    with _lines(path, "campaign") as lines:
-        scenario: Any = next(lines, {"scenario": {}})["scenario"]
-        for content in lines:
-            at_point = json.loads(json.dumps(scenario))
-            for key_path, value in content["swept"].items():
-                holder, key = holder_of(at_point, key_path)
-                holder[key] = value
-            point, run = int(content["point"]), int(content["run"])
-            records = tuple(_cycle(content["states"], *cycle) for cycle in content["cycles"])
-            yield RecordedMission(
-                str(content["manager"]), point, run, Scenario.model_validate(at_point), records
-            )
+    scenario: dict[str, Any] | None = None
+    for line in _lines(path, "campaign"):
+        with line.located():
+            if scenario is None:
+                scenario = line.checked(contents.ScenarioLine).scenario
+                continue
+            mission = _mission(line.checked(contents.MissionLine), scenario)
+        yield mission
 
 
-@contextmanager
-def _lines(path: Path, what: str) -> Iterator[Iterator[Any]]:
-    """Parse a file's lines one by one; what goes wrong while one is used is an error that names
-    it.
-    """
-    number = 0
+def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> RecordedMission:
+    at_point = json.loads(json.dumps(scenario))
+    for key_path, value in recorded.swept.items():
+        holder, key = holder_of(at_point, key_path)
+        holder[key] = value
+    try:
+        own = Scenario.model_validate(at_point)
+    except ValidationError:
+        raise InputError("the scenario is one that this suave-des does not read") from None
+    records = []
+    for t_s, index, *values in recorded.cycles:
+        state = recorded.states[int(index)]
+        measured = dict(zip(state.measured, map(str, values), strict=True))
+        records.append(KnowledgeRecord(float(t_s), _state(state, measured)))
+    return RecordedMission(recorded.manager, recorded.point, recorded.run, own, tuple(records))
 
-    def parsed(file: Iterable[str]) -> Iterator[Any]:
-        nonlocal number
-        for number, line in enumerate(file, start=1):  # noqa: B007
-            yield json.loads(line)
 
-    with opened(path) as stream, io.TextIOWrapper(stream, encoding="utf-8") as file:
+class _Line(NamedTuple):
+    """A line of a file, and what is to be run again if it is damaged."""
+
+    file: Path
+    number: int
+    text: bytes
+    made_by: str
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """Turn errors of the block into one that the line is damaged."""
         try:
-            yield parsed(file)
-        except (ValueError, KeyError, TypeError, IndexError, AttributeError, InputError) as error:
-            problem = "the scenario" if isinstance(error, ValidationError) else error
-            raise InputError(
-                f"is damaged: {problem}",
-                file=path,
-                place=f"line {number}",
-                remedy=f"run the {what} again",
+            yield
+        except InputError as error:
+            where = f"{error.place}: " if error.place else ""
+            remedy = f"run the {self.made_by} again"
+            raise line_error(
+                self.file, self.number, f"is damaged: {where}{error.problem}", remedy
             ) from None
 
-
-def _cycle(
-    states: Sequence[Mapping[str, Any]], t_s: Any, index: int, *values: Any
-) -> KnowledgeRecord:
-    state = states[index]
-    return _record(t_s, state, dict(zip(state["measured"], values, strict=True)))
+    def checked(self, model: type[_Model]) -> _Model:
+        """Return what the line stands for."""
+        text = self.text.decode(errors="surrogateescape")  # which no model takes
+        return contents.checked(model, parse_json(text, self.file), self.file, "")
 
 
-def _record(
-    t_s: Any, content: Mapping[str, Any], measurements: Mapping[str, Any]
-) -> KnowledgeRecord:
-    objectives = [
-        ObjectiveState(str(name), status, bool(always))
-        for name, status, always in content["objectives"]
-    ]
-    others = {name: content[name] for name in ("groundings", "components")}
-    return KnowledgeRecord(
-        float(t_s), KnowledgeState.of(objectives, measurements=measurements, **others)
+def _lines(path: Path, made_by: str) -> Iterator[_Line]:
+    """Yield a file's lines one by one."""
+    with opened(path) as stream:
+        for number, text in enumerate(stream, start=1):
+            yield _Line(path, number, text, made_by)
+
+
+def _state(content: contents.State, measurements: Mapping[str, str]) -> KnowledgeState:
+    objectives = (ObjectiveState(*each) for each in content.objectives)
+    return KnowledgeState.of(
+        objectives,
+        groundings=content.groundings,
+        components=content.components,
+        measurements=measurements,
     )

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pandas
 
 from suave_des.errors import InputError
 from suave_des.files import read_csv
+from suave_des.records.contents import Manifest
+from suave_des.records.contents import Missions as ManifestMissions
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
 from suave_des.records.runs import COLUMNS, REMEDY, SIZE_LIMIT_BYTES, is_foreign, runs_in
 from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
@@ -88,8 +88,9 @@ def _read_source(path: Path) -> Missions:
     is_campaign, is_file = (path / RUNS_FILE).exists(), not path.is_dir()
     is_exemplars = not (is_campaign or is_file)
     folder = path.parent if is_file else path
-    manifest = read_manifest(folder)
-    if is_file and path.name == RUNS_FILE and manifest:
+    is_ours = (folder / RUNS_FILE).exists()
+    manifest = read_manifest(folder) if is_ours else Manifest()
+    if is_file and path.name == RUNS_FILE and manifest.missions is not None:
         is_campaign = True
     if is_exemplars and (path / STORE_FILE).is_file():
         remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
@@ -115,7 +116,7 @@ def _read_source(path: Path) -> Missions:
         runs.check_simulated()
         frame = runs.frame.reset_index(drop=True)
         is_ours = bool(frame["scenario"].iloc[0])
-        swept = _swept({} if is_exemplars else manifest, frame) if is_ours else ()
+        swept = _swept(manifest, frame) if is_ours else ()
         _check_once(frame, swept, file)
         frames.append(frame)
         notes += runs.notes
@@ -123,8 +124,9 @@ def _read_source(path: Path) -> Missions:
     if is_exemplars or not is_ours:
         frame, swept = in_papers_order(frame), ()
     if is_campaign:
-        frame = frame.assign(**{SHARING: _sharing(manifest)})
-        notes += _unfinished(folder, manifest)
+        sharing = manifest.runs_per_draw if manifest.perturbations else 1
+        frame = frame.assign(**{SHARING: sharing})
+        notes += _unfinished(folder, manifest.missions)
     elif is_ours:
         frame = frame.assign(**{SHARING: _sharing_seen(frame, swept)})
     return Missions(frame, swept, tuple(notes))
@@ -172,7 +174,7 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
     except (ValueError, TypeError) as error:
         problem = f"the data frame's columns of metrics have something that is no number: {error}"
         raise InputError(problem, remedy="it needs the columns of runs.csv") from None
-    swept = _swept({}, plain)
+    swept = _swept(Manifest(), plain)
     _check_once(plain, swept)
     sharing = frame.attrs.get(SHARING) or _sharing_seen(plain, swept)
     return Missions(plain.assign(**{SHARING: int(sharing)}), swept)
@@ -184,14 +186,6 @@ def in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
     """
     ranks = frame["manager"].map(PAPER_ORDER).fillna(len(PAPER_ORDER))
     return frame.iloc[ranks.argsort(kind="stable")].reset_index(drop=True)
-
-
-def _sharing(manifest: Mapping[str, Any]) -> int:
-    """Return how many runs in a row share the draws of perturbations; 1 if none do."""
-    try:
-        return max(1, int(manifest["runs_per_draw"])) if manifest["perturbations"] else 1
-    except (ValueError, KeyError, TypeError):
-        return 1
 
 
 def _sharing_seen(frame: pandas.DataFrame, swept: Sequence[str]) -> int:
@@ -213,36 +207,25 @@ def _sharing_seen(frame: pandas.DataFrame, swept: Sequence[str]) -> int:
     return math.gcd(*(int(run) - 1 for run in changes)) or 1
 
 
-def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
+def _unfinished(folder: Path, missions: ManifestMissions | None) -> Iterator[str]:
     """Say how many missions a campaign lacks."""
-    with suppress(ValueError, KeyError, TypeError):
-        left_out, failed, planned = (
-            int(manifest["missions"][key]) for key in ("left_out", "failed", "planned")
+    if missions is not None and (missions.left_out or missions.failed):
+        yield (
+            f"{folder}: of {missions.planned} missions {missions.left_out} are missing and"
+            f" {missions.failed} failed; suave-des campaign --resume {folder} runs those that are"
+            " missing"
         )
-        if left_out or failed:
-            yield (
-                f"{folder}: of {planned} missions {left_out} are missing and {failed} failed;"
-                f" suave-des campaign --resume {folder} runs those that are missing"
-            )
 
 
-def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, ...]:
+def _swept(manifest: Manifest, frame: pandas.DataFrame) -> tuple[str, ...]:
     """Return the columns that a sweep varies: those that the manifest names, or else those that
     seem to vary.
 
     These differ between missions of one manager, seed and run, and are no metrics.
     """
     columns = [str(name) for name in frame if name not in COLUMNS and metric_of(str(name)) is None]
-    if "missions" in manifest:
-        with suppress(AttributeError, TypeError):
-            forms = manifest.get("sweep", {})
-            ranges = (forms.get("sample") or {}).get("ranges", {})
-            named = [
-                name
-                for form in (forms.get("grid", {}), forms.get("zip", {}), ranges)
-                for name in form
-            ]
-            return tuple(name for name in named if name in columns)
+    if manifest.missions is not None:
+        return tuple(name for name in manifest.sweep.names if name in columns)
     if not columns or frame["run"].isna().any():
         return ()
     counts = frame.groupby(["manager", "seed", "run"], sort=False, observed=True)[columns].nunique(

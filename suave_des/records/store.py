@@ -12,22 +12,28 @@ import json
 import sqlite3
 import time
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import WeakSet
 
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.files import (
+    DERIVED,
+    LISTED,
+    Content,
+    Listing,
     check_own,
     csv_pieces,
+    json_text,
     make_output_folder,
-    read_json,
+    own_files,
     remove_results,
     write_files,
 )
 from suave_des.interrupts import Stopped, is_stopping
+from suave_des.records import contents
 from suave_des.records.metrics import COLUMNS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 
@@ -50,7 +56,12 @@ _TABLES = (
     " crc INTEGER NOT NULL, PRIMARY KEY (point, manager, run)) WITHOUT ROWID",
     f"PRAGMA user_version = {_VERSION}",
 )
+_SCHEMA = {statement for statement in _TABLES if statement.startswith("CREATE")}
 _ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
+_LONGEST_BYTES = 500_000_000
+"""Of a value in the database."""
+_NAMES_ANOTHER = bytes.fromhex("d9d505f920a163d7")
+"""The end of a journal that names a file which SQLite removes when it has used the journal."""
 
 
 class MissionKey(NamedTuple):
@@ -90,7 +101,6 @@ class MissionFailure(NamedTuple):
 
 
 Outcome = tuple[MissionKey, Row | MissionFailure]
-Content = str | bytes | Iterable[str]
 
 
 class StoreError(SuaveDesError):
@@ -130,7 +140,7 @@ class Store:
 
     def _connect(self) -> None:
         with self.reading():
-            self._db = sqlite3.connect(self.path or "", timeout=0.0, isolation_level=None)
+            self._db = _connected(self.path)
             try:
                 self._check()
             except BaseException:
@@ -152,6 +162,7 @@ class Store:
             problem = f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}"
             remedy = "resume it with the suave-des version that began it, or start a new one with --overwrite"
             raise InputError(problem, file=self.path, remedy=remedy)
+        _check_schema(self._db, self.path)
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
             raise _damaged(self.path, verdict)
@@ -163,37 +174,11 @@ class Store:
         """
         return bool(self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,))
 
-    @contextmanager
-    def reading(self) -> Iterator[None]:
-        """Turn whatever is unexpected while what is stored is used into one error about the store.
-
-        Whoever interprets its content does so in this, as there is no end to what a file from
-        elsewhere can hold. An error after a signal asked to stop is no damage: it may be that of a
-        module whose import the signal broke off.
+    def reading(self) -> AbstractContextManager[None]:
+        """Turn whatever is unexpected while what is stored is used into one error about the store,
+        as `store_read` does.
         """
-        try:
-            yield
-        except (SuaveDesError, MemoryError):
-            raise
-        except sqlite3.OperationalError as error:
-            code = (
-                getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
-            )  # none: what is read is no text
-            if code == sqlite3.SQLITE_BUSY and self.path is not None:
-                problem, remedy = (
-                    "another campaign is running in the output folder",
-                    "wait for it, or give another",
-                )
-                raise InputError(problem, file=self.path.parent, remedy=remedy) from None
-            if code not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
-                raise StoreError(
-                    f"{self.path or 'temporary files'}: results cannot be kept: {error}"
-                ) from None
-            raise _damaged(self.path, error) from None
-        except Exception as error:
-            if is_stopping():
-                raise Stopped from error
-            raise _damaged(self.path, error) from error
+        return store_read(self.path)
 
     def begin(self, about: Mapping[str, Any]) -> None:
         """Begin a new campaign, in place of an earlier one, with what is noted about it, by name;
@@ -235,17 +220,7 @@ class Store:
             InputError: nothing was and there is no default, or it is damaged.
         """
         with self.reading():
-            found = self._db.execute(
-                "SELECT value, crc FROM about WHERE name = ?", (name,)
-            ).fetchone()
-            if found is None and default is not None:
-                return default
-            if found is None or _crc(name, found[0]) != found[1]:
-                raise _damaged(
-                    self.path,
-                    f"its {name} is {'missing' if found is None else 'not what was written'}",
-                )
-            return json.loads(found[0])
+            return _about(self._db, self.path, name, default)
 
     def note(self, name: str, value: Any) -> None:
         """Note something about the campaign, at once and durably."""
@@ -298,21 +273,32 @@ class Store:
         with self.reading():
             return int(self._db.execute("SELECT count(*) FROM outcomes").fetchone()[0])
 
-    def outcomes(self) -> Iterator[Outcome]:
+    def outcomes(self, problem_of: Callable[[Outcome], str]) -> Iterator[Outcome]:
         """Yield all outcomes in the order of their keys, read as they are requested; also of a
         store that is closed.
+
+        Args:
+            problem_of: says why an outcome cannot be one of this campaign; empty if it can.
 
         Raises:
             InputError: the store is damaged.
         """
+
+        def checked(records: Iterable[Any]) -> Iterator[Outcome]:
+            for record in records:
+                outcome = _outcome(record, self.path)
+                if problem := problem_of(outcome):
+                    raise _damaged(self.path, problem)
+                yield outcome
+
         with self.reading():
             if self._is_open:
                 self._cursors.add(cursor := self._db.execute(_ALL))
-                yield from (_outcome(record, self.path) for record in cursor)
+                yield from checked(cursor)
                 return
             assert self.path is not None
-            with closing(_read_only(self.path)) as db:
-                yield from (_outcome(record, self.path) for record in db.execute(_ALL))
+            with closing(_connected(self.path, is_read=True)) as db:
+                yield from checked(db.execute(_ALL))
 
     def close(self, *, keep_empty: bool = True) -> None:
         """Leave one plain file behind, without outcomes only if `keep_empty`.
@@ -333,36 +319,117 @@ class Store:
         if self.path is not None and self.path.exists():
             with (
                 suppress(sqlite3.Error),
-                closing(sqlite3.connect(self.path, isolation_level=None)) as db,
+                closing(_connected(self.path)) as db,
             ):
                 db.execute("PRAGMA journal_mode = DELETE")
             if is_empty:
                 self.path.unlink()
 
 
+@contextmanager
+def store_read(path: Path | None) -> Iterator[None]:
+    """Turn whatever is unexpected while what is stored is used into one error about the store.
+
+    Whoever interprets its content does so in this, as there is no end to what a file from
+    elsewhere can hold. An error after a signal asked to stop is no damage: it may be that of a
+    module whose import the signal broke off.
+    """
+    try:
+        yield
+    except (SuaveDesError, MemoryError):
+        raise
+    except sqlite3.OperationalError as error:
+        code = (
+            getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+        )  # none: what is read is no text
+        if code == sqlite3.SQLITE_BUSY and path is not None:
+            problem, remedy = (
+                "another campaign is running in the output folder",
+                "wait for it, or give another",
+            )
+            raise InputError(problem, file=path.parent, remedy=remedy) from None
+        if code not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
+            raise StoreError(
+                f"{path or 'temporary files'}: results cannot be kept: {error}"
+            ) from None
+        raise _damaged(path, error) from None
+    except Exception as error:
+        if is_stopping():
+            raise Stopped from error
+        raise _damaged(path, error) from error
+
+
 def has_campaign(folder: Path) -> bool:
     """Return whether a campaign was begun in a folder; damaged and busy ones count."""
-    return (folder / STORE_FILE).is_file() and _looked_up(
-        folder, "SELECT count(*) FROM sqlite_master"
-    ) != 0
-
-
-def _looked_up(folder: Path, query: str) -> Any:
-    """Return the one value that a query finds in a folder's store; None where it cannot be read."""
+    path = folder / STORE_FILE
+    if not path.is_file():
+        return False
     try:
-        with closing(_read_only(folder / STORE_FILE)) as db:
-            return db.execute(query).fetchone()[0]
-    except Exception:  # there is no end to what a file from elsewhere leads to
-        return None
+        with closing(_connected(path, is_read=True)) as db:
+            return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
+    except (SuaveDesError, sqlite3.Error):
+        return True
+
+
+def read_note(path: Path, name: str) -> Any:
+    """Return what is noted under a name in a store, which may come from elsewhere, without changing it.
+
+    Raises:
+        InputError: the store is not a campaign's, or damaged.
+        StoreError: it cannot be read now.
+    """
+    with store_read(path), closing(_connected(path, is_read=True)) as db:
+        _check_schema(db, path)
+        return _about(db, path, name, None)
+
+
+def _about(db: sqlite3.Connection, path: Path | None, name: str, default: Any) -> Any:
+    found = db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
+    if found is None and default is not None:
+        return default
+    if found is None or _crc(name, found[0]) != found[1]:
+        what = "missing" if found is None else "not what was written"
+        raise _damaged(path, f"its {name} is {what}")
+    return json.loads(found[0])
 
 
 def _own(path: Path) -> list[Path]:
     return [path.with_name(f"{path.name}{ending}") for ending in _ENDINGS]
 
 
-def _read_only(path: Path) -> sqlite3.Connection:
-    check_own(_own(path))
-    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
+def _connected(path: Path | None, *, is_read: bool = False) -> sqlite3.Connection:
+    """Open a database that may come from elsewhere; None: a temporary one.
+
+    One that is read only is not changed, nor are the files beside it: what is in these counts only
+    where there are any.
+
+    Raises:
+        InputError: one of its files is a link, or would have SQLite remove some other file.
+    """
+    name = ""
+    if path is not None:
+        check_own(own := _own(path))
+        journals = [each for each in own[1:] if each.exists() and each.stat().st_size]
+        if any(each.read_bytes().endswith(_NAMES_ANOTHER) for each in journals):
+            raise _damaged(path, "its journal names another file, which would be removed")
+        if is_read and own[-1] in journals:  # a campaign was killed as it began or ended
+            with closing(_connected(path)) as db:
+                db.execute("SELECT 1 FROM sqlite_master").fetchone()
+        mode = "mode=ro" if journals else "mode=ro&immutable=1"
+        name = f"{path.absolute().as_uri()}?{mode if is_read else 'mode=rwc'}"
+    db = sqlite3.connect(name, timeout=0.0, isolation_level=None, uri=True)
+    db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST_BYTES)
+    db.execute("PRAGMA trusted_schema = OFF")
+    return db
+
+
+def _check_schema(db: sqlite3.Connection, path: Path | None) -> None:
+    """Check that a database has the tables of a campaign's store, and nothing that acts by itself,
+    such as a view.
+    """
+    found = db.execute("SELECT sql FROM sqlite_master").fetchall()
+    if len(found) != len(_SCHEMA) or {sql for (sql,) in found} != _SCHEMA:
+        raise _damaged(path, "it does not have the tables of a campaign's store")
 
 
 def _damaged(path: Path | None, what: object) -> InputError:
@@ -391,7 +458,9 @@ def _outcome(record: tuple[int, int, int, int, str, int], path: Path | None) -> 
     if _crc(*key, kind, content) != crc:
         raise _damaged(path, f"the outcome of run {key.run} is not what was written")
     cells = json.loads(content)
-    return key, tuple(cells) if kind == _ROW else MissionFailure(*cells)
+    if kind == _ROW:
+        return key, contents.row_of(cells)
+    return key, MissionFailure(*contents.failure_of(cells))
 
 
 def _crc(*parts: object) -> int:
@@ -402,10 +471,13 @@ def _crc(*parts: object) -> int:
 
 
 def write_campaign(
-    folder: Path, files: Mapping[str, Content], suave: Mapping[str, Content]
+    folder: Path,
+    about: Mapping[str, Any],
+    files: Mapping[str, Content],
+    suave: Mapping[str, Content],
 ) -> None:
-    """Write a campaign's files, of those in FILES, into its folder, replacing those of an earlier
-    campaign.
+    """Write a campaign's manifest, which lists all others, and its files, of those in FILES, into
+    its folder, replacing those of an earlier campaign.
 
     The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a
     folder, or compare one file with the others, find what they expect.
@@ -413,14 +485,29 @@ def write_campaign(
     Raises:
         InputError: they cannot be written; nothing half-written stays.
     """
-    write_files(folder, files, stale=FILES)
+    before = own_files(folder, MANIFEST_FILE)
+    derived = {name: digest for name, digest in before.items() if name in DERIVED}
     inner = folder / SUAVE_FOLDER
     if suave:
         make_output_folder(inner)
-    if inner.is_dir():
-        write_files(inner, suave, stale=[path.name for path in inner.glob("*.csv")])
+
+    def manifest(hashes: Mapping[str, str]) -> str:
+        return json_text({**about, LISTED: {**derived, **hashes}})
+
+    all_files: dict[str, Content | Listing] = {
+        **files,
+        **{f"{SUAVE_FOLDER}/{name}": content for name, content in suave.items()},
+        MANIFEST_FILE: manifest,
+    }
+    write_files(folder, all_files, stale=before.keys() - derived.keys())
+    _leave_empty(folder, before)
+
+
+def _leave_empty(folder: Path, removed: Collection[str]) -> None:
+    """Remove the folder of the exemplar's files if only its files that were removed were in it."""
+    if any(name.startswith(f"{SUAVE_FOLDER}/") for name in removed):
         with suppress(OSError):  # something is in it
-            inner.rmdir()
+            (folder / SUAVE_FOLDER).rmdir()
 
 
 def tidy(folder: Path, *, is_new: bool) -> None:
@@ -434,7 +521,11 @@ def tidy(folder: Path, *, is_new: bool) -> None:
         raise InputError(
             "is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it"
         )
-    remove_results(folder, FILES, parts_only=not is_new)
+    own = own_files(folder, MANIFEST_FILE) if is_new else {}
+    if own:
+        own[MANIFEST_FILE] = ""
+    remove_results(folder, FILES, own)
+    _leave_empty(folder, own)
 
 
 def is_left_over(name: str) -> bool:
@@ -460,19 +551,23 @@ def runs_pieces(columns: Sequence[str], rows: Iterable[Row]) -> Iterator[str]:
     return csv_pieces(columns, map(exact, rows))
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
+def read_manifest(folder: Path) -> contents.Manifest:
     """Read a campaign's manifest.json; empty without one.
 
     Raises:
         InputError: it cannot be read, or is of another campaign than the missions that are kept
             beside it.
     """
-    kept = _looked_up(folder, "SELECT json_extract(value, '$') FROM about WHERE name = 'identity'")
-    path = folder / MANIFEST_FILE
-    found = read_json(path) if path.exists() else None
-    manifest = found if isinstance(found, dict) else {}
-    written = manifest.get("campaign_sha256")
-    if written is not None and kept is not None and written != kept:
+    path, store = folder / MANIFEST_FILE, folder / STORE_FILE
+    if not path.exists():
+        return contents.Manifest()
+    remedy = f"restore it, or suave-des campaign --resume {folder} writes it anew"
+    manifest = contents.read(contents.Manifest, path, remedy)
+    kept = None
+    if store.is_file():
+        with suppress(SuaveDesError):  # damaged or in use: the files beside it are complete
+            kept = read_note(store, "identity")
+    if manifest.campaign_sha256 is not None and kept not in (None, manifest.campaign_sha256):
         remedy = (
             f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
         )

@@ -27,7 +27,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, number_of, shown, unknown
 from suave_des.estimates import Estimate, mean_of
-from suave_des.files import write_files
+from suave_des.files import write_file
 from suave_des.records.metrics import METRICS, PAPER_METRICS
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.records.missions import Missions, read_missions
@@ -618,7 +618,7 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
     figure.savefig(
         picture, format=out.suffix[1:].lower(), bbox_inches=bbox_inches, metadata=metadata
     )
-    write_files(out.parent, {out.name: picture.getvalue()})
+    write_file(out, picture.getvalue())
 
 
 @style.publication()

@@ -166,16 +166,13 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
 
 
 def _functions_of(record: MissionRecord, task: str) -> set[str]:
-    revision, mission = (record.scenario.get(key, {}) for key in ("revision", "mission"))
-    shared = (
-        {MAINTAIN_MOTION}
-        if revision.get("coordinator", {}).get("maintain_motion_per_task")
-        else set()
-    )
+    scenario = record.settings
+    per_task = scenario.revision.coordinator.maintain_motion_per_task
+    shared = {MAINTAIN_MOTION} if per_task else set()
     own = {"search_pipeline": GENERATE_SEARCH_PATH, "inspect_pipeline": FOLLOW_PIPELINE}.get(
         task, SURFACE
     )
-    return {own, *shared, *mission.get("functions", {}).get(task, ())}
+    return {own, *shared, *getattr(scenario.mission.functions, task, ())}
 
 
 def _cause(record: MissionRecord, function: str, before: str, after: Span) -> str:
@@ -207,7 +204,7 @@ def _battery_cause(record: MissionRecord, before: str, after: Span) -> str:
     earlier, now = level.iloc[np.minimum(times, len(level) - 1)].astype(float)
     if now - earlier > _RECHARGED:
         return "battery recharged"
-    is_low = now <= record.scenario["reaction_metric"]["battery_limit"] + _ROUNDING
+    is_low = now <= record.settings.reaction_metric.battery_limit + _ROUNDING
     return f"battery at {now:.0%}" if is_low else ""
 
 
@@ -367,16 +364,16 @@ def _draw_way(
 
 
 def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
-    x_m, y_m = np.array(record.scenario["pipeline"]["vertices_m"])[:, :2].T
+    x_m, y_m = np.array(record.settings.pipeline.vertices_m)[:, :2].T
     axes.plot(x_m, y_m, **_PIPELINE, solid_capstyle="round", zorder=1.5)
     axes.set_aspect("equal")
     _draw_way(axes, record, colours, "x_m", record.trajectory["y_m"].to_numpy())
     start = record.trajectory.iloc[0]
     axes.plot(start["x_m"], start["y_m"], "o", color=style.BLACK, ms=4)
-    if battery := record.scenario.get("battery"):
+    if battery := record.settings.battery:
         axes.plot(
-            battery["station_x_m"],
-            battery["station_y_m"],
+            battery.station_x_m,
+            battery.station_y_m,
             "P",
             color=_BATTERY_COLOUR,
             ms=5,
@@ -488,9 +485,7 @@ def _draw_over_time(
 
 
 def _draw_visibility(axes: Axes, record: MissionRecord) -> None:
-    for threshold_m in record.scenario.get("reaction_metric", {}).get(
-        "visibility_thresholds_m", ()
-    ):
+    for threshold_m in record.settings.reaction_metric.visibility_thresholds_m:
         axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
     way = record.trajectory
     axes.plot(
@@ -607,7 +602,7 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
 
 def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]]:
     """Return the requested altitude above the sea bed over time, nan where there was none."""
-    follow_m = record.scenario.get("revision", {}).get("follow", {}).get("altitude_m", np.nan)
+    follow_m = record.settings.revision.follow.altitude_m
     asked: dict[str, float] = {}
     times_s, altitudes_m = [0.0], [np.nan]
     changes = [

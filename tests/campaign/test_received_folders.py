@@ -3,10 +3,14 @@ killed.
 """
 
 import json
+import math
 import os
 import random
 import shutil
 import sqlite3
+import struct
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -32,6 +36,9 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def received(finished: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished, tmp_path / "received"))
+
+
+NEW = ("campaign", "seams2023", "--runs", "1", "--managers", "none", "--quiet")
 
 
 class TestLinks:
@@ -78,6 +85,98 @@ class TestLinks:
         write_files(tmp_path, {"runs.csv": "new"})
         assert (tmp_path / "runs.csv").read_text() == "new"
         assert not (tmp_path / "runs.csv").is_symlink()
+
+
+def journal_that_removes(path: Path, database: Path) -> bytes:
+    """A rollback journal that names a file which SQLite removes when the journal is used; see
+    section 1.3 of SQLite's file format, and readSuperJournal of pager.c.
+    """
+    pages = database.stat().st_size // 4096
+    magic, name = bytes.fromhex("d9d505f920a163d7"), os.fsencode(path)
+    header = magic + struct.pack(">IIIII", 0, 7, pages, 512, 4096)
+    end = struct.pack(">II", len(name), sum(name)) + magic
+    return header.ljust(512, b"\0") + struct.pack(">I", 2**30 // 4096 + 1) + name + end
+
+
+class TestJournals:
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ["campaign", "--resume", "FOLDER"],
+            ["replay", "FOLDER"],
+            ["report", "FOLDER"],
+            ["compare", "FOLDER"],
+            ["figure", "FOLDER", "--out", "x.png"],
+            [*NEW, "--overwrite", "--out", "FOLDER"],
+        ],
+        ids=["resume", "replay", "report", "compare", "figure", "overwrite"],
+    )
+    def test_that_name_another_file_have_nothing_removed(
+        self, received, tmp_path, monkeypatch, command, words
+    ):
+        monkeypatch.chdir(tmp_path)
+        precious = tmp_path / "precious.txt"
+        precious.write_text("precious")
+        content = journal_that_removes(precious, received / "campaign.sqlite")
+        (received / "campaign.sqlite-journal").write_bytes(content)
+        done = command(*(received if word == "FOLDER" else word for word in words))
+        assert precious.read_text() == "precious"
+        is_read = words[0] in ("compare", "figure", "report") or "--overwrite" in words
+        assert done.status == (0 if is_read else 2), done.err
+
+    def test_of_a_write_that_was_killed_are_used(self, received):
+        """As a campaign leaves that was killed between the two modes of its journal."""
+        before = (received / "runs.csv").read_bytes()
+        path = received / "campaign.sqlite"
+        killed = (
+            f"import os, sqlite3; db = sqlite3.connect({str(path)!r}); db.execute('BEGIN');"
+            "db.execute('PRAGMA cache_size = 1'); db.execute('DELETE FROM outcomes');"
+            "db.execute('PRAGMA cache_spill = ON'); db.execute('CREATE TABLE x AS SELECT zeroblob(100000)');"
+            "os._exit(1)"
+        )
+        subprocess.run([sys.executable, "-c", killed], check=False)
+        assert (received / "campaign.sqlite-journal").stat().st_size > 0
+        resume_campaign(received)
+        assert (received / "runs.csv").read_bytes() == before
+
+    def test_a_folder_whose_code_is_not_trusted_stays_as_it_is(self, received, command):
+        with sqlite3.connect(received / "campaign.sqlite") as db:
+            (text,) = db.execute("SELECT value FROM about WHERE name = 'request'").fetchone()
+            request = {**json.loads(text), "managers": ["strange:Manager"]}
+            db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note("request", request))
+        db.close()
+        before = {path: path.read_bytes() for path in received.iterdir()}
+        done = command("campaign", "--resume", received)
+        assert done.status == 2 and "would run the code of strange:Manager" in done.err
+        assert {path: path.read_bytes() for path in received.iterdir()} == before
+
+
+ENDLESS = "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT x FROM n"
+
+
+class TestSchema:
+    @pytest.mark.parametrize(
+        "change",
+        [
+            f"DROP TABLE about; CREATE VIEW about AS SELECT 'identity' name, sum(x) value, 1 crc FROM ({ENDLESS})",
+            f"DROP TABLE outcomes; CREATE VIEW outcomes AS {ENDLESS}",
+            "CREATE TRIGGER t AFTER INSERT ON about BEGIN DELETE FROM outcomes; END",
+            "ALTER TABLE outcomes ADD COLUMN more",
+            "CREATE TABLE more (x)",
+            "CREATE TABLE o2 AS SELECT * FROM outcomes; DROP TABLE outcomes; ALTER TABLE o2 RENAME TO outcomes",
+        ],
+        ids=["view of about", "view of outcomes", "trigger", "column", "table", "no primary key"],
+    )
+    def test_that_is_not_ours_is_not_used(self, received, command, tmp_path, change):
+        with sqlite3.connect(received / "campaign.sqlite") as db:
+            db.executescript(change)
+        db.close()
+        with ends_within(60):
+            done = command("campaign", "--resume", received)
+            assert done.status == 2 and "is damaged" in done.err
+            for words in (["compare", received], ["figure", received, "--out", tmp_path / "x.png"]):
+                done = command(*words)
+                assert done.status == 0, done.err  # what it needs is in runs.csv
 
 
 WRONG = (
@@ -206,6 +305,34 @@ class TestDamage:
                     resume_campaign(received, runs=4)
                 except SuaveDesError as error:
                     assert len(str(error).splitlines()) == 1, name
+
+    @pytest.mark.parametrize(
+        ("key", "cell", "value"),
+        [
+            ((0, 0, 99), None, None),
+            ((0, 1, 1), None, None),
+            ((1, 0, 1), None, None),
+            ((0, 0, 1), 1, "random"),
+            ((0, 0, 1), 2, 2),
+            ((0, 0, 1), 3, 9),
+            ((0, 0, 1), 7, 1),
+            ((0, 0, 1), 8, "1.0"),
+            ((0, 0, 1), 8, math.inf),
+            ((0, 0, 1), 8, 1e30),
+        ],
+    )
+    def test_an_outcome_that_is_not_of_the_campaign_is_told(self, received, key, cell, value):
+        with sqlite3.connect(received / "campaign.sqlite") as db:
+            (content,) = db.execute("SELECT content FROM outcomes WHERE run = 1").fetchone()
+            cells = json.loads(content)
+            if cell is not None:
+                cells[cell] = value
+            text = json.dumps(cells)
+            statement = "INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, 0, ?, ?)"
+            db.execute(statement, (*key, text, _crc(*key, 0, text)))
+        db.close()
+        with pytest.raises(InputError, match="is damaged"):
+            resume_campaign(received)
 
     @pytest.mark.parametrize(
         ("damage", "told"),

@@ -196,7 +196,7 @@ class TestFigure:
     def test_damaged_files_are_named_with_line(self, command, results):
         mission, runs = results / "mission", results / "campaign" / "runs.csv"
         damages: list[tuple[Path, Callable[[str], str], str]] = [
-            (mission / "trajectory.csv", lambda text: "", "trajectory.csv: cannot be read"),
+            (mission / "trajectory.csv", lambda text: "", "trajectory.csv: t_s is missing"),
             (
                 mission / "trajectory.csv",
                 lambda text: text.replace("\n0.2,", "\ninf,"),
@@ -211,12 +211,12 @@ class TestFigure:
             (
                 mission / "mission.json",
                 lambda text: '{"metrics": {}, "scenario": {}}',
-                "is not the record",
+                "mission.json: metrics.scenario: is missing",
             ),
             (
                 mission / "mission.json",
                 lambda text: text.replace('"seed"', '"sed"', 1),
-                "seed is missing",
+                "metrics.seed: is missing",
             ),
             (runs, lambda text: "", "runs.csv: line 1: has no column"),
             (runs, lambda text: text.splitlines()[0] + "\n", "has no missions"),

@@ -2,6 +2,9 @@
 campaign.
 """
 
+import os
+import stat
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -73,3 +76,113 @@ def test_every_file_that_a_command_writes_is_known(command):
         here = (*arguments[:-1], f"{arguments[0]}-out")
         assert command(*here)[0] == 0
         assert {path.name for path in Path(here[-1]).iterdir()} <= set(FAMILIES[family])
+
+
+MINE = "mine, and of nobody else\n"
+
+
+def test_resuming_leaves_what_the_user_has_put_beside_the_exemplar_s_files(command):
+    assert command(*CAMPAIGN, "--format", "suave")[0] == 0
+    Path("out/suave/mine.csv").write_text(MINE)
+    (theirs,) = Path("out/suave").glob("none*.csv")
+    assert command("campaign", "--resume", "out")[0] == 0
+    assert Path("out/suave/mine.csv").read_text() == MINE and theirs.is_file()
+
+
+def test_resuming_leaves_an_empty_folder(command):
+    assert command(*CAMPAIGN)[0] == 0
+    Path("out/suave").mkdir()
+    assert command("campaign", "--resume", "out")[0] == 0
+    assert Path("out/suave").is_dir()
+
+
+def test_overwriting_leaves_what_only_has_the_name_of_a_result(command):
+    assert command(*CAMPAIGN, "--format", "suave")[0] == 0
+    names = ("replay.html", "report.html", "validation.csv", "suave/mine.csv", "paper_table.md")
+    for name in names:
+        Path("out", name).write_text(MINE)
+    assert command(*CAMPAIGN, "--overwrite")[0] == 0
+    assert [Path("out", name).read_text() for name in names] == [MINE] * len(names)
+    assert not list(Path("out/suave").glob("none*.csv"))
+
+
+@pytest.mark.parametrize(
+    ("first", "name"),
+    [
+        *(
+            (CAMPAIGN, name)
+            for name in ("runs.csv", "summary.csv", "ensemble.csv", "manifest.json")
+        ),
+        *((RUN, name) for name in ("mission.json", "events.csv", "knowledge.jsonl")),
+    ],
+)
+def test_overwriting_refuses_where_a_file_of_the_user_s_would_go(command, first, name):
+    assert command(*first)[0] == 0
+    content = "{}" if name.endswith("json") else MINE
+    Path("out", name).write_text(content)
+    before = files()
+    done = command(*first, "--overwrite")
+    assert done.status == 2 and f"out: has {name}, which " in done.err
+    assert files() == before
+
+
+def test_a_page_that_was_made_of_the_results_goes_with_them(command):
+    assert command(*CAMPAIGN)[0] == 0
+    assert command("replay", "out")[0] == 0
+    assert command(*CAMPAIGN, "--overwrite")[0] == 0
+    assert not Path("out/replay.html").exists()
+
+
+@pytest.mark.parametrize("name", ["trajectory.csv", "events.csv"])
+def test_a_mission_beside_files_of_another_is_told(command, name):
+    """As a kill between two renames of `run --overwrite` leaves it."""
+    assert command(*RUN)[0] == 0
+    before = Path("out", name).read_bytes()
+    assert command(*RUN, "--seed", "2", "--overwrite")[0] == 0
+    Path("out", name).write_bytes(before)
+    for words in (["figure", "out", "--out", "m.png"], ["replay", "out"]):
+        done = command(*words)
+        assert done.status == 2 and f"out/{name}: is not as mission.json beside it says" in done.err
+
+
+WRITING = {
+    "figure": ["figure", "out", "--out"],
+    "compare": ["compare", "out", "--out"],
+    "policy": ["kb", "policy", "--csv"],
+    "report": ["replay", "out", "--out"],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "ending"),
+    [("figure", ".png"), ("compare", ".csv"), ("policy", ".csv"), ("report", ".html")],
+)
+class TestFiles:
+    @pytest.fixture(autouse=True)
+    def results(self, command):
+        assert command(*CAMPAIGN)[0] == 0
+
+    def test_a_link_is_followed(self, command, name, ending):
+        Path("real").mkdir()
+        Path("real/file").write_text("old")
+        Path(f"link{ending}").symlink_to("real/file")
+        assert command(*WRITING[name], f"link{ending}")[0] == 0
+        assert Path(f"link{ending}").is_symlink()
+        assert Path("real/file").stat().st_size > 10
+
+    def test_a_pipe_is_written_into(self, command, name, ending):
+        os.mkfifo(f"pipe{ending}")
+        with subprocess.Popen(["cat", f"pipe{ending}"], stdout=subprocess.PIPE) as reader:
+            assert command(*WRITING[name], f"pipe{ending}")[0] == 0
+            assert len(reader.stdout.read()) > 10
+        assert stat.S_ISFIFO(Path(f"pipe{ending}").stat().st_mode)
+
+    def test_a_device_stays_one(self, command, name, ending):
+        Path(f"null{ending}").symlink_to(os.devnull)
+        assert command(*WRITING[name], f"null{ending}")[0] == 0
+        assert stat.S_ISCHR(Path(os.devnull).stat().st_mode)
+
+    def test_a_circle_of_links_is_told(self, command, name, ending):
+        Path(f"circle{ending}").symlink_to(f"circle{ending}")
+        done = command(*WRITING[name], f"circle{ending}")
+        assert done.status == 2 and done.err.count("\n") == 1

@@ -23,7 +23,7 @@ from suave_des.cli.kb.options import (
     state_at,
 )
 from suave_des.errors import InputError
-from suave_des.files import csv_text, write_files
+from suave_des.files import csv_text, write_file
 from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
@@ -112,7 +112,7 @@ def policy(
 
         draw_policy(found, png)
     if csv is not None:
-        write_files(csv.parent, {csv.name: found.csv()})
+        write_file(csv, found.csv())
     for name in found.functions:
         print(shown(function_table(found, name)[0]))
     print(*found.lines(), sep="\n")

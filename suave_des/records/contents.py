@@ -1,0 +1,228 @@
+"""What stands in the JSON files of results, as strict models: from these every reader gets values
+of their types, and numbers that are finite and not huge.
+
+Files may be damaged, come from elsewhere, or be made by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final, Self, TypeVar, get_type_hints
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    InstanceOf,
+    TypeAdapter,
+    ValidationError,
+    create_model,
+    model_validator,
+)
+
+from suave_des.errors import InputError
+from suave_des.files import read_json
+from suave_des.metrics.result import MissionMetrics
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.yamlfile import problem_and_remedy
+
+GREATEST: Final = 1e12
+"""Of numbers, as in scenarios."""
+_Model = TypeVar("_Model", bound=BaseModel)
+
+Number = Annotated[float, Field(ge=-GREATEST, le=GREATEST)]
+Whole = Annotated[int, Field(ge=-GREATEST, le=GREATEST)]
+Count = Annotated[int, Field(ge=0, le=GREATEST)]
+Cell = str | bool | Whole | Number | None
+"""Of a file of results."""
+FileName = InstanceOf[str]
+"""Any text, as a name's bytes may be no UTF-8."""
+
+
+class Recorded(BaseModel):
+    """A part of a file; further keys in it are left out."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+
+# Metrics
+
+_BOUNDED = {float: Number, float | None: Number | None, int: Whole}
+_METRICS: dict[str, Any] = {
+    name: _BOUNDED.get(kind, kind) for name, kind in get_type_hints(MissionMetrics).items()
+}
+_NEEDED = (
+    *("scenario", "manager", "run", "seed", "search_time_s", "pipeline_found"),
+    *("detection_x_m", "detection_y_m"),
+)
+"""Metrics that every mission.json has."""
+
+
+class _Metrics(Recorded):
+    """A row of runs.csv by column: those of every mission with their types, and other cells."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Cell]
+
+
+_FIELDS: dict[str, Any] = {
+    name: (kind, ... if name in _NEEDED else None) for name, kind in _METRICS.items()
+}
+Metrics: Any = create_model("Metrics", __base__=_Metrics, **_FIELDS)
+_tuple_of: Any = tuple.__class_getitem__
+_OWN_CELLS: TypeAdapter[tuple[Cell, ...]] = TypeAdapter(
+    _tuple_of(tuple(_METRICS.values())), config=Recorded.model_config
+)
+_FURTHER_CELLS: TypeAdapter[list[Cell]] = TypeAdapter(list[Cell], config=Recorded.model_config)
+_FAILURE: TypeAdapter[tuple[str, int, float | None, str, bool, int]] = TypeAdapter(
+    tuple[str, Whole, Number | None, str, bool, Whole], config=Recorded.model_config
+)
+
+
+def row_of(cells: list[Any]) -> tuple[Cell, ...]:
+    """Check the cells of a row of runs.csv, with what a campaign keeps besides; a ValueError if
+    one has another type.
+    """
+    own = tuple(cells[: len(_METRICS)])
+    return *_OWN_CELLS.validate_python(own), *_FURTHER_CELLS.validate_python(cells[len(own) :])
+
+
+def failure_of(cells: list[Any]) -> tuple[str, int, float | None, str, bool, int]:
+    """Check what a campaign keeps of a mission that failed; a ValueError likewise."""
+    return _FAILURE.validate_python(tuple(cells))
+
+
+class MissionFile(Recorded):
+    """mission.json."""
+
+    metrics: Metrics
+    scenario: Scenario
+    inputs_sha256: dict[FileName, str] = {}
+    search_altitudes_m: dict[str, Number] = {}
+    files_sha256: dict[FileName, str] = {}
+
+
+# Knowledge
+
+
+class State(Recorded):
+    """A state of knowledge without its measured values; objectives by function, status and whether
+    they are always improved.
+    """
+
+    objectives: list[Annotated[tuple[str, str | None, bool], Field(strict=False)]]
+    groundings: dict[str, str]
+    components: dict[str, str]
+
+
+class Cycle(State):
+    """A line of knowledge.jsonl; measured values are text, so that they stay exact."""
+
+    t_s: Number
+    measurements: dict[str, str]
+
+
+class ScenarioLine(Recorded):
+    """The first line of knowledge_states.jsonl."""
+
+    scenario: dict[str, Any]
+
+
+class StateOfTable(State):
+    """A state, with the names of what was measured."""
+
+    measured: list[str]
+
+
+class MissionLine(Recorded):
+    """Another line of it: a mission's states, and its cycles, each with its time, the number of its
+    state, and the measured values.
+    """
+
+    manager: str
+    point: Count
+    run: Count
+    swept: dict[str, Any]
+    states: list[StateOfTable]
+    cycles: list[list[str | int | Number]]
+
+    @model_validator(mode="after")
+    def _fit(self) -> Self:
+        for t_s, index, *values in self.cycles:
+            is_there = isinstance(index, int) and 0 <= index < len(self.states)
+            if isinstance(t_s, str) or not is_there:
+                raise ValueError("a cycle has no time, or none of the states")
+            if len(values) != len(self.states[int(index)].measured) or not all(
+                isinstance(value, str) for value in values
+            ):
+                raise ValueError("a cycle has other values than its state")
+        return self
+
+
+# Campaigns
+
+
+class Missions(Recorded):
+    """How many missions a campaign has."""
+
+    planned: Count
+    failed: Count
+    left_out: Count
+
+
+class Sample(Recorded):
+    """What a sweep samples."""
+
+    ranges: dict[str, Any] = {}
+
+
+class Sweep(Recorded):
+    """What a sweep varies, by name."""
+
+    grid: dict[str, Any] = {}
+    zip: dict[str, Any] = {}
+    sample: Sample | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that it varies."""
+        return (*self.grid, *self.zip, *(self.sample.ranges if self.sample else ()))
+
+
+class Manifest(Recorded):
+    """manifest.json; all keys may be missing, as in a folder without one."""
+
+    missions: Missions | None = None
+    sweep: Sweep = Sweep()
+    perturbations: dict[str, Any] = {}
+    runs_per_draw: Annotated[int, Field(ge=1, le=GREATEST)] = 1
+    campaign_sha256: str | None = None
+    command: list[FileName] = []
+
+
+# Reading
+
+
+def checked(model: type[_Model], content: Any, file: Path, remedy: str, place: str = "") -> _Model:
+    """Check what was read from a JSON file, or from a place in it.
+
+    Raises:
+        InputError: a value is missing, or of another type.
+    """
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        data = dict(content) if isinstance(content, Mapping) else {}
+        keys, problem, _ = problem_and_remedy(error, data, model)
+        where = ": ".join(filter(None, (place, ".".join(map(str, keys)))))
+        raise InputError(problem, file=file, place=where or None, remedy=remedy) from None
+
+
+def read(model: type[_Model], file: Path, remedy: str) -> _Model:
+    """Read a JSON file.
+
+    Raises:
+        InputError: it cannot be read, is no JSON, or as of checked.
+    """
+    return checked(model, read_json(file), file, remedy)
