@@ -10,6 +10,7 @@ import pytest
 
 from suave_des import Mission, load_scenario
 from suave_des.errors import InputError
+from suave_des.files import write_files
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records import mission_folder
@@ -57,8 +58,7 @@ def result():
 
 @pytest.fixture
 def folder(result, loaded, tmp_path: Path) -> Path:
-    for name, text in mission_files(result, loaded, {"own.py": "abc"}, ("run",)).items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+    write_files(tmp_path, mission_files(result, loaded, {"own.py": "abc"}, ("run",)))
     return tmp_path
 
 
