@@ -119,7 +119,7 @@ def _each_second(
     state: Callable[[], Pose | float],
 ) -> Process:
     if env.now != (second := ceil(env.now)):
-        yield exactly_at(env, second)
+        yield exactly_at(env, float(second))
     while True:
         bus.publish(Diagnostic(env.now, kind, key, state()))
         yield env.timeout(1.0)

@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des import InputError, Mission
+from suave_des.simulation.simulator import Simulator
 
 SEARCH = "f_generate_search_path"
 
@@ -77,3 +78,50 @@ def test_it_does_not_go_back(simulator, until):
     mission.advance(5.0)
     with pytest.raises(InputError, match="cannot go to"):
         mission.advance(until)
+
+
+def close_after(simulator: Simulator, t_s: float | None) -> Mission:
+    """A mission that is closed at a time; None: when it has its result."""
+    mission = Mission(simulator)
+    if t_s is None:
+        mission.result()
+    else:
+        mission.advance(t_s)
+    mission.close()
+    return mission
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda mission: mission.advance(9.0),
+        lambda mission: mission.result(),
+        lambda mission: mission.change_mode(SEARCH, "fd_spiral_high"),
+        lambda mission: mission.pose,
+        lambda mission: mission.way_m(),
+    ],
+    ids=["advance", "result", "change_mode", "pose", "way_m"],
+)
+def test_what_a_closed_mission_cannot_do_says_that_it_is_closed(simulator, use):
+    with pytest.raises(InputError, match="the mission is closed"):
+        use(close_after(simulator, 5.0))
+
+
+def test_what_does_not_need_the_vehicles_way_can_be_read_after_closing(simulator):
+    still, closed = Mission(simulator), close_after(simulator, 50.0)
+    still.advance(50.0)
+    assert closed.metrics() == still.metrics()
+    assert (closed.now_s, closed.task, closed.modes) == (50.0, still.task, still.modes)
+    assert closed.current_mode(SEARCH) == still.current_mode(SEARCH)
+
+
+def test_a_result_can_be_read_after_closing(simulator):
+    assert close_after(simulator, None).result() == Mission(simulator).result()
+
+
+def test_the_memory_of_a_closed_mission_is_that_of_the_next_one_only(simulator):
+    first = close_after(simulator, 5.0)
+    first.close()
+    second, third = Mission(simulator), Mission(simulator)
+    assert second._vehicle.track is first._vehicle.track
+    assert third._vehicle.track is not second._vehicle.track

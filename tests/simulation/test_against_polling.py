@@ -122,22 +122,30 @@ def test_missions_are_those_in_which_all_is_polled(name, condition, manager):
     assert_same(simulator(name, condition), manager, run)
 
 
-@given(
-    name=st.sampled_from(["release15", "seams2023"]),  # their visibility has a period
-    manager=st.sampled_from([*MANAGERS, Restless]),
-    run=st.integers(1, 10**6),
-    loss=st.sampled_from([0.0, 0.0, 0.1, 0.6]),
-    period_s=st.floats(10.0, 120.0),
-    latency_s=st.floats(0.0, 3.0),
-    failures_s=st.lists(st.floats(0.0, 100.0), max_size=4),
-    poll_s=st.sampled_from([0.1, 0.2, 0.37, 2.0]),
-    error_m=st.floats(-0.2, 1.0),
-    slower=st.floats(0.0, 1.0),
-)
-@settings(max_examples=12)
-def test_missions_are_those_in_which_all_is_polled_whatever_the_scenario(
-    name, manager, run, loss, period_s, latency_s, failures_s, poll_s, error_m, slower
-):
+ON_TICKS = st.integers(0, 400).map(lambda n: 0.25 * n)
+SCENARIOS = {
+    "name": st.sampled_from(["release15", "seams2023"]),  # their visibility has a period
+    "manager": st.sampled_from([*MANAGERS, Restless]),
+    "run": st.integers(1, 10**6),
+    "loss": st.sampled_from([0.0, 0.0, 0.1, 0.6]),
+    "period_s": st.floats(10.0, 120.0),
+    "latency_s": st.floats(0.0, 3.0) | ON_TICKS.map(lambda t_s: t_s / 100.0),
+    "failures": st.lists(
+        st.tuples(st.floats(0.0, 100.0) | ON_TICKS, st.sampled_from(["frozen", "dead"])), max_size=4
+    ),
+    "poll_s": st.sampled_from([0.1, 0.2, 0.25, 0.37, 1.0, 2.0]),
+    "error_m": st.floats(-0.2, 1.0),
+    "slower": st.floats(0.0, 1.0),
+}
+
+
+def assert_polled(
+    name, manager, run, loss, period_s, latency_s, failures, poll_s, error_m, slower
+) -> None:
+    events = [
+        {"thruster": 1 + number, "event": "failure", "time_s": t_s, "failure_mode": mode}
+        for number, (t_s, mode) in enumerate(failures)
+    ]
     values = {
         "revision.set_points.loss_probability": loss,
         "revision.follow.poll_period_s": poll_s,
@@ -145,9 +153,22 @@ def test_missions_are_those_in_which_all_is_polled_whatever_the_scenario(
         "latencies.mode_change_s": latency_s,
         "calibration.altitude_error_m": error_m,
         "calibration.real_time_factor_loss": slower,
-        **faults(*((1 + number, "failure", t_s) for number, t_s in enumerate(failures_s))),
+        "thruster_events": events,
     }
     assert_same(Simulator(with_values(LOADED[name], values)), manager, run)
+
+
+@given(**SCENARIOS)
+@settings(max_examples=12)
+def test_missions_are_those_in_which_all_is_polled_whatever_the_scenario(**scenario):
+    assert_polled(**scenario)
+
+
+@pytest.mark.slow
+@given(**SCENARIOS)
+@settings(max_examples=2000)
+def test_missions_of_many_scenarios_are_those_in_which_all_is_polled(**scenario):
+    assert_polled(**scenario)
 
 
 def test_set_points_may_be_sent_more_often_than_there_are_way_points_left():

@@ -1,11 +1,20 @@
 """Named random streams, and the clock's ticks."""
 
+import math
+
 import pytest
 import simpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.clock import Alarm, call_next, tick_at_or_after
+from suave_des.clock import (
+    Alarm,
+    MissionEnvironment,
+    call_next,
+    exactly_at,
+    tick_at_or_after,
+    until,
+)
 from suave_des.draws import Streams
 
 names = st.text(min_size=1, max_size=20)
@@ -85,3 +94,58 @@ def test_a_call_next_comes_before_all_else_of_its_time_but_not_at_once():
     Alarm(env, lambda: called.append((env.now, "second"))).set(4.0)
     env.run()
     assert called == [(4.0, "first"), (4.0, "next"), (4.0, "second")]
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    "schedule",
+    [
+        lambda env: env.timeout(NAN),
+        lambda env: env.schedule(env.event(), delay=NAN),
+        lambda env: exactly_at(env, NAN),
+        lambda env: until(env, NAN),
+    ],
+    ids=["timeout", "schedule", "exactly_at", "until"],
+)
+def test_a_time_that_is_not_a_number_is_refused_where_it_is_given(schedule):
+    env = MissionEnvironment()
+    with pytest.raises(ValueError, match="is nan"):
+        schedule(env)
+    assert env.peek() == math.inf
+
+
+def test_the_environment_flies_to_each_event_before_it_is_processed():
+    env, happened = MissionEnvironment(), []
+    env.fly_to = lambda t_s: happened.append(("flies", t_s))
+    for t_s in (2.0, 5.0, 5.0):
+        env.timeout(t_s).callbacks.append(lambda _: happened.append(("event", env.now)))
+    env.run()
+    two, five = 2.0, 5.0
+    assert happened == [
+        *[("flies", two), ("event", two), ("flies", five), ("event", five), ("event", five)]
+    ]
+
+
+def test_what_a_flight_brings_about_is_processed_before_the_event_it_flew_to():
+    env, happened = MissionEnvironment(), []
+
+    def fly_to(t_s: float) -> None:
+        if not happened and env.now < 3.0 < t_s:
+            exactly_at(env, 3.0).callbacks.append(lambda _: happened.append(env.now))
+
+    env.fly_to = fly_to
+    env.timeout(7.0).callbacks.append(lambda _: happened.append(env.now))
+    env.advance(8.0)
+    assert happened == [3.0, 7.0]
+    assert env.now == 8.0
+
+
+def test_advancing_stops_before_the_events_of_its_end():
+    env, happened = MissionEnvironment(), []
+    env.timeout(4.0).callbacks.append(lambda _: happened.append(env.now))
+    env.advance(4.0)
+    assert (env.now, happened) == (4.0, [])
+    env.advance(4.1)
+    assert happened == [4.0]
