@@ -5,7 +5,7 @@ decided.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -28,7 +28,7 @@ from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.state import Reasoning
+    from suave_des.knowledge.state import Fact, Reasoning
 
 
 TableFormat = Literal["text", "csv", "json"]
@@ -37,10 +37,12 @@ TableFormat = Literal["text", "csv", "json"]
 def infer(options: ReasonerOptions, at: At = None) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     knowledge = options.knowledge()
-    print(*_inference_lines(knowledge.infer(state_at(at, knowledge))), sep="\n")
+    state = state_at(at, knowledge)
+    lines = _inference_lines(knowledge.infer(state), knowledge.identities(state))
+    print(*lines, sep="\n")
 
 
-def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
+def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterator[str]:
     state, decisions = reasoning.inference.state, reasoning.plan.decisions
     yield "state"
     for objective in state.objectives:
@@ -54,7 +56,8 @@ def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
     for kind, pairs in parts.items():
         yield from (f"  {kind:<10}  {name} = {value}" for name, value in pairs)
     yield "inferred"
-    yield from (f"  {fact}" for fact in sorted(map(str, reasoning.inference.facts)) or ["nothing"])
+    facts = sorted(map(str, (*reasoning.inference.facts, *identities)))
+    yield from (f"  {fact}" for fact in facts or ["nothing"])
     yield "plan"
     if not decisions:
         yield "  nothing to adapt"

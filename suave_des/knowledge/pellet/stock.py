@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -47,8 +47,11 @@ class StockPellet:
     """
 
     def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
-        self._text = ontology.content.n_triples()
-        self._properties, self._classes = terms or ontology.content.decision_terms()
+        content = ontology.content
+        self._text = content.n_triples()
+        self._joined = content.joined_by_rules().n_triples() if content.given_back else ""
+        self._given_back = content.given_back
+        self._properties, self._classes = terms or content.decision_terms()
 
     def infer(
         self, assertions: Sequence[Triple], limit_s: float | None = None
@@ -56,9 +59,27 @@ class StockPellet:
         """Return the values and members of the properties and classes to read; None for a
         contradiction.
 
+        What must be given back (see Content) is, until nothing new follows.
+
         Raises:
             TimeoutError: it took longer than the limit; its Java process is ended.
         """
+        more = frozenset[Triple]()
+        while True:
+            if self._joined:
+                found, following = self._infer(self._joined, (*assertions, *sorted(more)), limit_s)
+                if found is None:
+                    return None
+                more |= following
+            found, following = self._infer(self._text, (*assertions, *sorted(more)), limit_s)
+            if following <= more:
+                return found
+            more |= following
+
+    def _infer(
+        self, text: str, assertions: Sequence[Triple], limit_s: float | None
+    ) -> tuple[frozenset[Triple] | None, frozenset[Triple]]:
+        """One run: what follows of the terms to read, and of the properties to give back."""
         # owlready2 passes these on to subprocess.run, and has no other parameter for it.
         owlready2.reasoning._subprocess_kargs.update(timeout=limit_s, env=launcher_environment())
         owlready2.JAVA_EXE = str(java_executable())
@@ -69,29 +90,32 @@ class StockPellet:
                 for each in assertions
                 if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"
             ]
-            text = self._text + "".join(
-                n_triple(triple) for triple in assertions if triple not in numbers
-            )
+            text += "".join(n_triple(triple) for triple in assertions if triple not in numbers)
             ontology = world.get_ontology(_STATE_IRI).load(
                 fileobj=io.BytesIO(text.encode()), only_local=True
             )
             for triple in numbers:
                 _add_exactly(world, ontology, triple)
             if not _reason(world):
-                return None
-            return frozenset(self._read(world)).difference(map(_as_float, numbers)).union(numbers)
+                return None, frozenset()
+            found = frozenset(self._read(world)).difference(map(_as_float, numbers)).union(numbers)
+            return found, frozenset(_values(world.as_rdflib_graph(), self._given_back))
         finally:
             world.close()
 
     def _read(self, world: Any) -> Iterator[Triple]:
         graph = world.as_rdflib_graph()
-        for name in self._properties:
-            for subject, _, value in graph.triples((None, URIRef(name), None)):
-                yield str(subject), name, _value(value)
+        yield from _values(graph, self._properties)
         for name in self._classes:
             for kind in _below(graph, name):
                 for subject in graph.subjects(RDF.type, kind):
                     yield str(subject), RDF_TYPE, name
+
+
+def _values(graph: Any, properties: Iterable[str]) -> Iterator[Triple]:
+    for name in properties:
+        for subject, _, value in graph.triples((None, URIRef(name), None)):
+            yield str(subject), name, _value(value)
 
 
 def _value(term: Node) -> str | Lit:
