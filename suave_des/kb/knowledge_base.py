@@ -235,8 +235,7 @@ class KnowledgeBase:
         )
 
     def identities(self, state: KnowledgeState) -> tuple[Fact, ...]:
-        """Infer which individuals are the same, and which are different, where rules conclude it;
-        each pair once, and no other fact says it.
+        """Infer which individuals are the same, and which are different, by rules; each pair once.
 
         Raises:
             KnowledgeError: as infer.
@@ -245,12 +244,15 @@ class KnowledgeBase:
         if not any(atom.predicate in IDENTITIES for atom in heads):
             return ()
         given = self.base.assertions(state)
-        asserted = {*given, *self.base.content.triples}
-        found = self.limit.run(lambda: self._tracing_pellet.identities(given), reasoning_on(state))
+
+        def by_rules() -> set[Triple]:
+            without = InProcessPellet(self.base.with_rules(()), self.base.content.all_terms())
+            return self._tracing_pellet.identities(given) - without.identities(given)
+
+        found = self.limit.run(by_rules, reasoning_on(state))
         pairs = {(*sorted((one, str(other))), name) for one, name, other in found if one != other}
-        told = {(one, name, other) for one, other, name in pairs} - asserted
-        told = {each for each in told if (each[2], each[1], each[0]) not in asserted}
-        return tuple(sorted((fact_of(each, self.base.names) for each in told), key=str))
+        facts = (fact_of((one, name, other), self.base.names) for one, other, name in pairs)
+        return tuple(sorted(facts, key=str))
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Explain why a fact or a decision follows in a state.

@@ -457,8 +457,9 @@ class RulesFile:
         """
         for error in self.errors:
             raise error
-        found = (looked_up(rule, vocabulary) for rule in self.parsed)
-        return tuple(check_rule(rule, vocabulary) if rule.enabled else rule for rule in found)
+        found = [looked_up(rule, vocabulary) for rule in self.parsed]
+        known = vocabulary.with_rules(found)  # one may conclude what another asks for
+        return tuple(check_rule(rule, known) if rule.enabled else rule for rule in found)
 
 
 def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
