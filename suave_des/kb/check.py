@@ -27,6 +27,7 @@ from suave_des.errors import (
 )
 from suave_des.kb.space import PolicySpace
 from suave_des.kb.states import ManagingSettings
+from suave_des.knowledge import rdf
 from suave_des.knowledge.checks import (
     Subject,
     check_revision,
@@ -37,9 +38,11 @@ from suave_des.knowledge.checks import (
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, place_of
 from suave_des.knowledge.pellet import TimeLimit
-from suave_des.knowledge.rdf import HAS_VALUE, local_name
+from suave_des.knowledge.pellet.in_process import pattern_problem
+from suave_des.knowledge.rdf import HAS_VALUE, Lit, local_name
 from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.resolver import collect
+from suave_des.knowledge.rules.files import about_rule
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState, measurement_name
 from suave_des.monitor.diagnostics import RECOVERED
 from suave_des.resources import shipped_folder
@@ -77,7 +80,23 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         is_known = has_level(findings, Level.ERROR)
         return ordered([*findings, Finding(Level.NOTE, message) if is_known else Finding.of(error)])
     findings = [*findings_in(base, subject), *check_shapes(base.sources)]
-    return ordered([*findings, *_ask_pellet(subject, base, findings)])
+    return ordered([*findings, *_wrong_patterns(base), *_ask_pellet(subject, base, findings)])
+
+
+_PATTERN: Final = {
+    rdf.SWRLB + name: place for name, place in (("matches", 1), ("replace", 2), ("tokenize", 2))
+}
+
+
+def _wrong_patterns(base: Ontology) -> Iterator[Finding]:
+    """Find the patterns in rules that are none for Java, so that they match nothing."""
+    for rule in base.content.enabled_rules:
+        for atom in rule.body:
+            number = _PATTERN.get(atom.predicate, len(atom.arguments))
+            pattern = next(iter(atom.arguments[number : number + 1]), None)
+            if isinstance(pattern, Lit) and (problem := pattern_problem(pattern.text)):
+                words = f"{pattern.text!r} is not a pattern, and matches nothing: {problem}"
+                yield about_rule(rule, words, atom.place(number), None, Level.WARN)
 
 
 def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> Iterator[Finding]:

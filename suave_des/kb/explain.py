@@ -1,7 +1,8 @@
 """Explain why a fact follows, why a rule does not fire, and why a function design is chosen or not.
 
 All facts in a derivation are Pellet's, and so is what its built-ins say of their values. Where a
-fact follows in several ways, the first one is shown, by the rule's name and then by the bindings.
+fact follows in several ways, the shortest one is shown, and of those the first by the rule's name
+and then by the bindings.
 Pellet's own tracing picks another one each time, and is asked only where neither a rule nor a
 single fact suffices.
 
@@ -19,14 +20,15 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb import matching
-from suave_des.kb.matching import FACT_KINDS, Binding, Bound, Facts, bound, with_bindings
+from suave_des.kb.matching import Binding, Bound, Facts, bound, with_bindings
 from suave_des.kb.states import FactReader
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology
 from suave_des.knowledge.pellet.in_process import (
     InProcessPellet,
+    dropped_rules,
     entailed,
     one_at_a_time,
     trace_contradiction,
@@ -35,6 +37,7 @@ from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import (
     COMPARISONS,
+    FACT_KINDS,
     IDENTITIES,
     Atom,
     AtomKind,
@@ -43,7 +46,7 @@ from suave_des.knowledge.rules import (
     write_atom,
     write_term,
 )
-from suave_des.knowledge.rules.files import fatal_problems
+from suave_des.knowledge.rules.files import fatal_problems, rule_problems
 from suave_des.knowledge.state import (
     ContradictionError,
     Decision,
@@ -78,8 +81,11 @@ class Derivation:
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
-    def lines(self, indent: str = "") -> Iterator[str]:
-        """The fact and how it follows, and below it, indented, the facts that it follows from."""
+    def lines(self, indent: str = "", told: set[Fact] | None = None) -> Iterator[str]:
+        """The fact and how it follows, and below it, indented, the facts that it follows from;
+        what was told above is not told again.
+        """
+        told = set() if told is None else told
         how = {
             "rule": f"by rule {self.rule}{with_bindings(self.bindings)}",
             "axioms": f"by the schema: {'; '.join(self.axioms)}"
@@ -88,14 +94,20 @@ class Derivation:
             "state": "given in the state",
             "ontology": "asserted in the ontology",
         }[self.source]
-        yield f"{indent}{self.fact}  [{how}]"
-        for premise in self.premises:
-            yield from premise.lines(indent + "  ")
+        is_told = bool(self.premises) and self.fact in told
+        told.add(self.fact)
+        yield f"{indent}{self.fact}  [{how}{'; see above' if is_told else ''}]"
+        for premise in () if is_told else self.premises:
+            yield from premise.lines(indent + "  ", told)
 
     def rules(self) -> frozenset[str]:
         """Names of all rules in it."""
-        own = frozenset[str]() if self.rule is None else frozenset({self.rule})
-        return own.union(*(premise.rules() for premise in self.premises))
+        waiting, seen = [self], {id(self): self}
+        for each in waiting:  # grows meanwhile, by premises that several may share
+            new = {id(one): one for one in each.premises if id(one) not in seen}
+            seen |= new
+            waiting += new.values()
+        return frozenset(each.rule for each in waiting if each.rule is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +115,7 @@ class Tracer:
     """Derives the facts of one state.
 
     Attributes:
-        pellet: has the ontologies, and reads all terms.
+        pellet: matching.tracing_pellet of the ontologies.
     """
 
     base: Ontology
@@ -111,6 +123,8 @@ class Tracer:
     pellet: InProcessPellet = field(repr=False)
     _steps: dict[object, frozenset[Triple]] = field(default_factory=dict, repr=False)
     _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
+    _ways: dict[Triple, list[_Way]] = field(default_factory=dict, repr=False)
+    _asked: set[Triple] = field(default_factory=set, repr=False)
 
     @cached_property
     def asserted(self) -> frozenset[Triple]:
@@ -130,9 +144,16 @@ class Tracer:
             for rule in self.base.content.enabled_rules
             for atom in rule.atoms
         )
-        return self.pellet.infer(given).union(
-            self.asserted, self.pellet.identities(given) if asks else ()
-        )
+        return self._told[0].union(self.asserted, self.pellet.identities(given) if asks else ())
+
+    @cached_property
+    def holding(self) -> frozenset[int]:
+        """The numbers of the bodies that hold, of those that Pellet was asked for."""
+        return self._told[1]
+
+    @cached_property
+    def _told(self) -> tuple[frozenset[Triple], frozenset[int]]:
+        return matching.told_of(self.base, self.pellet.infer(self.base.assertions(self.state)))
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
@@ -164,8 +185,12 @@ class Tracer:
     def derive(self, triple: Triple) -> Derivation:
         """Derive a triple that is entailed."""
         with one_at_a_time:
-            found = self._derive(canonical_triple(triple), frozenset())
-            return found or self._by_all(triple)
+            wanted = canonical_triple(triple)
+            self._collect(wanted)
+            while wanted not in self._found:
+                if not (self._step() or self._ask_schema() or self._ask_axioms()):
+                    return self._by_all(triple)
+            return self._found[wanted]
 
     def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
@@ -181,26 +206,26 @@ class Tracer:
                     facts = tuple(map(self._fact, sorted(concluded, key=str)))
                     yield matching.shown_bindings(binding, self.base.names), facts
 
-    def _derive(self, triple: Triple, above: frozenset[Triple]) -> Derivation | None:
-        """The first tree for a triple that does not depend on itself or on what is above it; None
-        if there is none.
+    def _collect(self, wanted: Triple) -> None:
+        """Find all ways in which rules conclude a fact, and what they conclude it from, and so
+        on.
         """
-        if triple in self._leaves:
-            is_of_state = self._leaves[triple] in self.base.assertions(self.state)
-            return Derivation(
-                self._fact(self._leaves[triple]), "state" if is_of_state else "ontology"
-            )
-        if triple not in self._found:
-            inside = above | {triple}
-            derivation = next(self._by_rules(triple, inside), None) or next(
-                self._by_schema(triple, inside), None
-            )
-            if derivation is None:
-                return None
-            self._found[triple] = derivation
-        return self._found[triple]
+        waiting = [wanted]
+        while waiting:
+            triple = waiting.pop()
+            if triple in self._found or triple in self._ways:
+                continue
+            if triple in self._leaves:
+                leaf = self._leaves[triple]
+                source = "state" if leaf in self.base.assertions(self.state) else "ontology"
+                self._found[triple] = Derivation(self._fact(leaf), source)
+            elif _is_expression(triple):
+                self._found[triple] = Derivation(self._fact(triple), "axioms")
+            else:
+                self._ways[triple] = list(self._ways_of(triple))
+                waiting += (each for way in self._ways[triple] for each in way.body)
 
-    def _by_rules(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
+    def _ways_of(self, triple: Triple) -> Iterator[_Way]:
         for rule in self.base.content.enabled_rules:
             starts = (
                 matching.matched(atom, each, {})
@@ -210,50 +235,81 @@ class Tracer:
             for start in (each for each in starts if each is not None):
                 for binding in matching.matches(rule, self._facts, start):
                     said = (matching.stated(atom, binding) for atom in rule.body)
-                    body = dict.fromkeys(
-                        canonical_triple(each) for each in said if each is not None
-                    )
-                    if above.isdisjoint(body):
-                        premises = tuple(
-                            found
-                            for each in body
-                            if (found := self._derive(each, above)) is not None
-                        )
-                        if len(premises) == len(body):
-                            bindings = matching.shown_bindings(binding, self.base.names)
-                            yield Derivation(
-                                self._fact(triple), "rule", rule.name, bindings, premises=premises
-                            )
+                    body = dict.fromkeys(canonical_triple(one) for one in said if one is not None)
+                    bindings = matching.shown_bindings(binding, self.base.names)
+                    yield _Way(tuple(body), rule.name, bindings)
+
+    def _step(self) -> bool:
+        """Derive all facts that follow from those derived so far; each depends on no later one.
+
+        Returns:
+            whether there was any.
+        """
+        new: dict[Triple, _Way] = {}
+        for triple, ways in self._ways.items():
+            if triple not in self._found:
+                ready = [way for way in ways if all(one in self._found for one in way.body)]
+                if ready:
+                    new[triple] = ready[0]
+        for triple, way in sorted(new.items(), key=lambda each: str(each[0])):
+            premises = tuple(self._found[each] for each in way.body)
+            fact, axioms = self._fact(triple), tuple[str, ...]()
+            if way.rule is None:
+                axioms = self._axioms(triple, way.body)
+            source = "axioms" if way.rule is None else "rule"
+            new_one = Derivation(fact, source, way.rule, way.bindings, axioms, premises)
+            self._found[triple] = new_one
+        return bool(new)
+
+    @property
+    def _open(self) -> list[Triple]:
+        """What is wanted and has not been derived yet."""
+        return sorted((each for each in self._ways if each not in self._found), key=str)
+
+    def _ask_schema(self) -> bool:
+        """Find of what is still open what follows from one other fact about the same thing: a class
+        by a domain, an inverse, a sub-property.
+
+        Returns:
+            whether there is a new way.
+        """
+        is_new = False
+        for triple in self._open:
+            if triple in self._asked:
+                continue
+            self._asked.add(triple)
+            if triple[1] in IDENTITIES:  # they follow from all that is asserted
+                self._found[triple] = self._by_all(triple)
+                return True
+            asked = _asked_of(triple)
+            for other in self.known:
+                about_same = {triple[0], triple[2]} & {other[0], other[2]}
+                if not about_same or other == triple or _is_expression(other):
+                    continue
+                if triple in self._concluded(other, asked):
+                    self._ways[triple].append(_Way((other,)))
+                    self._collect(other)
+                    is_new = True
+        return is_new
+
+    def _ask_axioms(self) -> bool:
+        """Derive what of the rest follows by axioms from several facts: of a transitive property.
+
+        Returns:
+            whether there was any.
+        """
+        told = [each for each in (*self._leaves.values(), *self._found) if not _is_expression(each)]
+        rest = self._open
+        follows = entailed(self._text(told, ()), list(map(_asked_of, rest)))
+        for triple in set(rest).intersection(map(canonical_triple, follows)):
+            axioms = self._axioms(triple, told)
+            self._found[triple] = Derivation(self._fact(triple), "axioms", axioms=axioms)
+        return len(self._open) < len(rest)
 
     def _by_all(self, triple: Triple) -> Derivation:
         """The axioms that Pellet says that a triple follows from, without the steps between."""
         axioms = self._axioms(triple, self.asserted, self.base.content.enabled_rules)
         return Derivation(self._fact(triple), "axioms", axioms=axioms)
-
-    def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
-        """What follows from one other fact about the same thing: a class by a domain, an inverse, a
-        sub-property.
-        """
-        if triple[1] in IDENTITIES:  # they follow from all that is asserted
-            yield self._by_all(triple)
-            return
-        kind: AtomKind = (
-            "class"
-            if triple[1] == rdf.RDF_TYPE
-            else "data"
-            if isinstance(triple[2], Lit)
-            else "object"
-        )
-        asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
-        for other in self.known:
-            about_same = {triple[0], triple[2]} & {other[0], other[2]}
-            if about_same and other not in above and triple in self._concluded(other, asked):
-                premise = self._derive(other, above)
-                if premise is not None:
-                    axioms = self._axioms(triple, [other])
-                    yield Derivation(
-                        self._fact(triple), "axioms", premises=(premise,), axioms=axioms
-                    )
 
     def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
         """What Pellet says of the property or class of an atom, from a fact and the schema
@@ -289,6 +345,27 @@ class Tracer:
 
     def _fact(self, triple: Triple) -> Fact:
         return rdf.fact_of(triple, self.base.names)
+
+
+class _Way(NamedTuple):
+    """A way in which a fact follows from others: by a rule, or by axioms."""
+
+    body: tuple[Triple, ...]
+    rule: str | None = None
+    bindings: Bound = ()
+
+
+def _is_expression(triple: Triple) -> bool:
+    """Whether a triple says that something is a member of a class expression."""
+    return triple[1] == rdf.RDF_TYPE and str(triple[2]).startswith("_:")
+
+
+def _asked_of(triple: Triple) -> Atom:
+    """An atom that asks for the class or property of a triple."""
+    kind: AtomKind = "data" if isinstance(triple[2], Lit) else "object"
+    if triple[1] == rdf.RDF_TYPE:
+        return Atom("class", str(triple[2]), ())
+    return Atom(kind, triple[1], ())
 
 
 def _is_told(triple: Triple) -> bool:
@@ -380,7 +457,9 @@ class RuleQuestions:
     """
 
     base: Ontology
-    _facts: dict[KnowledgeState, Facts | str] = field(default_factory=dict, repr=False)
+    _facts: dict[KnowledgeState, tuple[Facts, frozenset[Rule]] | str] = field(
+        default_factory=dict, repr=False
+    )
 
     def why_not(self, name: str, state: KnowledgeState) -> WhyNot:
         """Say why a rule does not fire in a state.
@@ -403,17 +482,29 @@ class RuleQuestions:
         if not rule.enabled:
             answer = f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
             return WhyNot(rule.name, answer)
-        for problem in fatal_problems(rule, self.base.vocabulary):
-            remedy = f"; {problem.remedy}" if problem.remedy else ""
-            return WhyNot(rule.name, f"never fires: {problem.message}{remedy}")
-        facts = self._known(state)
-        if isinstance(facts, str):
-            return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
+        problems = rule_problems(rule, self.base.vocabulary)
+        never = [
+            f"never fires: {each.message}" + (f"; {each.remedy}" if each.remedy else "")
+            for each in problems
+        ]
+        if rule not in self._usable.rules:
+            return WhyNot(rule.name, next(iter(never), f"never fires: {self._dropped[rule]}"))
+        known = self._known(state)
+        if isinstance(known, str):
+            return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {known}")
+        facts, firing = known
+        fires = rule in firing
+        for answer in never if not fires else ():
+            return WhyNot(rule.name, answer)
         binding, failing = matching.nearest_match(rule, facts, start)
+        if fires and (not failing or not start):
+            shown_bindings = matching.shown_bindings({} if failing else binding, self.base.names)
+            said = ", ".join(self._concluded(atom, dict(binding)) for atom in rule.head)
+            words = f"it fires{with_bindings(shown_bindings)}, and concludes {said}"
+            return WhyNot(rule.name, words, fires=True)
         if not failing:
-            bindings = with_bindings(matching.shown_bindings(binding, self.base.names))
-            said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
-            return WhyNot(rule.name, f"it fires{bindings}, and concludes {said}", fires=True)
+            words = "it does not fire, though each atom of its body holds"
+            return WhyNot(rule.name, words, failing=len(rule.body))
         # What no state can bring comes first.
         first = rule.body[
             min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))
@@ -447,22 +538,49 @@ class RuleQuestions:
         )
 
     @cached_property
-    def _usable(self) -> Ontology:
-        """The knowledge base without the rules that Pellet would drop."""
-        known = self.base.vocabulary
-        return self.base.with_rules(
-            one for one in self.base.rules if not (one.enabled and fatal_problems(one, known))
-        )
+    def _dropped(self) -> dict[Rule, str]:
+        """The enabled rules that Pellet drops, with its reasons."""
+        try:
+            return dropped_rules(self.base)
+        except KnowledgeError:  # it cannot even read them
+            known = self.base.vocabulary
+            wrong = {one: fatal_problems(one, known) for one in self.base.content.enabled_rules}
+            return {one: found[0].message for one, found in wrong.items() if found}
 
-    def _known(self, state: KnowledgeState) -> Facts | str:
-        """All that follows in a state, or what contradicts what in it."""
+    @cached_property
+    def _usable(self) -> Ontology:
+        """The knowledge base without the rules that Pellet drops."""
+        return self.base.with_rules(one for one in self.base.rules if one not in self._dropped)
+
+    @cached_property
+    def _pellet(self) -> InProcessPellet:
+        bodies = [rule.body for rule in self._usable.content.enabled_rules]
+        return matching.tracing_pellet(self._usable, bodies)
+
+    def _known(self, state: KnowledgeState) -> tuple[Facts, frozenset[Rule]] | str:
+        """All that follows in a state and the rules that fire, or what contradicts what in it."""
         if state not in self._facts:
             try:
-                pellet = InProcessPellet(self._usable, self._usable.content.all_terms())
-                self._facts[state] = Facts(Tracer(self._usable, state, pellet).known)
+                self._facts[state] = self._asked_of_pellet(state)
             except ContradictionError as error:
                 self._facts[state] = error.problem.removeprefix("contradiction: ")
         return self._facts[state]
+
+    def _asked_of_pellet(self, state: KnowledgeState) -> tuple[Facts, frozenset[Rule]]:
+        """All that follows in a state, and the rules that fire."""
+        rules = self._usable.content.enabled_rules
+        try:
+            tracer = Tracer(self._usable, state, self._pellet)
+            facts = Facts(tracer.known)
+            return facts, frozenset(rules[number] for number in tracer.holding)
+        except ContradictionError:
+            raise
+        except KnowledgeError:
+            # Where rules ask what is different Pellet can fail on what it is asked besides: what
+            # matches tells.
+            pellet = matching.tracing_pellet(self._usable)
+            facts = Facts(Tracer(self._usable, state, pellet).known)
+            return facts, frozenset(rule for rule in rules if matching.matches(rule, facts))
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
         fact = matching.stated(atom, binding)

@@ -18,15 +18,23 @@ from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, nearest
 from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.explain import Explainer, Explanation
+from suave_des.kb.matching import tracing_pellet
 from suave_des.kb.policy import Policy, make_policy
 from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
 from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
+from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.rdf import PREFIXES, Triple, n_triple
+from suave_des.knowledge.rdf import PREFIXES, Triple, fact_of, n_triple
 from suave_des.knowledge.reasoner import Reasoner, regions_of
-from suave_des.knowledge.state import ContradictionError, KnowledgeState, Number, Reasoning
+from suave_des.knowledge.rules import IDENTITIES
+from suave_des.knowledge.state import (
+    ContradictionError,
+    Fact,
+    KnowledgeState,
+    Number,
+    Reasoning,
+)
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
@@ -153,7 +161,7 @@ class KnowledgeBase:
 
     @cached_property
     def _tracing_pellet(self) -> InProcessPellet:
-        return InProcessPellet(self.base, self.base.content.all_terms())
+        return tracing_pellet(self.base)
 
     def decide(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Reasoning:
         """Decide as a mission does: infer the terms on which decisions depend and those that rules
@@ -225,6 +233,26 @@ class KnowledgeBase:
         return self._with_all_terms.analyze_and_plan(
             state, improve_exceeded=self.settings.improves_exceeded
         )
+
+    def identities(self, state: KnowledgeState) -> tuple[Fact, ...]:
+        """Infer which individuals are the same, and which are different, by rules; each pair once.
+
+        Raises:
+            KnowledgeError: as infer.
+        """
+        heads = (atom for rule in self.base.content.enabled_rules for atom in rule.head)
+        if not any(atom.predicate in IDENTITIES for atom in heads):
+            return ()
+        given = self.base.assertions(state)
+
+        def by_rules() -> set[Triple]:
+            without = InProcessPellet(self.base.with_rules(()), self.base.content.all_terms())
+            return self._tracing_pellet.identities(given) - without.identities(given)
+
+        found = self.limit.run(by_rules, reasoning_on(state))
+        pairs = {(*sorted((one, str(other))), name) for one, name, other in found if one != other}
+        facts = (fact_of((one, name, other), self.base.names) for one, other, name in pairs)
+        return tuple(sorted(facts, key=str))
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Explain why a fact or a decision follows in a state.

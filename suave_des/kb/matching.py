@@ -14,16 +14,25 @@ from types import MappingProxyType
 from typing import Final
 
 from suave_des.kb.space import Situation
-from suave_des.knowledge.ontology import Content, Ontology
+from suave_des.knowledge.ontology import Content, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
-from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable
+from suave_des.knowledge.rules import (
+    FACT_KINDS,
+    Atom,
+    Named,
+    Rule,
+    Term,
+    Variable,
+    computed,
+)
 from suave_des.knowledge.state import ContradictionError, Value, value_text
 
 #: Begins the IRIs of what is added to a knowledge base to question it.
 PROBE: Final = "urn:suave-des:probe"
 _HOLDS: Final = f"{PROBE}#holds"
+_MEMBER: Final = f"{PROBE}#member"
 
 Body = tuple[Atom, ...]
 #: What the variables of a rule stand for: IRIs and literals by name.
@@ -31,8 +40,6 @@ Binding = Mapping[str, str | Lit]
 #: The same as people write it.
 Bound = tuple[tuple[str, Value], ...]
 _BINDING: Final = ("class", "object", "data")
-#: Kinds of atoms that are about facts; the others compare or compute.
-FACT_KINDS: Final = (*_BINDING, "same", "different")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
 MOST_WAYS: Final = 20_000
 
@@ -213,15 +220,20 @@ def _ways(
 def _tested(atom: Atom, binding: Binding) -> list[Binding] | None:
     """The bindings with which a built-in or datatype holds; None if an argument has no value."""
     asked = instance(atom, binding)
-    unbound = [number for number, term in enumerate(asked.arguments) if isinstance(term, Variable)]
-    computes = atom.computes and unbound == [0]
-    if unbound and not computes:
+    unbound = [term.name for term in asked.arguments if isinstance(term, Variable)]
+    if not unbound:
+        return [binding] if _holds(asked) else []
+    if not set(unbound) <= computed(atom, binding):
         return None
-    values = _ask_pellet(asked, computes=computes)
-    if computes:
-        name = next(atom.variables())
-        return [{**binding, name: canonical(value)} for value in values]
-    return [binding] if values else []
+    if isinstance(asked.arguments[0], Variable) and len(set(unbound)) == 1:
+        found: list[tuple[Lit, ...]] = [(value,) for value in _computed(asked)]
+    else:
+        found = [tuple(value for name in unbound for value in _part(asked, name))]
+    return [
+        {**binding, **dict(zip(unbound, map(canonical, each), strict=True))}
+        for each in found
+        if len(each) == len(unbound)
+    ]
 
 
 def _distance(atom: Atom, facts: Facts, binding: Binding) -> int:
@@ -253,7 +265,7 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
         ready = (
             number
             for number in waiting
-            if body[number].kind in _BINDING or _inputs(body[number]) <= known
+            if body[number].kind in _BINDING or _is_testable(body[number], known)
         )
         number = next(ready, waiting[0])
         waiting.remove(number)
@@ -262,24 +274,106 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
     return order
 
 
-def _inputs(atom: Atom) -> set[str]:
-    """Variables that must have values before an atom can be tested, or its first argument
-    computed.
+def _is_testable(atom: Atom, known: set[str]) -> bool:
+    """Whether an atom can be tested, or what it computes be computed, where variables have
+    values.
     """
-    return {
-        term.name for term in atom.arguments[int(atom.computes) :] if isinstance(term, Variable)
-    }
+    return set(atom.variables()) <= known | computed(atom, known)
+
+
+_IT: Final = Named(f"{PROBE}#it")
+_VALUE: Final = f"{PROBE}#value"
 
 
 @lru_cache(maxsize=4096)
-def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
-    """What Pellet computes for the first argument, or one value if the atom holds."""
-    result = atom.arguments[0] if computes else Lit("true", XSD + "boolean")
-    head = Atom("data", f"{PROBE}#value", (Named(f"{PROBE}#it"), result))
-    rule = Rule("probe", (atom,), (head,))
-    known = ((f"{PROBE}#it", RDF_TYPE, OWL + "Thing"),)
-    found = entailed(Content(known, (), (rule,)).n_triples(), [head])
+def _holds(atom: Atom) -> bool:
+    """Whether Pellet says that a built-in or datatype holds for values."""
+    head = Atom("data", _VALUE, (_IT, Lit("true", XSD + "boolean")))
+    return bool(_concluded((), (atom,), head))
+
+
+@lru_cache(maxsize=4096)
+def _computed(atom: Atom) -> tuple[Lit, ...]:
+    """What Pellet computes for the first argument, from the values of the others."""
+    given, body = _from_variables(atom)
+    return _concluded(given, body, Atom("data", _VALUE, (_IT, atom.arguments[0])))
+
+
+@lru_cache(maxsize=4096)
+def _part(atom: Atom, name: str) -> tuple[Lit, ...]:
+    """What Pellet computes for a variable that is not the first argument: a part of a date."""
+    given, body = _from_variables(atom)
+    return _concluded(given, body, Atom("data", _VALUE, (_IT, Variable(name))))
+
+
+def _from_variables(atom: Atom) -> tuple[tuple[Triple, ...], tuple[Atom, ...]]:
+    """Facts and a body that give the values of an atom to variables: some are computed from these
+    only.
+    """
+    given, body, terms = list[Triple](), list[Atom](), list[Term]()
+    for number, term in enumerate(atom.arguments):
+        if isinstance(term, Lit):
+            name, variable = f"{PROBE}#argument{number}", Variable(f"argument {number}")
+            given += [(name, RDF_TYPE, OWL + "DatatypeProperty"), (_IT.iri, name, term)]
+            body.append(Atom("data", name, (_IT, variable)))
+            term = variable
+        terms.append(term)
+    return tuple(given), (*body, replace(atom, arguments=tuple(terms)))
+
+
+def _concluded(given: Sequence[Triple], body: Body, head: Atom) -> tuple[Lit, ...]:
+    """The values that Pellet concludes from facts with one rule."""
+    rule = Rule("probe", body, (head,))
+    triples = ((_IT.iri, RDF_TYPE, OWL + "Thing"), *given)
+    found = entailed(Content(triples, (), (rule,)).n_triples(), [head])
     return tuple(sorted(value for _, _, value in found if isinstance(value, Lit)))
+
+
+def _expressions(base: Ontology) -> dict[str, Atom]:
+    """The class expressions that rules ask for, each by a class that stands for it."""
+    asked = {
+        replace(atom, arguments=(Variable("x"),), places=()): None
+        for rule in base.content.enabled_rules
+        for atom in rule.body
+        if atom.kind == "class" and atom.expression
+    }
+    return {f"{_MEMBER}{number}": atom for number, atom in enumerate(asked)}
+
+
+def tracing_pellet(base: Ontology, bodies: Sequence[Body] = ()) -> InProcessPellet:
+    """Pellet that reads all terms, the members of the class expressions that rules ask for, and
+    which bodies of rules hold; see told_of.
+
+    Raises:
+        KnowledgeError: Pellet cannot use the knowledge base.
+    """
+    members = _expressions(base)
+    rules = [
+        Rule("", (atom,), (Atom("class", name, (Variable("x"),)),))
+        for name, atom in members.items()
+    ]
+    rules += [Rule("", body, (_head(number),)) for number, body in enumerate(bodies)]
+    properties, classes = base.content.all_terms()
+    terms = Terms((*properties, _HOLDS), (*classes, *members))
+    return InProcessPellet(base.with_rules((*base.rules, *rules)), terms)
+
+
+def told_of(base: Ontology, triples: Iterable[Triple]) -> tuple[frozenset[Triple], frozenset[int]]:
+    """Separate what a Pellet of tracing_pellet infers: all that follows, and the numbers of the
+    bodies that hold.
+    """
+    members = {name: atom.predicate for name, atom in _expressions(base).items()}
+    known, numbers = set[Triple](), set[int]()
+    for subject, predicate, value in triples:
+        if predicate == _HOLDS and isinstance(value, Lit):
+            numbers.add(int(value.text))
+        elif subject == _IT.iri or value == _IT.iri:  # which the probes alone have
+            continue
+        elif isinstance(value, str):
+            known.add((subject, predicate, members.get(value, value)))
+        else:
+            known.add((subject, predicate, value))
+    return frozenset(known), frozenset(numbers)
 
 
 class Probes:
@@ -325,4 +419,4 @@ class Probes:
 
 
 def _head(number: int) -> Atom:
-    return Atom("data", _HOLDS, (Named(f"{PROBE}#it"), Lit(str(number), XSD + "string")))
+    return Atom("data", _HOLDS, (_IT, Lit(str(number), XSD + "string")))

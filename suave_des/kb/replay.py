@@ -12,11 +12,10 @@ from typing import Final, NamedTuple
 from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.explain import Tracer
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.matching import with_bindings
+from suave_des.kb.matching import tracing_pellet, with_bindings
 from suave_des.kb.space import Situation, differing_decisions
 from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.state import NONE_LEFT, STAYS, KnowledgeState
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
@@ -151,7 +150,7 @@ class _Trial:
         self.with_rule = self.after.base if disabled is None else base
         names = {disabled, *(each.name for each in tried)}
         self.rules = [each for each in self.with_rule.content.enabled_rules if each.name in names]
-        self.pellet = InProcessPellet(self.with_rule, self.with_rule.content.all_terms())
+        self.pellet = tracing_pellet(self.with_rule)
 
     def replay(self, state: KnowledgeState) -> Iterator[tuple[str, str]]:
         """The effects of the change in a recorded state, if it has any; see MissionReplay."""

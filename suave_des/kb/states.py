@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,15 +16,34 @@ from pydantic import BaseModel, ConfigDict
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import OWL, RDF_TYPE, TOMASYS, XSD, Lit, Triple, fact_of, local_name
+from suave_des.knowledge.rdf import (
+    C_STATUS,
+    OWL,
+    RDF_TYPE,
+    TOMASYS,
+    XSD,
+    Lit,
+    Triple,
+    fact_of,
+    local_name,
+)
 from suave_des.knowledge.reasoner import triggers_adaptation
-from suave_des.knowledge.rules import Atom, Named, Rule, RuleError, Term, Variable, texts_of
+from suave_des.knowledge.rules import (
+    IDENTITIES,
+    Atom,
+    Named,
+    Rule,
+    RuleError,
+    Term,
+    Variable,
+    texts_of,
+)
 from suave_des.knowledge.rules.files import (
     RulesFile,
     Vocabulary,
     check_rule,
-    fatal_problems,
     looked_up,
+    rule_problems,
 )
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, ObjectiveState
@@ -36,7 +56,7 @@ from suave_des.records.mission_folder import (
 )
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml, validated
-from suave_des.scenario_knowledge import measured_attributes
+from suave_des.scenario_knowledge import REPORTED_STATUSES, measured_attributes
 
 #: Begins the IRIs of individuals that exist in a test or a question only.
 NEW_INDIVIDUAL: Final = "urn:suave-des:test#"
@@ -78,6 +98,9 @@ class FactReader:
             raise InputError(
                 f"{shown(text)} has a variable or too many arguments for a fact", remedy=remedy
             )
+        if OWL + atom.predicate in IDENTITIES and len(atom.arguments) == 2:
+            one, other = map(self._individual, atom.arguments)
+            return one, OWL + atom.predicate, other
         kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
         iris = (
             (atom.predicate,)
@@ -90,7 +113,14 @@ class FactReader:
             for kind in kinds
             if kind in self.base.vocabulary.kinds.get(iri, ())
         )
-        predicate, kind = next(declared, ("", ""))
+        concluded = (
+            (head.predicate, _KINDS[head.kind])
+            for rule in self.base.content.enabled_rules
+            for head in rule.head
+            if atom.predicate in (head.predicate, local_name(head.predicate))
+            and _KINDS.get(head.kind) in kinds
+        )
+        predicate, kind = next(chain(declared, concluded), ("", ""))
         if not predicate:
             problem = f"there is no {kinds[0].split()[-1]} {shown(local_name(atom.predicate))}"
             raise InputError(problem, remedy=self.base.vocabulary.guess(atom.predicate, kinds))
@@ -117,7 +147,7 @@ class FactReader:
             atom = Atom("data", predicate, (Variable("x"), value))
             concluded = Atom("class", OWL + "Thing", (Variable("x"),))
             asked = Rule("", (atom,), (concluded,))
-            for problem in fatal_problems(asked, self.base.vocabulary):
+            for problem in rule_problems(asked, self.base.vocabulary):
                 raise InputError(problem.message, remedy=problem.remedy)
         return fact_of((subject, predicate, value), self.base.names)
 
@@ -143,6 +173,9 @@ class FactReader:
             or f"introduce it under facts, as Class({term.iri})"
         )
         raise InputError(f"there is no individual {shown(term.iri)}", remedy=remedy)
+
+
+_KINDS: Final = {"class": "class", "object": "object property", "data": "data property"}
 
 
 def read_rules(given: str, vocabulary: Vocabulary) -> tuple[Rule, ...]:
@@ -310,6 +343,17 @@ class StateBuilder:
             remedy = did_you_mean(value.upper(), sorted(known))
             raise InputError(f"no rule mentions the {property_name} {shown(value)}", remedy=remedy)
 
+    def _check_reported(self, value: str) -> None:
+        """Reject a status from which nothing follows, unless a rule reads whatever it is."""
+        atoms = [
+            atom for rule in self.base.rules for atom in rule.atoms if atom.predicate == C_STATUS
+        ]
+        asked = {term for atom in atoms for term in atom.arguments[1:]}
+        known = texts_of(atoms, C_STATUS).union(*REPORTED_STATUSES.values())
+        if value not in known and not any(isinstance(term, Variable) for term in asked):
+            problem = f"no rule mentions the c_status {shown(value)}, and nothing reports it"
+            raise InputError(problem, remedy=did_you_mean(value, sorted(known)))
+
     def add_file(self, path: Path) -> None:
         """Add the parts in a YAML file with the keys of StateContent.
 
@@ -362,6 +406,8 @@ class StateBuilder:
             known = dict.fromkeys(each for one in _NOUNS for each in self._known(one))
             problem = f"there is no quality attribute, component or function {shown(name)}"
             raise InputError(problem, remedy=did_you_mean(name, known))
+        if kind == "components":
+            self._check_reported(value)
         is_status = kind == "groundings" and (value == UNGROUNDED or triggers_adaptation(value))
         self.add("objectives" if is_status else kind, name, value)
 

@@ -40,8 +40,8 @@ from suave_des.knowledge.rules.files import (
     WITHOUT_NAME,
     RulesFile,
     about_rule,
-    fatal_problems,
     looked_up,
+    rule_problems,
 )
 from suave_des.resources import shipped_folder, shown_name
 
@@ -122,7 +122,7 @@ class Material:
             for one, name, other in related
             if name in (*both_ways, rdf.RDFS + "subPropertyOf")
         ]
-        held = {rdf.OWL + "Thing", swrl.EXPRESSION}
+        held = {rdf.OWL + "Thing"}
         held |= rdf.terms(
             rdf.TOMASYS,
             "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status",
@@ -139,7 +139,7 @@ class Material:
         waiting, possible = list(content.enabled_rules), rdf.reached(held, steps)
 
         def allows(atom: Atom) -> bool:
-            is_named = atom.kind in ("class", "object", "data") and atom.arguments
+            is_named = atom.kind in ("class", "object", "data") and not atom.expression
             # Class expressions and property chains are not followed.
             return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
 
@@ -505,7 +505,83 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
     """Find what Pellet would drop or ignore without a word."""
     for rule in material.rules:
         if rule not in material.for_other_models:
-            yield from fatal_problems(rule, material.base.vocabulary)
+            for place, message, remedy, is_fatal in rule_problems(rule, material.base.vocabulary):
+                if is_fatal:
+                    yield about_rule(rule, message, place, remedy)
+                else:
+                    yield material.suspicious(rule, place, message, remedy)
+
+
+_TEXTS: Final = rdf.terms(rdf.XSD, "string boolean")
+
+
+def never_comparable(material: Material) -> Iterator[Finding]:
+    """Find comparisons of a number with a text or a truth value, which hold for no values."""
+    ranges = material.base.vocabulary.ranges
+    for rule in material.rules:
+        datatypes: dict[Term, frozenset[str]] = {}
+        for atom in rule.body:
+            if atom.kind == "data" and len(atom.arguments) == 2:
+                datatypes[atom.arguments[1]] = ranges.get(atom.predicate, frozenset())
+        for atom in rule.body:
+            if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
+                continue
+            sides = [
+                frozenset({term.datatype})
+                if isinstance(term, Lit)
+                else datatypes.get(term, frozenset())
+                for term in atom.arguments
+            ]
+            numbers = [bool(side) and side <= rdf.NUMERIC for side in sides]
+            texts = [bool(side) and side <= _TEXTS for side in sides]
+            if any(numbers) and any(texts):
+                term = atom.arguments[texts.index(True)]
+                problem = f"{swrl.write_term(term)} is no number, and never compares with one"
+                remedy = "write numbers without quotes" if isinstance(term, Lit) else None
+                place = atom.place(texts.index(True))
+                yield material.suspicious(rule, place, problem, remedy)
+
+
+def literals_of_expressions(material: Material) -> Iterator[Finding]:
+    """Find literals in class expressions and data ranges that are none of their datatype."""
+    for source in material.base.sources:
+        for subject, _, value in source.triples:
+            if (
+                subject.startswith("_:")
+                and isinstance(value, Lit)
+                and not rdf.is_well_formed(value)
+            ):
+                problem = f"a class expression has {value.text!r}, which is not an xsd:{local_name(value.datatype)}"
+                yield Finding(Level.ERROR, problem, str(source.path))
+
+
+def undeclared_terms(material: Material) -> Iterator[Finding]:
+    """Find what rules use and no ontology declares, which a reasoner takes all the same."""
+    vocabulary = material.base.vocabulary
+    for rule in material.rules:
+        for name in rule.undeclared:
+            problem = (
+                f"?{name} is not declared as a variable; in a value's place Pellet takes it for one"
+            )
+            yield material.suspicious(rule, None, problem, "declare it: a swrl:Variable")
+        for number, atom in enumerate(rule.atoms):
+            if (
+                atom.kind in _NOUNS
+                and not atom.expression
+                and atom.predicate not in vocabulary.kinds
+                and (number >= len(rule.body) or atom.predicate in vocabulary.used)
+            ):
+                name, noun = local_name(atom.predicate), _NOUNS[atom.kind]
+                remedy = vocabulary.guess(atom.predicate, (noun,))
+                yield material.suspicious(
+                    rule,
+                    atom.place(),
+                    f"{noun} {name} is not defined: it is taken as the rule uses it",
+                    remedy or f"declare it as {noun} in the ontology",
+                )
+
+
+_NOUNS: Final = {"class": "class", "object": "object property", "data": "data property"}
 
 
 def shared_names(material: Material) -> Iterator[Finding]:
@@ -635,6 +711,32 @@ def equal_individuals(material: Material) -> Iterator[Finding]:
                 )
                 yield material.suspicious(rule, atom.place(), f"{write_atom(atom)} {needs}", remedy)
 
+
+#: Axioms by which individuals that have different names can be the same.
+_MAKE_SAME: Final = re.compile(rdf.OWL + "(sameAs|.*Functional|.*ardinality|oneOf|hasKey|hasValue)")
+
+
+def same_individuals(material: Material) -> Iterator[Finding]:
+    """Find rules that ask for the same individuals (sameAs), where nothing makes any the same."""
+    terms = (
+        *(str(term) for triple in material.content.triples for term in triple[1:]),
+        *material.content.structure,
+    )
+    heads = (atom.kind for rule in material.rules for atom in rule.head)
+    kinds = (kind for kind in terms if not kind.endswith("#FunctionalProperty"))
+    links = material.base.vocabulary.kinds
+    functional = {s for s, _, o in material.content.triples if o == _FUNCTIONAL}
+    merges = any("object property" in links.get(name, ()) for name in functional)
+    if merges or any(map(_MAKE_SAME.search, kinds)) or "same" in heads:
+        return
+    for rule in material.rules:
+        for atom in rule.body:
+            if atom.kind == "same":
+                problem = f"{write_atom(atom)} holds of an individual and itself only: nothing says that two names mean one"
+                yield material.suspicious(rule, atom.place(), problem)
+
+
+_FUNCTIONAL: Final = rdf.OWL + "FunctionalProperty"
 
 # Rules that cannot mean what their author wanted.
 
@@ -789,10 +891,14 @@ CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
     assumed_operators,
     another_revision,
     mistakes_that_pellet_ignores,
+    undeclared_terms,
+    never_comparable,
+    literals_of_expressions,
     shared_names,
     for_other_models,
     never_fires,
     equal_individuals,
+    same_individuals,
     misspelt_variables,
     two_values,
     no_effect,

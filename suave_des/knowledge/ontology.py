@@ -8,8 +8,10 @@ in its terms.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import operator
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
@@ -26,7 +28,7 @@ from suave_des.knowledge.ontology_file import (
 )
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.resolver import Sources, Supply, collect
-from suave_des.knowledge.rules import EXPRESSION, Rule
+from suave_des.knowledge.rules import Atom, Rule, Variable
 from suave_des.knowledge.rules.files import (
     RulesFile,
     Vocabulary,
@@ -59,6 +61,12 @@ _OF_OBJECT_PROPERTIES: Final = rdf.terms(
     "InverseFunctionalProperty TransitiveProperty SymmetricProperty AsymmetricProperty ReflexiveProperty "
     "IrreflexiveProperty",
 )
+_TRANSITIVE: Final = rdf.OWL + "TransitiveProperty"
+_CHAIN: Final = rdf.OWL + "propertyChainAxiom"
+_FIRST: Final = rdf.RDF + "first"
+_REST: Final = rdf.RDF + "rest"
+#: What makes values of a property follow from two others.
+_JOINING: Final = re.compile(re.escape(rdf.OWL) + "(TransitiveProperty|propertyChain)")
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
 RULE_IRI: Final = "urn:suave-des:rule:"
 #: Annotations, which mean nothing for inference.
@@ -104,18 +112,72 @@ class Content:
         """The properties and classes that an enabled rule can assert."""
         return frozenset(name for name, _ in _concluded(self.enabled_rules))
 
+    @cached_property
+    def given_back(self) -> tuple[str, ...]:
+        """The properties whose entailed values must be asserted before rules see all of them.
+
+        Pellet matches rules with the values that it holds, and not with those that follow from two
+        others: of a transitive property, or by a chain of properties. For a rule that asks for such
+        a property it tries every choice of individuals: it may lose inferences, and may never end,
+        depending on the order of its axioms.
+        """
+        joined = {s for s, p, o in self.triples if o == _TRANSITIVE or p == _CHAIN}
+        asked = {a.predicate for r in self.enabled_rules for a in r.body if a.kind == "object"}
+        for line in self.structure:
+            subject, predicate, _ = line.split(" ", 2)
+            if predicate == f"<{_CHAIN}>":
+                joined.add(subject.strip("<>"))
+            elif _JOINING.search(line):
+                return tuple(sorted(asked))  # joined without a name: it may be any of them
+        return tuple(sorted(asked & rdf.reached(joined, self._related_properties())))
+
+    def joined_by_rules(self) -> Content:
+        """The same with rules in place of axioms that join values, from which Pellet concludes all
+        that holds of named individuals, and at once.
+        """
+        after = {line.split(" ", 1)[0]: line for line in self.structure if f"<{_REST}>" in line}
+        firsts = [line.split(" ", 2) for line in self.structure if f"<{_FIRST}>" in line]
+        link = {subject: term.removesuffix(" .\n") for subject, _, term in firsts}
+        rules, kept = list[Rule](), list[str]()
+        for line in self.structure:
+            subject, predicate, node = line.removesuffix(" .\n").split(" ", 2)
+            links = list[str]()
+            while predicate == f"<{_CHAIN}>" and node in link and len(links) < len(firsts):
+                links.append(link[node])
+                node = after[node].removesuffix(" .\n").split(" ", 2)[2] if node in after else ""
+            if links and all(each.startswith("<") for each in links):
+                names = [each.strip("<>") for each in links]
+                rules.append(_joining_rule(names, subject.strip("<>")))
+            else:
+                kept.append(line)
+        transitive = [s for s, _, o in self.triples if o == _TRANSITIVE]
+        rules += [_joining_rule([name, name], name) for name in transitive]
+        triples = [
+            (s, p, rdf.OWL + "ObjectProperty" if o == _TRANSITIVE else o)
+            for s, p, o in self.triples
+        ]
+        return replace(
+            self,
+            triples=tuple(triples),
+            structure=tuple(kept),
+            rules=(*self.rules, *rules),
+        )
+
+    def _related_properties(self) -> list[tuple[str, str]]:
+        """Each property with those to which its values lead: super-properties and inverses."""
+        both_ways = (rdf.OWL + "inverseOf", rdf.OWL + "equivalentProperty")
+        related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
+        edges = [(s, o) for s, p, o in related if p in (rdf.RDFS + "subPropertyOf", *both_ways)]
+        return edges + [(o, s) for s, p, o in related if p in both_ways]
+
     def decision_terms(self) -> Terms:
         """Terms on which decisions depend, and terms that rules assert, with super-properties and
         inverses.
         """
-        both_ways = (rdf.OWL + "inverseOf", rdf.OWL + "equivalentProperty")
-        related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
-        edges = [(s, o) for s, p, o in related if p in (rdf.RDFS + "subPropertyOf", *both_ways)]
-        edges += [(o, s) for s, p, o in related if p in both_ways]
         heads = sorted(_concluded(self.enabled_rules))
         wanted = {*rdf.DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
         return Terms(
-            _named(rdf.reached(wanted, edges)),
+            _named(rdf.reached(wanted, self._related_properties())),
             tuple(name for name, kind in heads if kind == "Class"),
         )
 
@@ -139,7 +201,7 @@ class Content:
             atom
             for rule in self.enabled_rules
             for atom in rule.body
-            if atom.predicate not in ("", EXPRESSION)
+            if atom.predicate and not atom.expression
         ]
         properties |= {atom.predicate for atom in asked if atom.kind in ("object", "data")}
         classes |= {atom.predicate for atom in asked if atom.kind == "class"}
@@ -156,6 +218,16 @@ class Content:
         for rule in chosen:
             lines += _rule_lines(rule, self.rules.index(rule))
         return "".join(lines)
+
+
+def _joining_rule(links: Sequence[str], whole: str) -> Rule:
+    """The rule that says what a chain of properties does, for named individuals."""
+    places = [Variable(f"v{number}") for number in range(len(links) + 1)]
+    body = tuple(
+        Atom("object", name, pair)
+        for name, pair in zip(links, itertools.pairwise(places), strict=True)
+    )
+    return Rule(f"chain to {whole}", body, (Atom("object", whole, (places[0], places[-1])),))
 
 
 def _named(iris: Iterable[str]) -> tuple[str, ...]:
@@ -220,7 +292,7 @@ def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[
 def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
     """(IRI, kind in OWL) of each property and class that rules assert."""
     kinds = {"object": "ObjectProperty", "data": "DatatypeProperty", "class": "Class"}
-    heads = (atom for rule in rules for atom in rule.head if atom.predicate not in ("", EXPRESSION))
+    heads = (atom for rule in rules for atom in rule.head if atom.predicate and not atom.expression)
     return {(atom.predicate, kinds[atom.kind]) for atom in heads if atom.kind in kinds}
 
 
@@ -670,15 +742,16 @@ class Ontology:
             ]
             content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
         numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
+        known = Vocabulary.of(merged.triples, model.in_states, enumerated_texts(sources.files))
+        in_expressions = re.findall(r"<([^>]+)>", "".join(merged.structure))
+        known = replace(known, used=known.used.union(in_expressions))
         return cls(
             files=tuple(sorted(source.path for source in sources.files)),
             content_hash=_digest(contents, numbers, assumed),
             content=content,
             names=rdf.Names(merged.triples),
             model=model,
-            vocabulary=Vocabulary.of(
-                merged.triples, model.in_states, enumerated_texts(sources.files)
-            ),
+            vocabulary=known.with_rules(content.enabled_rules),
             sources=sources.files,
             stated=merged.triples,
             assumed=assumed,
@@ -715,6 +788,7 @@ class Ontology:
                 self.content_hash, [file.text for file in files], sorted(set(disabled_rules))
             ),
             content=replace(self.content, rules=_in_order(found), replaced=tuple(replaced)),
+            vocabulary=self.vocabulary.with_rules(found),
         )
 
     def check_names(self, values: Iterable[str], disabled_rules: Iterable[str]) -> None:

@@ -79,6 +79,8 @@ PERFORMANCE: Final = MROS + "performance"
 
 def local_name(iri: str) -> str:
     """Last part of an IRI: after '#', or after the last '/' or ':' where there is none."""
+    if iri.startswith("_:"):  # what has no name
+        return iri[2:]
     for separator in ("#", "/", ":"):
         head, found, tail = iri.rpartition(separator)
         if found and tail:
@@ -107,13 +109,14 @@ Triple = tuple[str, str, str | Lit]
 
 _T = TypeVar("_T")
 _Term = TypeVar("_Term", Lit, str | Lit)
-_WHOLE: Final = terms(
+#: Datatypes of whole numbers.
+WHOLE: Final = terms(
     XSD,
     "integer int long short byte nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger "
     "unsignedInt unsignedLong unsignedShort unsignedByte",
 )
 #: Datatypes of exact numbers.
-EXACT: Final = _WHOLE | {XSD + "decimal"}
+EXACT: Final = WHOLE | {XSD + "decimal"}
 #: Datatypes of numbers.
 NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
@@ -122,7 +125,7 @@ _FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)
 #: How values of a datatype are written; rdflib, which takes more for them, knows the other
 # datatypes of XML Schema.
 _LEXICAL: Final = (
-    dict.fromkeys(_WHOLE, re.compile(r"[+-]?[0-9]+"))
+    dict.fromkeys(WHOLE, re.compile(r"[+-]?[0-9]+"))
     | dict.fromkeys((XSD + "double", XSD + "float"), re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
     | {XSD + "boolean": re.compile(r"true|false|0|1"), XSD + "decimal": _DECIMAL}
 )

@@ -45,7 +45,7 @@ from suave_des.knowledge.rdf import (
     local_name,
     reached,
 )
-from suave_des.knowledge.rules import COMPARISONS, EXPRESSION, Variable
+from suave_des.knowledge.rules import COMPARISONS, Variable
 from suave_des.knowledge.state import (
     MAX_EXPONENT,
     NO_GROUNDING,
@@ -172,7 +172,7 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
                 yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
-            if atom.kind == "range" or atom.predicate == EXPRESSION:
+            if atom.kind == "range" or atom.expression:
                 yield f"rule {rule.name} asks for a datatype or a class expression"
         read = [
             atom.arguments[1]

@@ -2,12 +2,13 @@
 
 import itertools
 import json
+from pathlib import Path
 
 import pytest
 
 from suave_des import run_mission
 from suave_des.errors import InputError
-from suave_des.kb.replay import CONTRADICTS, DECIDES, FIRES, try_rules
+from suave_des.kb.replay import CONTRADICTS, DECIDES, FIRES, MissionReplay, summary, try_rules
 from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
@@ -174,3 +175,13 @@ def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):
     (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
     with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
         list(try_rules(tmp_path, NEAR))
+
+
+def test_missions_are_counted_once_however_often_something_happens_in_them():
+    decides = tuple((t_s, DECIDES, "f: a instead of b") for t_s in (1.0, 2.0, 3.0))
+    missions = [
+        MissionReplay(Path("flown"), "one", 9, decides),
+        MissionReplay(Path("flown"), "two", 9, ()),
+    ]
+    (last,) = (line for line in summary(missions) if "missions:" in line)
+    assert "different decisions in 1 (3 decisions)" in last

@@ -367,3 +367,11 @@ def test_the_shipped_tests_kill_the_mutants_of_the_shipped_rules(knowledge):
     assert len(survivors) <= 0.05 * sum(each.result != adequacy.EQUIVALENT for each in results), (
         survivors
     )
+
+
+def test_the_share_of_mutants_killed_does_not_count_those_that_change_nothing(knowledge):
+    mutants = mutants_of(knowledge.base)[:4]
+    kinds = (adequacy.KILLED, adequacy.KILLED, adequacy.SURVIVED, adequacy.EQUIVALENT)
+    results = [adequacy.MutantResult(*each, "") for each in zip(mutants, kinds, strict=True)]
+    title = adequacy.mutation_table(results).title
+    assert title == "mutation: 2 of 3 mutants killed, 67%; 1 equivalent"

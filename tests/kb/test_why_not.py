@@ -51,7 +51,7 @@ CASES = {
         "r: hasValue(?q, 1) -> QAvalue(?q)",
         {},
         "",
-        "1 is not a decimal, the range of hasValue: it never matches (write 1.0)",
+        "never fires: 1 is not a decimal, the range of hasValue: it never matches; write 1.0",
     ),
     "an exact number and an inexact one": (
         "r: depth_class(?c, 3.0) -> Component(?c)",

@@ -28,7 +28,7 @@ from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.state import Reasoning, Value
+    from suave_des.knowledge.state import Fact, Reasoning, Value
 
 
 TableFormat = Literal["text", "csv", "json"]
@@ -37,10 +37,12 @@ TableFormat = Literal["text", "csv", "json"]
 def infer(options: ReasonerOptions, at: At = None) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     knowledge = options.knowledge()
-    print(*_inference_lines(knowledge.infer(state_at(at, knowledge))), sep="\n")
+    state = state_at(at, knowledge)
+    lines = _inference_lines(knowledge.infer(state), knowledge.identities(state))
+    print(*lines, sep="\n")
 
 
-def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
+def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterator[str]:
     from suave_des.knowledge.state import value_text
 
     state, decisions = reasoning.inference.state, reasoning.plan.decisions
@@ -56,7 +58,8 @@ def _inference_lines(reasoning: Reasoning) -> Iterator[str]:
     for kind, pairs in parts.items():
         yield from (f"  {kind:<10}  {name} = {value_text(value)}" for name, value in pairs)
     yield "inferred"
-    yield from (f"  {fact}" for fact in sorted(map(str, reasoning.inference.facts)) or ["nothing"])
+    facts = sorted(map(str, (*reasoning.inference.facts, *identities)))
+    yield from (f"  {fact}" for fact in facts or ["nothing"])
     yield "plan"
     if not decisions:
         yield "  nothing to adapt"

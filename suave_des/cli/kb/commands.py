@@ -75,7 +75,7 @@ def rules(options: KnowledgeOptions) -> None:
 
 def rules_text(base: Ontology) -> str:
     """Write all rules of a knowledge base as one text, file by file."""
-    from suave_des.knowledge.rules import EXPRESSION, naming, write_rule
+    from suave_des.knowledge.rules import naming, write_rule
 
     named = naming(lambda iri: not base.vocabulary.means_itself(iri))
     blocks = []
@@ -86,7 +86,7 @@ def rules_text(base: Ontology) -> str:
         for rule in base.rules:
             if rule.file == file:
                 text = write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled)
-                if any(atom.predicate in ("", EXPRESSION) for atom in rule.atoms):
+                if any(atom.expression or not atom.predicate for atom in rule.atoms):
                     lines = "".join(f"# {line}\n" for line in text.splitlines())
                     text = f"# This rule has an atom without a name, which rules as text cannot have:\n{lines}"
                 blocks.append(text)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
@@ -32,7 +32,7 @@ from suave_des.knowledge.rdf import (
     for_pellet,
     n_triple,
 )
-from suave_des.knowledge.rules import DIFFERENT, SAME, Atom
+from suave_des.knowledge.rules import DIFFERENT, SAME, Atom, Rule
 from suave_des.knowledge.state import ContradictionError
 
 with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
@@ -230,6 +230,7 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
     try:
         yield
     except JavaError as error:
+        take_warnings()  # they are about what failed, not about what is loaded next
         reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
         problem, remedy = (
             f"Pellet cannot use the ontologies: {reason}",
@@ -252,19 +253,27 @@ class InProcessPellet:
 
     def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
         self._ontology = ontology
+        self._asserted = frozenset[Triple]()
         terms = terms or ontology.content.decision_terms()
         with one_at_a_time, _java_errors(ontology):
             start()
             self._terms = java_class(_PELLET + "utils.ATermUtils")
             self._term = cache(self._terms.makeTermAppl)
-            self._base = load_n_triples(ontology.content.n_triples())
+            self._given_back = [(name, self._term(name)) for name in ontology.content.given_back]
+            text = ontology.content.n_triples()
+            self._base = load_n_triples(text)
+            if self._given_back:
+                self._joined = load_n_triples(ontology.content.joined_by_rules().n_triples())
             self._properties = [(name, self._term(name)) for name in terms.properties]
             self._classes = [(name, self._term(name)) for name in terms.classes]
-            if not self._base.isConsistent():
+            if not self._given_back and not self._base.isConsistent():
                 raise contradiction(ontology, ())
             # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on
             # it.
-            self._base.copy().isConsistent()
+            _, self._asserted = self._with(())
+            if self._asserted:
+                self._base = load_n_triples(text + "".join(map(n_triple, sorted(self._asserted))))
+                self._base.isConsistent()
             # Entailment is monotonic: what the ontologies entail, every state entails.
             self._known = self._collections(self._base)
             self._always = frozenset(self._read(self._base))
@@ -278,7 +287,7 @@ class InProcessPellet:
         """
         start()  # an error in a process that was forked since
         with one_at_a_time, _java_errors(self._ontology):
-            copy = self._with(assertions)
+            copy, _ = self._with(assertions)
             found = self._always.union(self._read(copy, self._known))
             self._refuse_dropped_rules()
             return found
@@ -288,8 +297,9 @@ class InProcessPellet:
         errors as infer.
         """
         with one_at_a_time, _java_errors(self._ontology):
-            text = self._ontology.content.n_triples() + "".join(map(n_triple, assertions))
-            copy = self._with(assertions)
+            copy, more = self._with(assertions)
+            facts = "".join(map(n_triple, (*assertions, *more)))
+            text = self._ontology.content.n_triples() + facts
             individuals = list(copy.getIndividuals())
             found: set[Triple] = {
                 (_name(one), SAME, _name(each))
@@ -308,13 +318,35 @@ class InProcessPellet:
             take_warnings()
             return found
 
-    def _with(self, assertions: Sequence[Triple]) -> Any:
-        """A copy of the knowledge base with assertions, which is consistent."""
-        copy = self._base.copy()
-        for subject, predicate, value in assertions:
+    def _with(self, assertions: Sequence[Triple]) -> tuple[Any, frozenset[Triple]]:
+        """A copy of the knowledge base with assertions, which is consistent, and what was asserted
+        besides: what follows and must be given back (see Content), until nothing new follows.
+        """
+        more = self._asserted
+        while True:
+            if self._given_back:
+                more |= self._following(self._copy(self._joined, assertions, more))
+            copy = self._copy(self._base, assertions, more - self._asserted)
+            following = self._following(copy)
+            if following <= more:
+                return copy, more
+            more |= following
+
+    def _following(self, knowledge_base: Any) -> frozenset[Triple]:
+        """What follows of the properties to give back."""
+        return frozenset(
+            triple
+            for name, term in self._given_back
+            for triple in _values(knowledge_base.getPropertyValues(term).entrySet(), name)
+        )
+
+    def _copy(self, base: Any, assertions: Sequence[Triple], more: Collection[Triple]) -> Any:
+        """A copy of a knowledge base with assertions, which is consistent."""
+        copy = base.copy()
+        for subject, predicate, value in (*assertions, *sorted(more)):
             self._add(copy, subject, predicate, value)
         if not copy.isConsistent():
-            raise contradiction(self._ontology, assertions)
+            raise contradiction(self._ontology, assertions, more)
         return copy
 
     def _add(self, knowledge_base: Any, subject: str, predicate: str, value: str | Lit) -> None:
@@ -387,6 +419,33 @@ def _members(individuals: Any, name: str) -> Iterator[Triple]:
     return ((_name(each), RDF_TYPE, name) for each in individuals)
 
 
+def dropped_rules(ontology: Ontology) -> dict[Rule, str]:
+    """Find the enabled rules that Pellet does not use, with its reasons.
+
+    Raises:
+        KnowledgeError: it cannot read the ontologies.
+    """
+    with one_at_a_time, _java_errors(ontology):
+        take_warnings()
+        load_n_triples(ontology.content.n_triples()).isConsistent()
+        found: dict[Rule, str] = {}
+        for warning in take_warnings():
+            for number in _RULE.findall(warning)[:1]:
+                rule = ontology.content.rules[int(number)]
+                reason = warning.rpartition("): ")[2].replace(f"{RULE_IRI}{number}", rule.name)
+                found.setdefault(rule, f"Pellet does not use it: {reason}")
+        return found
+
+
+def pattern_problem(text: str) -> str | None:
+    """Why Java, and so Pellet, does not take a text as a pattern (a regular expression)."""
+    try:
+        java_class("java.util.regex.Pattern").compile(text)
+    except JavaError as error:
+        return str(error).splitlines()[0].rpartition("Exception: ")[2]
+    return None
+
+
 def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
     """Load N-Triples alone, and read the values of the properties and the members of the classes
     that atoms name.
@@ -439,9 +498,14 @@ def trace_contradiction(text: str) -> tuple[str, list[str]]:
         take_warnings()
 
 
-def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
-    """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
-    text = ontology.content.n_triples() + "".join(map(n_triple, assertions))
+def contradiction(
+    ontology: Ontology, assertions: Sequence[Triple], more: Iterable[Triple] = ()
+) -> ContradictionError:
+    """Explain a contradiction: its subject, the rules involved, and the assertions of the state,
+    with which more was found to follow.
+    """
+    given = "".join(map(n_triple, (*assertions, *sorted(more))))
+    text = ontology.content.n_triples() + given
     reason, axioms = trace_contradiction(text)
     numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
     involved = [ontology.rules[number] for number in numbers]
@@ -449,7 +513,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
         f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})"
         for each in involved
     )
-    facts = [
+    stated = [
         str(fact)
         for triple in assertions
         if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
@@ -460,8 +524,8 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
     problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), reason)
     if rules:
         problem += f", by the rule{'s' if len(rules) > 1 else ''} {', '.join(rules)}"
-    if facts:
-        problem += f", in the state {', '.join(facts)}"
+    if stated:
+        problem += f", in the state {', '.join(stated)}"
     problem = f"contradiction: {problem[0].lower()}{problem[1:]}"
     remedy = (
         "change a rule, so that no two of these hold at once" if rules else "correct the ontology"

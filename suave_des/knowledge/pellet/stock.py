@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -54,9 +54,14 @@ class StockPellet:
     """
 
     def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
+        content = ontology.content
         self._stand_ins: dict[str, str] = {}
-        self._text = self._with_stand_ins(ontology.content.n_triples())
-        self._properties, self._classes = terms or ontology.content.decision_terms()
+        self._text = self._with_stand_ins(content.n_triples())
+        self._joined = ""
+        if content.given_back:
+            self._joined = self._with_stand_ins(content.joined_by_rules().n_triples())
+        self._given_back = content.given_back
+        self._properties, self._classes = terms or content.decision_terms()
 
     def _with_stand_ins(self, text: str) -> str:
         """Return N-Triples with another IRI in place of each that would come back otherwise."""
@@ -81,9 +86,27 @@ class StockPellet:
         """Return the values and members of the properties and classes to read; None for a
         contradiction.
 
+        What must be given back (see Content) is, until nothing new follows.
+
         Raises:
             TimeoutError: it took longer than the limit; its Java process is ended.
         """
+        more = frozenset[Triple]()
+        while True:
+            if self._joined:
+                found, following = self._infer(self._joined, (*assertions, *sorted(more)), limit_s)
+                if found is None:
+                    return None
+                more |= following
+            found, following = self._infer(self._text, (*assertions, *sorted(more)), limit_s)
+            if following <= more:
+                return found
+            more |= following
+
+    def _infer(
+        self, text: str, assertions: Sequence[Triple], limit_s: float | None
+    ) -> tuple[frozenset[Triple] | None, frozenset[Triple]]:
+        """One run: what follows of the terms to read, and of the properties to give back."""
         # owlready2 passes these on to subprocess.run, and has no other parameter for it.
         owlready2.reasoning._subprocess_kargs.update(timeout=limit_s, env=launcher_environment())
         owlready2.JAVA_EXE = str(java_executable())
@@ -95,7 +118,7 @@ class StockPellet:
                 if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"
             ]
             others = [triple for triple in assertions if triple not in numbers]
-            text = self._text + self._with_stand_ins("".join(map(n_triple, others)))
+            text += self._with_stand_ins("".join(map(n_triple, others)))
             ontology = world.get_ontology(_STATE_IRI).load(
                 fileobj=io.BytesIO(text.encode()), only_local=True
             )
@@ -103,21 +126,25 @@ class StockPellet:
                 subject = self._stand_ins.get(triple[0], triple[0])
                 _add_exactly(world, ontology, (subject, *triple[1:]))
             if not _reason(world):
-                return None
-            return frozenset(self._read(world)).difference(map(_as_float, numbers)).union(numbers)
+                return None, frozenset()
+            found = frozenset(self._read(world)).difference(map(_as_float, numbers)).union(numbers)
+            return found, frozenset(self._values(world.as_rdflib_graph(), self._given_back))
         finally:
             world.close()
 
     def _read(self, world: Any) -> Iterator[Triple]:
         graph = world.as_rdflib_graph()
-        for name in self._properties:
-            iri = URIRef(self._stand_ins.get(name, name))
-            for subject, _, value in graph.triples((None, iri, None)):
-                yield str(self._named(str(subject))), name, self._named(_value(value))
+        yield from self._values(graph, self._properties)
         for name in self._classes:
             for kind in _below(graph, self._stand_ins.get(name, name)):
                 for subject in graph.subjects(RDF.type, kind):
                     yield str(self._named(str(subject))), RDF_TYPE, name
+
+    def _values(self, graph: Any, properties: Iterable[str]) -> Iterator[Triple]:
+        for name in properties:
+            iri = URIRef(self._stand_ins.get(name, name))
+            for subject, _, value in graph.triples((None, iri, None)):
+                yield str(self._named(str(subject))), name, self._named(_value(value))
 
 
 def _value(term: Node) -> str | Lit:

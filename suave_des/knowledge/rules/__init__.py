@@ -7,7 +7,7 @@ both.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -68,11 +68,12 @@ KINDS: Final[dict[str, AtomKind]] = {
     SWRL + "DifferentIndividualsAtom": "different",
     SWRL + "BuiltinAtom": "builtin",
 }
+#: Kinds of atoms that are about facts, which bind all of their variables; the others compare or
+# compute.
+FACT_KINDS: Final = ("class", "object", "data", "same", "different")
 SAME: Final = OWL + "sameAs"
 DIFFERENT: Final = OWL + "differentFrom"
 IDENTITIES: Final = (SAME, DIFFERENT)
-#: The predicate of an atom on a class expression, which has no name.
-EXPRESSION: Final = "_:expression"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +83,16 @@ class Atom:
     Attributes:
         kind: what the predicate is used as.
         predicate: IRI of a class, property, datatype or builtin; as the parser returns it, perhaps
-            a bare name.
+            a bare name; of a class expression or a data range, "_:" and its words.
         places: of the predicate and of each argument; empty when it was not read from text.
+        expression: the triples of the class expression or data range, the first one about it.
     """
 
     kind: AtomKind
     predicate: str
     arguments: tuple[Term, ...]
     places: tuple[Place, ...] = field(default=(), compare=False)
+    expression: tuple[Triple, ...] = field(default=(), repr=False)
 
     def place(self, argument: int | None = None) -> Place | None:
         """Place of the predicate, or of an argument."""
@@ -123,6 +126,7 @@ class Rule:
         file: the ontology file, or the file of rules as text.
         line: of the file, where the rule begins; None where the file does not show it.
         triples: its RDF, as an ontology has it; none of a rule as text.
+        undeclared: variables that its ontology does not declare as such.
     """
 
     name: str
@@ -132,6 +136,7 @@ class Rule:
     file: Path = Path()
     line: int | None = None
     triples: tuple[Triple, ...] = field(default=(), repr=False)
+    undeclared: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @cached_property
     def text(self) -> str:
@@ -198,6 +203,30 @@ BUILTINS: Final[Mapping[str, tuple[int, int]]] = dict.fromkeys(TESTERS, (2, 2)) 
 }
 
 
+#: What computes from its result, too, and only from variables.
+_BOTH_WAYS: Final = frozenset(SWRLB + name for name in ("booleanNot", "date", "dateTime", "time"))
+
+
+def computed(atom: Atom, bound: Collection[str]) -> frozenset[str]:
+    """Variables to which Pellet gives a value in a built-in, where others have one.
+
+    It is the first argument, once all others have values. Dates and times also give all of their
+    parts, and booleanNot its argument: but these are computed from variables only. (Found by giving
+    Pellet each of its built-ins, with each argument left open.)
+    """
+    if not atom.computes or not atom.arguments:
+        return frozenset()
+    first, *others = atom.arguments
+    known = all(term.name in bound for term in others if isinstance(term, Variable))
+    is_both_ways = atom.predicate in _BOTH_WAYS
+    found = frozenset[str]()
+    if known and not (is_both_ways and any(isinstance(term, Lit) for term in others)):
+        found |= {term.name for term in (first,) if isinstance(term, Variable)}
+    if is_both_ways and isinstance(first, Variable) and first.name in bound:
+        found |= {term.name for term in others if isinstance(term, Variable)}
+    return found - set(bound)
+
+
 def mirrored(sign: str) -> str:
     """The sign of a comparison with its sides exchanged: > for <."""
     return sign.translate(str.maketrans("<>", "><"))
@@ -236,7 +265,7 @@ def naming(shared: Callable[[str], bool]) -> Naming:
 
     def name(iri: str) -> str:
         bare = local_name(iri)
-        if ":" not in iri or (namespace(iri) == SWRLB and not shared(iri)):
+        if iri.startswith("_:") or ":" not in iri or (namespace(iri) == SWRLB and not shared(iri)):
             return bare
         return (
             bare

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain, count
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple, TypeVar
 
 import rdflib
 
@@ -22,6 +22,7 @@ from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.rules import Atom, AtomKind, Named, Place, Rule, RuleError, Term, Variable
+from suave_des.knowledge.rules.expressions import in_words
 from suave_des.knowledge.rules.parser import parse_rules
 
 # The names that rules may use, and checks of one rule for mistakes that Pellet drops in silence, or
@@ -49,11 +50,16 @@ class Vocabulary:
         ranges: datatypes that the values of a data property can have, where that is one datatype or
             a choice of them.
         enumerations: the values that a data property can have, where its range lists them.
+        used: what anything says of individuals or of other terms, or a rule concludes, whether or
+            not it is declared.
+        whole: data properties of which something has or concludes a whole number.
     """
 
     kinds: Mapping[str, frozenset[str]]
     ranges: Mapping[str, frozenset[str]]
     enumerations: Mapping[str, frozenset[str]]
+    used: frozenset[str] = frozenset()
+    whole: frozenset[str] = frozenset()
 
     @classmethod
     def of(
@@ -69,7 +75,11 @@ class Vocabulary:
             set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}}
         )
         ranges: dict[str, set[str]] = defaultdict(set)
+        used, whole = set[str](), set[str]()
         for subject, predicate, value in triples:
+            used |= {term for term in (subject, predicate, value) if isinstance(term, str)}
+            if isinstance(value, Lit) and value.datatype in rdf.WHOLE:
+                whole.add(predicate)
             if predicate == rdf.RDF_TYPE and isinstance(value, str):
                 if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
                     kinds[subject].add(_DECLARED.get(value, "individual"))
@@ -90,8 +100,22 @@ class Vocabulary:
         single = {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
         texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
         return cls(
-            {iri: frozenset(found) for iri, found in kinds.items()}, single | texts, enumerations
+            {iri: frozenset(found) for iri, found in kinds.items()},
+            single | texts,
+            enumerations,
+            frozenset(used),
+            frozenset(whole),
         )
+
+    def with_rules(self, rules: Iterable[Rule]) -> Vocabulary:
+        """Add what the heads of rules use."""
+        used, whole = set(self.used), set(self.whole)
+        for atom in (atom for rule in rules for atom in rule.head):
+            used |= {atom.predicate, *(t.iri for t in atom.arguments if isinstance(t, Named))}
+            # A variable may stand for a whole number.
+            if any(isinstance(t, Variable) or t[-1] in rdf.WHOLE for t in atom.arguments[1:]):
+                whole.add(atom.predicate)
+        return replace(self, used=frozenset(used), whole=frozenset(whole))
 
     @cached_property
     def by_name(self) -> Mapping[str, tuple[str, ...]]:
@@ -126,8 +150,21 @@ class Vocabulary:
         return nearest(bare, known)
 
 
-#: What is wrong in a rule: where, in words, and what would be right, if that is known.
-Problem = tuple[Place | None, str, str | None]
+class Problem(NamedTuple):
+    """What is wrong in a rule.
+
+    Attributes:
+        remedy: what would be right, if that is known.
+        is_fatal: whether a reasoner drops the rule, or what it concludes is a contradiction;
+            else it only never fires.
+    """
+
+    place: Place | None
+    message: str
+    remedy: str | None
+    is_fatal: bool = True
+
+
 _DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
 
@@ -142,15 +179,25 @@ def about_rule(
     return Finding(level, message, str(rule.file), line, rule.name, column, remedy)
 
 
-def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[Finding]:
-    """Find the problems with which a rule cannot work, in the order of its text."""
+def rule_problems(rule: Rule, vocabulary: Vocabulary) -> list[Problem]:
+    """Find what keeps a rule from ever having an effect, in the order of its text."""
     found = list(_variable_problems(rule))
     for number, atom in enumerate(rule.atoms):
         found += _atom_problems(atom, vocabulary, is_head=number >= len(rule.body))
     if not rule.head:
-        found.append((None, "the rule concludes nothing", "write at least one atom after ->"))
-    ordered = sorted(found, key=lambda problem: (problem[0] or Place(0, 0), problem[1]))
-    return [about_rule(rule, message, place, remedy) for place, message, remedy in ordered]
+        found.append(
+            Problem(None, "the rule concludes nothing", "write at least one atom after ->")
+        )
+    return sorted(found, key=lambda problem: (problem.place or Place(0, 0), problem.message))
+
+
+def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[Finding]:
+    """Find the problems with which a rule cannot be used, in the order of its text."""
+    return [
+        about_rule(rule, each.message, each.place, each.remedy)
+        for each in rule_problems(rule, vocabulary)
+        if each.is_fatal
+    ]
 
 
 def check_rule(rule: Rule, vocabulary: Vocabulary) -> Rule:
@@ -194,60 +241,65 @@ def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iter
     name = local_name(atom.predicate)
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Lit) and not rdf.is_well_formed(term):
-            yield (
-                atom.place(number),
-                f"{term.text!r} is not an xsd:{local_name(term.datatype)}",
-                None,
-            )
+            words = f"{term.text!r} is not an xsd:{local_name(term.datatype)}"
+            yield Problem(atom.place(number), words, None)
             return
     if atom.kind == "builtin":
         yield from _builtin_problems(atom, name, is_head=is_head)
-    elif (wrong := _predicate_problem(atom, name, vocabulary)) is not None:
+    elif (wrong := _predicate_problem(atom, name, vocabulary, is_head=is_head)) is not None:
         yield wrong
         return
     elif len(atom.arguments) != (wanted := _ARGUMENTS[atom.kind]):
         words = "one argument" if wanted == 1 else "two arguments"
-        yield atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None
+        yield Problem(atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None)
         return
     for number, term in enumerate(atom.arguments):
         yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
 
 
-def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem | None:
-    """Check that a class, property or datatype is declared, and used as declared."""
+def _predicate_problem(
+    atom: Atom, name: str, vocabulary: Vocabulary, *, is_head: bool
+) -> Problem | None:
+    """Check that a class, property or datatype can hold of something, and is used as declared."""
     if atom.kind == "" or not atom.predicate:
-        return atom.place(), "an atom without a kind that SWRL knows, or without a name", None
-    declared = vocabulary.kinds.get(atom.predicate, frozenset())
+        words = "an atom without a kind that SWRL knows, or without a name"
+        return Problem(atom.place(), words, None)
     if atom.kind == "range":
-        known = [
-            *map(str, dir(rdflib.XSD)),
-            *(iri for iri, kinds in vocabulary.kinds.items() if "datatype" in kinds),
-        ]
-        problem = f"datatype {name} is not defined"
-        return (
-            None
-            if atom.predicate in known
-            else (atom.place(), problem, nearest(name, map(local_name, known)))
-        )
+        return _range_problem(atom, name, vocabulary, is_head=is_head)
+    declared = vocabulary.kinds.get(atom.predicate, frozenset())
     wanted = _DECLARED_AS.get(atom.kind)
-    if wanted is None or wanted in declared or atom.predicate == swrl.EXPRESSION:
+    if wanted is None or wanted in declared or atom.expression:
         return None
     if not declared:
+        if is_head or atom.predicate in vocabulary.used:
+            return None  # a reasoner takes it as it is used
         kinds = ("class",) if atom.kind == "class" else ("object property", "data property")
         remedy = (
             vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
         )
-        return atom.place(), f"{wanted} {name} is not defined", remedy
+        return Problem(atom.place(), f"{wanted} {name} is not defined", remedy)
     if "class" in declared:
-        return atom.place(), f"{name} is a class, but is used as a property", f"write {name}(?x)"
+        words = f"{name} is a class, but is used as a property"
+        return Problem(atom.place(), words, f"write {name}(?x)")
     found = next(
         (kind for kind in ("object property", "data property") if kind in declared), min(declared)
     )
-    return (
-        atom.place(),
-        f"{name} is {with_article(found)}, but is used as {with_article(wanted)}",
-        None,
-    )
+    words = f"{name} is {with_article(found)}, but is used as {with_article(wanted)}"
+    return Problem(atom.place(), words, None)
+
+
+def _range_problem(
+    atom: Atom, name: str, vocabulary: Vocabulary, *, is_head: bool
+) -> Problem | None:
+    if is_head:
+        words = f"datatype {name} occurs in the head"
+        return Problem(atom.place(), words, "Pellet takes datatypes in bodies only")
+    defined = (iri for iri, kinds in vocabulary.kinds.items() if "datatype" in kinds)
+    known = [*map(str, dir(rdflib.XSD)), *defined]
+    if atom.expression or atom.predicate in known:
+        return None
+    words = f"datatype {name} is not defined"
+    return Problem(atom.place(), words, nearest(name, map(local_name, known)))
 
 
 def _argument_problems(
@@ -262,40 +314,47 @@ def _argument_problems(
         atom.takes_value(number),
     )
     if isinstance(term, Lit) and not takes_value:
-        yield (
-            place,
-            f"{name}: {swrl.write_term(term)} is a value, but an individual is needed",
-            None,
-        )
+        words = f"{name}: {swrl.write_term(term)} is a value, but an individual is needed"
+        yield Problem(place, words, None)
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:
-            problem = f"{name}: {thing} is an individual where a value is needed"
-            yield place, problem, f'a text needs quotes: "{thing}"'
-        elif "individual" not in vocabulary.kinds.get(term.iri, ()):
-            yield (
-                place,
-                f"individual {thing} is not defined",
-                vocabulary.guess(term.iri, ("individual",)),
-            )
+            words = f"{name}: {thing} is an individual where a value is needed"
+            yield Problem(place, words, f'a text needs quotes: "{thing}"')
+        elif (
+            not is_head
+            and atom.kind in _DECLARED_AS
+            and atom.predicate != rdf.OWL + "Thing"
+            and not atom.expression
+            and term.iri not in vocabulary.used.union(vocabulary.kinds)
+        ):
+            words = f"individual {thing} is not defined"
+            yield Problem(place, words, vocabulary.guess(term.iri, ("individual",)))
     elif isinstance(term, Lit) and atom.kind == "data":
-        consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
-        ranges = vocabulary.ranges.get(atom.predicate, frozenset({term.datatype}))
-        values = vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))
-        whole = (
-            term.datatype == rdf.XSD + "integer" and rdf.XSD + "decimal" in ranges
-        )  # matches no decimal, but is one
-        if term.datatype not in ranges and not (whole and is_head):
-            wanted = " or ".join(sorted(map(local_name, ranges)))
-            problem = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
-            yield place, problem, f"write {term.text}.0" if whole else f"a value of {wanted}"
-        elif term.text not in values:
-            problem = f"{swrl.write_term(term)} is not among the values of {name}: it {consequence}"
-            yield (
-                place,
-                problem,
-                nearest(term.text, values) or f"one of {', '.join(sorted(values))}",
-            )
+        yield from _value_problems(atom, place, term, vocabulary, is_head=is_head)
+
+
+def _value_problems(
+    atom: Atom, place: Place | None, term: Lit, vocabulary: Vocabulary, *, is_head: bool
+) -> Iterator[Problem]:
+    """Check that a property can have a value."""
+    name = local_name(atom.predicate)
+    consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
+    ranges = vocabulary.ranges.get(atom.predicate, frozenset({term.datatype}))
+    values = vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))
+    # A whole number is a decimal, which matches no decimal as they are measured.
+    whole = term.datatype in rdf.WHOLE and rdf.XSD + "decimal" in ranges
+    can_be = whole and (is_head or atom.predicate in vocabulary.whole)
+    can_be = can_be or (term.datatype in rdf.WHOLE and not ranges.isdisjoint(rdf.WHOLE))
+    if term.datatype not in ranges and not can_be:
+        wanted = " or ".join(sorted(map(local_name, ranges)))
+        words = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
+        remedy = f"write {term.text}.0" if whole else f"a value of {wanted}"
+        yield Problem(place, words, remedy, is_head)
+    elif term.text not in values:
+        words = f"{swrl.write_term(term)} is not among the values of {name}: it {consequence}"
+        remedy = nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
+        yield Problem(place, words, remedy, is_head)
 
 
 def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Problem]:
@@ -303,14 +362,11 @@ def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Probl
     if counts is None:
         known = sorted(map(local_name, swrl.BUILTINS))
         suggestion = nearest(name, known) or f"known: {', '.join(known)}"
-        yield atom.place(), f"there is no builtin {name} in Pellet", suggestion
+        yield Problem(atom.place(), f"there is no builtin {name} in Pellet", suggestion)
         return
     if is_head:
-        yield (
-            atom.place(),
-            f"builtin {name} occurs in the head",
-            "Pellet takes builtins in bodies only",
-        )
+        words = f"builtin {name} occurs in the head"
+        yield Problem(atom.place(), words, "Pellet takes builtins in bodies only")
     least, most = counts
     if not least <= len(atom.arguments) <= most:
         wanted = (
@@ -320,8 +376,9 @@ def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Probl
             if most == 99
             else f"{least} to {most}"
         )
+        words = f"{name} takes {wanted} arguments, not {len(atom.arguments)}"
         remedy = "arguments are separated by commas, and decimals have a point"
-        yield atom.place(), f"{name} takes {wanted} arguments, not {len(atom.arguments)}", remedy
+        yield Problem(atom.place(), words, remedy)
 
 
 def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
@@ -340,46 +397,22 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(filter(None, (individuals[name], values[name])), default=None)
-        yield place, f"?{name} stands for an individual and for a value", None
+        yield Problem(place, f"?{name} stands for an individual and for a value", None)
     bound = {
-        name
-        for atom in rule.body
-        if atom.kind in ("class", "object", "data", "same")
-        for name in atom.variables()
+        name for atom in rule.body if atom.kind in swrl.FACT_KINDS for name in atom.variables()
     }
     builtins = [atom for atom in rule.body if atom.kind == "builtin" and atom.arguments]
-    while more := _computed(builtins, bound) - bound:
+    while more := {name for atom in builtins for name in swrl.computed(atom, bound)} - bound:
         bound |= more
-    different = [atom for atom in rule.body if atom.kind == "different"]  # Pellet takes any two
-    for atom, number, name in _uses([*builtins, *different]):
+    ranges = [atom for atom in rule.body if atom.kind == "range"]
+    for atom, number, name in _uses([*builtins, *ranges]):
         if name not in bound:
-            problem = (
-                f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
-            )
-            yield atom.place(number), problem, nearest(name, bound)
+            words = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
+            yield Problem(atom.place(number), words, nearest(name, bound))
     for atom, number, name in _uses(rule.head):
         if name not in bound:
-            problem = f"?{name} occurs in the head, but the body does not bind it"
-            yield atom.place(number), problem, nearest(name, bound)
-
-
-#: What Pellet computes from variables, and refuses to compute from literals.
-_FROM_VARIABLES: Final = {rdf.SWRLB + name for name in ("booleanNot", "date", "dateTime", "time")}
-
-
-def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
-    """Variables that builtins compute: the first argument, once all others have values."""
-    return {
-        first.name
-        for name, (first, *others) in (
-            (atom.predicate, atom.arguments) for atom in builtins if atom.computes
-        )
-        if isinstance(first, Variable)
-        and all(
-            term.name in bound if isinstance(term, Variable) else name not in _FROM_VARIABLES
-            for term in others
-        )
-    }
+            words = f"?{name} occurs in the head, but the body does not bind it"
+            yield Problem(atom.place(number), words, nearest(name, bound))
 
 
 # Rules as text.
@@ -424,8 +457,9 @@ class RulesFile:
         """
         for error in self.errors:
             raise error
-        found = (looked_up(rule, vocabulary) for rule in self.parsed)
-        return tuple(check_rule(rule, vocabulary) if rule.enabled else rule for rule in found)
+        found = [looked_up(rule, vocabulary) for rule in self.parsed]
+        known = vocabulary.with_rules(found)  # one may conclude what another asks for
+        return tuple(check_rule(rule, known) if rule.enabled else rule for rule in found)
 
 
 def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
@@ -529,8 +563,9 @@ _NAMES: Final[Mapping[str, str]] = {"same": swrl.SAME, "different": swrl.DIFFERE
 _CLASS_OF: Final = {kind: name for name, kind in swrl.KINDS.items()}
 #: Ends the names that rules without one get.
 WITHOUT_NAME: Final = "without a name"
-#: Beginnings of the IRIs that Protégé and owlready2 give to variables.
-VARIABLE_IRIS: Final = ("urn:swrl:var#", "urn:swrl#")
+#: Begins the IRIs given to variables, as Protégé does.
+_VARIABLES: Final = "urn:swrl:var#"
+_Term = TypeVar("_Term", str, str | Lit)
 
 
 @lru_cache(
@@ -546,7 +581,9 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     ):
         names: dict[str, str] = {}
         body = _read_side(file, node, "body", names)
-        found.append((node, Rule("", body, _read_side(file, node, "head", names))))
+        rule = Rule("", body, _read_side(file, node, "head", names))
+        undeclared = (name for iri, name in names.items() if _VARIABLE not in file.kinds(iri))
+        found.append((node, replace(rule, undeclared=tuple(undeclared))))
     for node, rule in sorted(found, key=lambda each: (each[1].text, each[0])):
         label, mark = file.value(node, rdf.RDFS + "label"), file.value(node, ENABLED)
         name = label.text if isinstance(label, Lit) else local_name(node)
@@ -600,14 +637,32 @@ def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> At
     arguments = [file.value(node, rdf.SWRL + name) for name in ("argument1", "argument2")]
     if kind == "builtin":
         arguments = [*file.items(file.value(node, rdf.SWRL + "arguments"))]
-    terms = tuple(_read_term(file, term, names) for term in arguments if term is not None)
-    return Atom(kind, swrl.EXPRESSION if name.startswith("_:") else name, terms)
+    expression = tuple(_renamed(_closure(file, name))) if name.startswith("_:") else ()
+    atom = Atom(kind, f"_:{in_words(expression)}" if expression else name, (), (), expression)
+    terms = (
+        _read_term(file, term, names, takes_value=atom.takes_value(number))
+        for number, term in enumerate(term for term in arguments if term is not None)
+    )
+    return replace(atom, arguments=tuple(terms))
 
 
-def _read_term(file: OntologyFile, term: str | Lit, names: dict[str, str]) -> Term:
+def _renamed(triples: Iterable[rdf.Triple]) -> Iterator[rdf.Triple]:
+    """Triples with their nodes without a name numbered, so that equal expressions are equal."""
+    names: dict[str | Lit, str] = {}
+    for subject, predicate, value in triples:
+        for term in (subject, value):
+            if isinstance(term, str) and term.startswith("_:"):
+                names.setdefault(term, f"_:e{len(names)}")
+        yield names.get(subject, subject), predicate, names.get(value, value)
+
+
+def _read_term(
+    file: OntologyFile, term: str | Lit, names: dict[str, str], *, takes_value: bool
+) -> Term:
+    """A term as Pellet takes it: in a value's place every name is that of a variable."""
     if isinstance(term, Lit):
         return term
-    if _VARIABLE not in file.kinds(term) and not term.startswith(VARIABLE_IRIS):
+    if not takes_value and _VARIABLE not in file.kinds(term):
         return Named(term)
     if term not in names:
         wish = re.sub(r"[^\w-]", "_", local_name(term)).lstrip("-") or "v"
@@ -626,7 +681,7 @@ def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
         ("_:rule", rdf.RDFS + "label", label),
     ]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
-        triples.append((VARIABLE_IRIS[0] + variable, rdf.RDF_TYPE, _VARIABLE))
+        triples.append((_VARIABLES + variable, rdf.RDF_TYPE, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
         triples.append(
@@ -638,14 +693,17 @@ def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
 def _write_term(term: Term) -> str | Lit:
     if isinstance(term, Lit):
         return term
-    return term.iri if isinstance(term, Named) else VARIABLE_IRIS[0] + term.name
+    return term.iri if isinstance(term, Named) else _VARIABLES + term.name
 
 
 def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
     node = f"_:atom{len(triples)}"
     triples.append((node, rdf.RDF_TYPE, _CLASS_OF[atom.kind]))
     if atom.kind in _PREDICATE_OF:
-        triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], atom.predicate))
+        of_atom = [(_of_atom(node, s), p, _of_atom(node, o)) for s, p, o in atom.expression]
+        predicate = of_atom[0][0] if of_atom else atom.predicate
+        triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], predicate))
+        triples += of_atom
     if atom.kind == "builtin":
         arguments = _write_list(
             [_write_term(term) for term in atom.arguments], rdf.RDF + "List", triples
@@ -655,6 +713,12 @@ def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
         for number, term in enumerate(atom.arguments[:2], start=1):
             triples.append((node, f"{rdf.SWRL}argument{number}", _write_term(term)))
     return node
+
+
+def _of_atom(node: str, term: _Term) -> _Term:
+    """A term of the expression of an atom; its nodes get names of their own in each atom."""
+    is_node = isinstance(term, str) and term.startswith("_:")
+    return f"{node}{term[2:]}" if is_node else term
 
 
 def _write_list(items: Sequence[str | Lit], kind: str, triples: list[rdf.Triple]) -> str:
