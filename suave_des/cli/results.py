@@ -206,6 +206,7 @@ def validate(
         published_for,
         read_conditions,
         read_real,
+        runs_in_a_row,
         targets_of,
     )
     from suave_des.results.validation import FILES
@@ -217,7 +218,8 @@ def validate(
         check_no_use(files.given, "with --runs-file", "leave one of them out")
     conditions = read_conditions(name, **files.replacements)
     data = data or [str(published_for(name) or PAPERS_RUNS)]
-    real = read_real([find(each, "scenarios/published") for each in data], conditions)
+    files_of_data = [find(each, "scenarios/published") for each in data]
+    real = read_real(files_of_data, conditions, runs_in_a_row(name))
     chosen = real.choose(comma_separated(managers))
     shares, limits, targets_paths = targets_of(real, targets)
     word = "published" if all(map(_is_shipped, real.files)) else "real"

@@ -14,7 +14,15 @@ import pandas
 from suave_des.errors import InputError
 from suave_des.files import read_csv
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
-from suave_des.records.runs import COLUMNS, REMEDY, SIZE_LIMIT_BYTES, is_foreign, runs_in
+from suave_des.records.runs import (
+    COLUMNS,
+    REMEDY,
+    SIZE_LIMIT_BYTES,
+    TIME_LIMIT,
+    check_one_mission,
+    is_foreign,
+    runs_in,
+)
 from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
 
 Source = pandas.DataFrame | str | Path | Sequence[str | Path]
@@ -117,6 +125,7 @@ def _read_source(path: Path) -> Missions:
         frames.append(frame)
         notes += runs.notes
     frame = pandas.concat(frames, ignore_index=True)
+    check_one_mission(frame, str(path))
     if is_exemplars or not is_ours:
         frame, swept = in_papers_order(frame), ()
     if is_campaign:
@@ -207,7 +216,8 @@ def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, .
 
     These differ between missions of one manager, seed and run, and are no metrics.
     """
-    columns = [str(name) for name in frame if name not in COLUMNS and metric_of(str(name)) is None]
+    known = (*COLUMNS, TIME_LIMIT)
+    columns = [str(name) for name in frame if name not in known and metric_of(str(name)) is None]
     if "missions" in manifest:
         with suppress(AttributeError, TypeError):
             forms = manifest.get("sweep", {})

@@ -20,7 +20,8 @@ from suave_des.records.metrics import (
     metric_of,
 )
 from suave_des.records.missions import SHARING, Missions
-from suave_des.results.real import matched
+from suave_des.records.runs import check_one_mission
+from suave_des.results.real import common_limit_s, matched
 
 _USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
@@ -71,7 +72,7 @@ class Groups:
             differ.
         time_limit_s: whole seconds that missions of every group had; where all found the pipeline,
             the longest search. Of real missions that simulated ones assist, the limit of all;
-            infinite if it is not known.
+            nan if it is not known.
         lost: by name of a group that did not find the pipeline in most of its missions, in how
             many.
         sides: real missions and those simulated under the same conditions, with the numbers of
@@ -186,12 +187,12 @@ def grouped(
     same, population = simulated
     notes = [*same.notes, *population.notes, *notes]
     real = pandas.concat([group.frame for group in groups], ignore_index=True)
-    limit_s, drawn = (
-        _common_limit_s((real, same.frame, population.frame), chosen),
-        _with_draws(population),
-    )
-    sides = (*matched(real, same.frame, same.swept), drawn)
-    return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, sides)
+    check_one_mission(real, _PLACES[0])
+    sides = dict(zip(_PLACES, (real, same.frame, population.frame), strict=True))
+    _check_numbers(sides, chosen)
+    limit_s = common_limit_s(sides)
+    matching = (*matched(real, same.frame, same.swept), _with_draws(population))
+    return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, matching)
 
 
 def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
@@ -287,27 +288,15 @@ def _time_limit_s(groups: Sequence[Group]) -> int:
     return math.floor(limit_s) or math.ceil(limit_s)
 
 
-def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric]) -> float:
-    """Check the numbers in real missions and those that assist them, and return the time limit of
-    all.
-    """
-    limits_s: list[float] = []
-    for place, frame in zip(_PLACES, frames, strict=True):
+def _check_numbers(sides: Mapping[str, pandas.DataFrame], metrics: Sequence[Metric]) -> None:
+    """Check that real missions and those that assist them have the numbers that are compared."""
+    for place, frame in sides.items():
         for metric in metrics:
             values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
             may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
             if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
                 problem = f"{metric.name} has a value that is no number, or no value at all"
                 raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
-        # Real missions may not say how long they lasted, and simulated ones may all have found the
-        # pipeline.
-        ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
-        limit_s = float(ends_s.max())
-        if abs(limit_s - min(limits_s, default=limit_s)) > _SAME_LIMIT_S:
-            problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
-            raise InputError(problem, place=place, remedy="give missions with one time limit")
-        limits_s += [] if math.isnan(limit_s) else [limit_s]
-    return math.floor(min(limits_s)) if limits_s else math.inf
 
 
 # Runs that share their draws

@@ -175,7 +175,7 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit():
         ({"same": missions(2, POINTS, 5, managers="a")}, "there is no mission of b"),
         (
             {"population": population().assign(mission_duration_s=400.0)},
-            "missions end after 400 s, others after 300 s",
+            "missions of a end after 400 s, real missions after 300 s",
         ),
         (
             {"real": real_missions(3).drop(columns="start.y_m")[:-1]},
@@ -199,8 +199,36 @@ def test_other_starts_are_other_conditions():
     in_order = real.assign(initial_y_m=real["start.y_m"]).drop(columns="start.y_m")
     assert compared(real=in_order, same=same).estimates["conditions"].eq(6).all()
     turned = in_order.iloc[::-1].sort_values("manager", kind="stable")
-    with pytest.raises(InputError, match=r"initial_y_m is .* from the simulated one"):
+    with pytest.raises(InputError, match="12 missions of manager a, which do not begin where"):
         compared(real=turned, same=same)
+
+
+def test_numbers_of_conditions_that_contradict_the_starts_are_refused():
+    real, same = real_missions(2), missions(2, POINTS, 5)
+    same["initial_y_m"] = same["start.y_m"] + 0.4
+    places = real["start.y_m"].map({at: 6 - number for number, at in enumerate(POINTS)})
+    turned = real.assign(initial_y_m=real["start.y_m"], condition=places).drop(columns="start.y_m")
+    with pytest.raises(InputError, match="initial_y_m of manager a under condition 1 is"):
+        compared(real=turned, same=same)
+
+
+def test_missions_of_one_manager_in_reverse_are_refused():
+    real, same = real_missions(2), missions(2, POINTS, 5)
+    same["initial_y_m"] = same["start.y_m"]
+    real = real.assign(initial_y_m=real["start.y_m"]).drop(columns="start.y_m")
+    half = real[real["manager"] == "b"].iloc[::-1]
+    with pytest.raises(InputError, match="12 missions of manager b, which do not begin where"):
+        compared(real=pandas.concat([real[real["manager"] == "a"], half]), same=same)
+
+
+def test_real_missions_without_those_of_a_condition_are_not_assigned_by_their_order():
+    real, same = real_missions(5), missions(2, POINTS, 5)
+    same["initial_y_m"] = same["start.y_m"]
+    real = real.assign(initial_y_m=real["start.y_m"]).drop(columns="start.y_m")
+    at = real.groupby("manager").cumcount()
+    for left in (at < 24, (at < 5) | (at >= 11)):  # the last six, and the second and one more
+        with pytest.raises(InputError, match="24 missions of manager a, which do not begin where"):
+            compared(real=real[left], same=same)
 
 
 def test_runs_that_share_a_draw_are_one_draw():
