@@ -103,7 +103,8 @@ def compare(
     real missions can be assisted by simulated ones.
     """
     from suave_des.records.missions import read_missions
-    from suave_des.results.compare import compare_assisted, compare_groups
+    from suave_des.results.assisted import compare_assisted
+    from suave_des.results.compare import compare_groups
     from suave_des.results.groups import grouped
 
     if out is not None:

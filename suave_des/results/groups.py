@@ -188,10 +188,17 @@ def grouped(
     notes = [*same.notes, *population.notes, *notes]
     real = pandas.concat([group.frame for group in groups], ignore_index=True)
     check_one_mission(real, _PLACES[0])
+    if population.swept:
+        problem = (
+            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
+        )
+        raise InputError(
+            problem, place="population", remedy="draw the conditions, as perturbations"
+        )
     sides = dict(zip(_PLACES, (real, same.frame, population.frame), strict=True))
     _check_numbers(sides, chosen)
     limit_s = common_limit_s(sides)
-    matching = (*matched(real, same.frame, same.swept), _with_draws(population))
+    matching = matched(real, same.frame, population.frame, same.swept)
     return Groups(missions, groups, chosen, tuple(notes), counted, limit_s, lost, matching)
 
 
@@ -315,20 +322,6 @@ def first_alike(frame: pandas.DataFrame, alike: int = 0) -> pandas.Series[float]
     """
     alike = alike or runs_sharing_draw(frame)
     return (frame["run"] - 1) // alike * alike + 1
-
-
-def _with_draws(population: Missions) -> pandas.DataFrame:
-    """Return simulated missions, which must be of no sweep, with the numbers of their draws."""
-    if population.swept:
-        problem = (
-            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
-        )
-        raise InputError(
-            problem, place="population", remedy="draw the conditions, as perturbations"
-        )
-    frame = population.frame
-    drawn = frame.assign(draw=first_alike(frame))
-    return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 
 def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:

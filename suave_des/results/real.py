@@ -25,8 +25,8 @@ from suave_des.arguments import plain_arguments
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
 from suave_des.errors import InputError, line_error, located, number_of
-from suave_des.records.metrics import FOUND, SEARCH_TIME
-from suave_des.records.runs import TIME_LIMIT, Runs, check_one_mission, read_runs
+from suave_des.records.metrics import FOUND, SEARCH_TIME, metric_of
+from suave_des.records.runs import COLUMNS, TIME_LIMIT, Runs, check_one_mission, read_runs
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario.models import Number, Strict, in_order, wrong
@@ -44,6 +44,14 @@ _STARTS = {"start.x_m": "initial_x_m", "start.y_m": "initial_y_m"}
 """Parameters that place the vehicle, and columns that say where missions began."""
 _START_M = 0.25
 """Starts under the same condition differ by no more, apart from a shift that all have."""
+_DRAW = "draw the conditions of the population as those of the real missions were drawn"
+_BEYOND, _BEYOND_OF_FEW = 0.05, 5.0
+"""How far a real condition may be beyond those drawn, in parts of their range: so much, and so much
+divided by the number of draws.
+"""
+_SURELY = 0.001
+"""p below which real conditions are not of a population."""
+_OF_CAMPAIGNS = ("source", "ensemble_member")
 _GIVE_NUMBERS = (
     f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
 )
@@ -444,16 +452,21 @@ def _limits_s(frame: pandas.DataFrame, place: str) -> pandas.Series[float]:
 
 
 def matched(
-    real: pandas.DataFrame, simulated: pandas.DataFrame, names: Sequence[str]
-) -> tuple[pandas.DataFrame, pandas.DataFrame]:
-    """Return real and simulated missions with the numbers of their conditions, the points of a
-    sweep of these names.
+    real: pandas.DataFrame,
+    same: pandas.DataFrame,
+    population: pandas.DataFrame,
+    names: Sequence[str],
+) -> tuple[pandas.DataFrame, pandas.DataFrame, pandas.DataFrame]:
+    """Return real missions and those that assist them: with the numbers of their conditions, those
+    simulated under the same conditions, likewise, and a population with the numbers of its draws.
 
-    Conditions of real missions are found as by `numbered`; simulated ones are in the order of the
-    points.
+    Conditions are the points of a sweep of these names. Those of real missions are found as by
+    `numbered`; simulated ones are in the order of the points. Missions of a population that have
+    the same values are of one draw.
 
     Raises:
-        InputError: nothing is swept, or the real missions are not of these conditions.
+        InputError: nothing is swept, the real missions are not of these conditions, or the
+            population is of another scenario, or drawn otherwise than the real conditions were.
     """
     if not names:
         remedy = (
@@ -461,13 +474,66 @@ def matched(
         )
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
     names = list(names)
-    by_point = simulated.groupby(names, sort=False, dropna=False)
-    starts = by_point[[name for name in _STARTS.values() if name in simulated]].mean()
+    by_point = same.groupby(names, sort=False, dropna=False)
+    starts = by_point[[name for name in _STARTS.values() if name in same]].mean()
     with located(place="real missions"):
-        conditions = simulated[names].drop_duplicates().astype(object)
+        conditions = same[names].drop_duplicates().astype(object).reset_index(drop=True)
         real = numbered(real, conditions, starts=starts)
         _check_starts(real, starts)
-    return real, simulated.assign(**{CONDITION: by_point.ngroup() + 1})
+    same = same.assign(**{CONDITION: by_point.ngroup() + 1})
+    with located(place="population"):
+        _check_scenario(same, population, names)
+        draws = population[names].drop_duplicates()
+        for name in names:
+            flown = conditions.loc[sorted(set(real[CONDITION] - 1)), name]
+            _check_drawn(name, flown, draws[name])
+    by_draw = population.groupby(names, sort=False, dropna=False)
+    return real, same, population.assign(draw=by_draw.ngroup())
+
+
+def _check_scenario(
+    same: pandas.DataFrame, population: pandas.DataFrame, names: Sequence[str]
+) -> None:
+    """Check that a population is of the scenario of the missions under the real conditions, and
+    varies in what these vary in.
+    """
+    scenarios = sorted(set(same["scenario"]) - {""}), sorted(set(population["scenario"]) - {""})
+    if all(scenarios) and scenarios[0] != scenarios[1]:
+        problem = f"it is of scenario {scenarios[1][0]}, and the missions under the real conditions of {scenarios[0][0]}"
+        raise InputError(problem, remedy="give campaigns of one scenario")
+    for name in names:
+        if name not in population:
+            problem = f"it does not draw {name}, in which the real conditions differ"
+            raise InputError(problem, remedy=_DRAW)
+    known = {*COLUMNS, *same, *_OF_CAMPAIGNS}
+    for name in map(str, population):
+        if name not in known and metric_of(name) is None and population[name].nunique() > 1:
+            problem = (
+                f"it draws {name}, which is one for all the missions under the real conditions"
+            )
+            raise InputError(problem, remedy=_DRAW)
+
+
+def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]) -> None:
+    """Check that the values of a parameter under the real conditions may be from those drawn."""
+    from scipy.stats import ks_2samp
+
+    values = pandas.to_numeric(flown, errors="coerce")
+    numbers = pandas.to_numeric(drawn, errors="coerce")
+    if values.isna().any() or numbers.isna().any():
+        known = set(drawn.astype(str))
+        for value in flown[~flown.astype(str).isin(known)][:1]:
+            raise InputError(f"it never draws {name}={value}, a real condition", remedy=_DRAW)
+        return
+    low, high = float(numbers.min()), float(numbers.max())
+    beyond = (high - low) * (_BEYOND + _BEYOND_OF_FEW / len(numbers)) + _ABSOLUTE
+    for value in values[(values < low - beyond) | (values > high + beyond)][:1]:
+        problem = f"it draws {name} from {low:g} to {high:g}, and a real condition has {value:g}"
+        raise InputError(problem, remedy=_DRAW)
+    if ks_2samp(values, numbers).pvalue < _SURELY:
+        problem = f"it draws {name} otherwise than the real conditions are spread"
+        ends = f"{low:g} to {high:g}, and these {values.min():g} to {values.max():g}"
+        raise InputError(f"{problem}: from {ends} (Kolmogorov-Smirnov p < {_SURELY})", remedy=_DRAW)
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:
