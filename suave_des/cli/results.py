@@ -110,7 +110,8 @@ def compare(
     real missions can be assisted by simulated ones.
     """
     from suave_des.records.missions import read_missions
-    from suave_des.results.compare import compare_assisted, compare_groups
+    from suave_des.results.assisted import compare_assisted
+    from suave_des.results.compare import compare_groups
     from suave_des.results.groups import grouped
 
     if out is not None:
@@ -213,6 +214,7 @@ def validate(
         published_for,
         read_conditions,
         read_real,
+        runs_in_a_row,
         targets_of,
     )
     from suave_des.results.validation import validate as compare
@@ -223,7 +225,8 @@ def validate(
         check_no_use(files.given, "with --runs-file", "leave one of them out")
     conditions = read_conditions(name, **files.replacements)
     data = data or [str(published_for(name) or PAPERS_RUNS)]
-    real = read_real([find(each, "scenarios/published") for each in data], conditions)
+    files_of_data = [find(each, "scenarios/published") for each in data]
+    real = read_real(files_of_data, conditions, runs_in_a_row(name))
     chosen = real.choose(comma_separated(managers))
     shares, limits, targets_paths = targets_of(real, targets)
     word = "published" if all(map(_is_shipped, real.files)) else "real"

@@ -14,7 +14,15 @@ from suave_des.files import read_csv
 from suave_des.records.contents import Manifest
 from suave_des.records.contents import Missions as ManifestMissions
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
-from suave_des.records.runs import COLUMNS, REMEDY, SIZE_LIMIT_BYTES, is_foreign, runs_in
+from suave_des.records.runs import (
+    COLUMNS,
+    REMEDY,
+    SIZE_LIMIT_BYTES,
+    TIME_LIMIT,
+    check_one_mission,
+    is_foreign,
+    runs_in,
+)
 from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
 
 Source = pandas.DataFrame | str | Path | Sequence[str | Path]
@@ -121,6 +129,7 @@ def _read_source(path: Path) -> Missions:
         frames.append(frame)
         notes += runs.notes
     frame = pandas.concat(frames, ignore_index=True)
+    check_one_mission(frame, str(path))
     if is_exemplars or not is_ours:
         frame, swept = in_papers_order(frame), ()
     if is_campaign:
@@ -223,7 +232,8 @@ def _swept(manifest: Manifest, frame: pandas.DataFrame) -> tuple[str, ...]:
 
     These differ between missions of one manager, seed and run, and are no metrics.
     """
-    columns = [str(name) for name in frame if name not in COLUMNS and metric_of(str(name)) is None]
+    known = (*COLUMNS, TIME_LIMIT)
+    columns = [str(name) for name in frame if name not in known and metric_of(str(name)) is None]
     if manifest.missions is not None:
         return tuple(name for name in manifest.sweep.names if name in columns)
     if not columns or frame["run"].isna().any():

@@ -51,7 +51,15 @@ detection_x_m is nan where it is not known or nothing was detected; pipeline_fou
 where the file does not say; mean_reaction_time_s nan where nothing was reacted to or the file does
 not say. run is nan, and scenario and seed, which are text, empty where the file does not say.
 """
-_LIMIT, _DURATION = "time_limit_s", "mission_duration_s"
+TIME_LIMIT = "time_limit_s"
+"""Column of frames whose file has it, and of the exemplar's file of 2023."""
+MISSION = "mission"
+"""Column of frames of the exemplar's files: its name of the mission, such as "suave_extended"."""
+_LIMIT, _DURATION = TIME_LIMIT, "mission_duration_s"
+_POSITION = "initial pos (x,y)"
+_START = ("initial_x_m", "initial_y_m")
+_PLACE = r"^\(\s*([-+.0-9e]+)\s*,\s*([-+.0-9e]+)\s*\)$"
+"""How the exemplar writes where a mission began: (-17.0, 2.57)."""
 SIZE_LIMIT_BYTES = 500_000_000
 """Of a file of results."""
 _GREATEST = 1e12
@@ -82,7 +90,7 @@ _Layout = Mapping[str, tuple[str, Callable[[_Mission], object]]]
 _LAYOUT_2023: _Layout = {
     "mission_name": ("manager", lambda of: of["name"]),
     "datetime": ("", lambda of: f"{of['month']}-{of['stamp']:%d-%Y-%H-%M-%S}"),
-    "initial pos (x,y)": ("", lambda of: of["position"]),
+    _POSITION: ("", lambda of: of["position"]),
     "time budget (s)": (_LIMIT, lambda of: _whole(of[_LIMIT])),
     # The program wrote -1 when the pipeline was not found; the published table has the limit
     # instead.
@@ -92,7 +100,7 @@ _LAYOUT_2023: _Layout = {
 _LAYOUT_1_5: _Layout = {
     "mission name": ("manager", lambda of: of["name"]),
     "datetime": ("", lambda of: f"{of['stamp']:%d}-{of['month']}-{of['stamp']:%Y-%H-%M-%S}"),
-    "initial pos (x,y)": ("", lambda of: of["position"]),
+    _POSITION: ("", lambda of: of["position"]),
     "mission duration (s)": (_DURATION, lambda of: int(of[_DURATION])),
     "pipeline found": (FOUND, lambda of: of[FOUND]),
     # The program writes the mission's duration when the pipeline was not found.
@@ -167,6 +175,18 @@ class Runs:
             raise line_error(
                 next(iter(self.files)), line, problem, "give the missions of one scenario"
             )
+        check_one_mission(self.frame, ", ".join(map(str, self.files)))
+
+
+def check_one_mission(frame: pandas.DataFrame, file: str) -> None:
+    """Raise an InputError if one manager has several of the exemplar's missions, such as "suave"
+    and "suave_extended".
+    """
+    for manager, names in frame.get(MISSION, pandas.Series(dtype=str)).groupby(frame["manager"]):
+        kinds = [name for name in names.dropna().unique() if name]
+        if len(kinds) > 1:
+            problem = f"manager {manager} has missions of {kinds[0]} and of {kinds[1]}"
+            raise InputError(problem, file=file, remedy="give the missions of one of them")
 
 
 @plain_arguments
@@ -254,9 +274,8 @@ class _Cells:
         names = self.text["manager"]
         are_names = {name: bool(name.strip()) for name in managers}  # one of exec: has spaces
         self._check("manager", self.text["manager"].map(are_names), "a manager's name")
-        self.text["manager"] = self.text["manager"].map(
-            {name: name if is_own else manager_of(name) for name in managers}
-        )
+        if not is_own:
+            self._split_names(managers)
         search_time_s = self._numbers(SEARCH_TIME)
         limit_s = self._numbers(_LIMIT, least=0.0) if _LIMIT in self.text else None
         if limit_s is not None and not is_own:
@@ -273,9 +292,7 @@ class _Cells:
             name: "" if name in ("scenario", "seed") else math.nan for name in COLUMNS
         }
         values |= {
-            name: self._converted(name)
-            for name in map(str, self.text)
-            if name not in ("", _LIMIT, FOUND)
+            name: self._converted(name) for name in map(str, self.text) if name not in ("", FOUND)
         }
         values |= {
             SEARCH_TIME: search_time_s,
@@ -294,12 +311,21 @@ class _Cells:
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)
         return frame
 
+    def _split_names(self, names: Sequence[str]) -> None:
+        """Take the exemplar's names of missions apart: manager, mission, and where it began."""
+        missions = {name: " ".join(name.split()[:-1]) for name in names}
+        self.text[MISSION] = self.text["manager"].map(missions)
+        self.text["manager"] = self.text["manager"].map({name: manager_of(name) for name in names})
+        if _POSITION in self.text:
+            places = self.text[_POSITION].str.extract(_PLACE).fillna("")
+            self.text = self.text.assign(**{name: places[at] for at, name in enumerate(_START)})
+
     def _converted(self, name: str) -> Any:
         """Convert a column: a metric to numbers; another to numbers if all its cells are, to
         integers if these are.
         """
         text = self.text[name]
-        if name in ("scenario", "manager", "seed"):
+        if name in ("scenario", "manager", "seed", MISSION):
             return text
         if name == "run" or metric_of(name) is not None:
             is_whole = COLUMN_TYPES.get(name) == "int"

@@ -14,7 +14,7 @@ import pandas
 from suave_des.errors import number_of
 from suave_des.estimates import Estimate, interval_names
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
-from suave_des.results.conclusions import conclusion, difference_claim, overall_conclusion
+from suave_des.results.conclusions import conclusion, overall_conclusion
 from suave_des.results.groups import Groups, listed
 from suave_des.results.statistics import A12, RANK_BISERIAL
 from suave_des.tables import EFFECT, Section, Table, Written, capital, rows_of
@@ -214,57 +214,6 @@ class Comparison(Written):
         }
 
 
-@dataclass(frozen=True)
-class AssistedComparison(Written):
-    """What real missions show, alone and assisted by simulated ones.
-
-        found = run_campaign("same.yaml").assist("real.csv", "population")
-        found.estimates[["group", "other", "assisted", "narrower", "conclusion"]]
-
-    Attributes:
-        estimates: a row for each metric and manager, or pair of managers: group, other (whose mean
-            is subtracted, or empty), metric, runs (real missions of the group), conditions, alone
-            and assisted (means with the ends of their intervals), weight, narrower (how many times
-            as wide the interval of the real missions alone is), equal_runs (real missions, as many
-            in each condition, that would give the assisted interval), helps, and conclusion.
-        conclusion: of all; empty, as each estimate has its own.
-    """
-
-    estimates: pandas.DataFrame
-    notes: tuple[str, ...]
-    metrics: tuple[Metric, ...] = field(repr=False)
-    conclusion: str = field(repr=False, default="")
-
-    def frames(self) -> dict[str, pandas.DataFrame]:
-        """Return the estimates."""
-        return {"estimates": self.estimates}
-
-    def sections(self) -> Iterator[Section]:
-        """Yield a table for each metric."""
-        headings = (
-            "mean",
-            "n",
-            "alone",
-            "95% interval",
-            "assisted",
-            "95% interval",
-            "weight",
-            "equals",
-        )
-        for metric in self.metrics:
-            own = rows_of(self.estimates[self.estimates["metric"] == metric.name])
-            table = Table(headings, [_assisted_cells(row, metric) for row in own])
-            yield Section(capital(metric.heading), [table], [row["conclusion"] for row in own])
-
-    def remarks(self) -> list[str]:
-        """Describe the numbers, and what to know about the data."""
-        how = (
-            "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
-            "equals: real missions that would give the assisted interval alone, as many in each condition as now.",
-        )
-        return [*how, *(f"Note: {note}." for note in self.notes)]
-
-
 def _over_all(tests: int) -> str:
     return f", Holm's correction over all {tests}" if tests > 1 else ""
 
@@ -363,27 +312,6 @@ def _p(p: float) -> str:
     if p < 1e-300:  # next to the least that a float can hold
         return "<1e-300"
     return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
-
-
-def _assisted_cells(row: Row, metric: Metric) -> tuple[str, ...]:
-    both = [estimate_in(row, name) for name in ("alone", "assisted")]
-    if row["other"]:
-        value, interval = metric.difference, metric.difference_interval
-    else:
-        value, interval = metric.number, metric.interval
-    cells = [text for found in both for text in (value(found.value), interval(found))]
-    equal = f"{row['equal_runs']:,.0f}" if row["helps"] and row["equal_runs"] is not None else ""
-    return (
-        _group_name(row),
-        f"{row['runs']} in {row['conditions']}",
-        *cells,
-        f"{row['weight']:.2f}",
-        equal,
-    )
-
-
-def _group_name(row: Row) -> str:
-    return f"{row['group']} - {row['other']}" if row["other"] else str(row["group"])
 
 
 # Conclusions
@@ -493,30 +421,3 @@ def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
     ]
     if worse:
         yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
-
-
-def assisted_conclusion(row: Row, metric: Metric) -> str:
-    """Write what an estimate shows, and whether the simulation helped."""
-    found = estimate_in(row, "assisted")
-    if row["other"] and found.has_interval and not found.contains(0.0):
-        claim = difference_claim(row["group"], row["other"], found.value, metric)
-        found = found if found.value > 0.0 else -found
-    else:
-        is_share = metric.name == FOUND and not row["other"]
-        claim = f"{metric.title} of {_group_name(row)}: {(metric.number if is_share else metric.amount)(found.value)}"
-    if row["other"]:
-        interval = found.text(f".{metric.interval_decimals}f", metric.scale)
-    else:
-        interval = metric.interval(found)
-    claim += f" (95% interval {interval or 'not known'})"
-    claim += f" from {number_of(row['runs'], 'real mission')} in {row['conditions']} conditions"
-    if not row["helps"]:
-        return f"{claim}; the simulation does not help."
-    equal = (
-        f", as that of {row['equal_runs']:,} real missions alone"
-        if row["equal_runs"] is not None
-        else ""
-    )
-    return (
-        f"{claim}; the interval is {row['narrower']:.1f} times narrower with the simulation{equal}."
-    )

@@ -21,6 +21,7 @@ from suave_des.records.metrics import (
     metric_of,
 )
 from suave_des.records.missions import SHARING, Missions
+from suave_des.records.runs import check_one_mission
 from suave_des.results.horizon import (
     ENDED,
     FOUND_BY_HORIZON,
@@ -29,7 +30,7 @@ from suave_des.results.horizon import (
     at_horizons,
     to_horizon,
 )
-from suave_des.results.real import matched
+from suave_des.results.real import common_limit_s, matched
 
 _USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
@@ -234,16 +235,25 @@ def _assisted(
     """Group real missions by manager, with those that assist them."""
     same, population = simulated
     frame = frame.assign(source="")
-    chosen = _chosen_metrics(metrics or PAPER_METRICS, [Group("", frame)])
-    limit_s = _common_limit_s((frame, same.frame, population.frame), chosen)
-    drawn, simulated_same = _with_draws(population), same.frame
-    if math.isfinite(limit_s):
-        frame, simulated_same, drawn = (
-            to_horizon(each, limit_s) for each in (frame, simulated_same, drawn)
+    check_one_mission(frame, _PLACES[0])
+    if population.swept:
+        problem = (
+            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
         )
+        remedy = "draw the conditions, as perturbations"
+        raise InputError(problem, place="population", remedy=remedy)
+    chosen = _chosen_metrics(metrics or PAPER_METRICS, [Group("", frame)])
+    sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
+    _check_numbers(sides, chosen)
+    limit_s = common_limit_s(sides)
+    in_same, in_population = same.frame, population.frame
+    if math.isfinite(limit_s):
+        frame = to_horizon(frame, limit_s)
+        in_same = to_horizon(in_same, limit_s)
+        in_population = to_horizon(in_population, limit_s)
     else:
         frame = at_horizons(frame, ())
-    sides = (*matched(frame, simulated_same, same.swept), drawn)
+    matching = matched(frame, in_same, in_population, same.swept)
     groups = [
         Group(name, _by_run(part), horizon_s=limit_s)
         for part, name, _ in _parts(frame, managers, ())
@@ -251,7 +261,7 @@ def _assisted(
     notes = [*same.notes, *population.notes, *_notes(groups, (), frame, {})]
     notes += _notes_on_metrics(groups, chosen)
     lost = dict(_mostly_lost(groups))
-    return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost, sides)
+    return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost, matching)
 
 
 def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
@@ -335,27 +345,15 @@ def _counted(groups: Sequence[Group]) -> str:
     return "mission" if kinds == {True} else "value"
 
 
-def _common_limit_s(frames: Sequence[pandas.DataFrame], metrics: Sequence[Metric]) -> float:
-    """Check the numbers in real missions and those that assist them, and return the time limit of
-    all.
-    """
-    limits_s: list[float] = []
-    for place, frame in zip(_PLACES, frames, strict=True):
+def _check_numbers(sides: Mapping[str, pandas.DataFrame], metrics: Sequence[Metric]) -> None:
+    """Check that real missions and those that assist them have the numbers that are compared."""
+    for place, frame in sides.items():
         for metric in metrics:
             values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
             may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
             if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
                 problem = f"{metric.name} has a value that is no number, or no value at all"
                 raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
-        # Real missions may not say how long they lasted, and simulated ones may all have found the
-        # pipeline.
-        ends_s = frame.get("mission_duration_s", frame[SEARCH_TIME].where(frame[FOUND] == 0.0))
-        limit_s = float(ends_s.max())
-        if abs(limit_s - min(limits_s, default=limit_s)) > SAME_LIMIT_S:
-            problem = f"missions end after {limit_s:.0f} s, others after {min(limits_s):.0f} s"
-            raise InputError(problem, place=place, remedy="give missions with one time limit")
-        limits_s += [] if math.isnan(limit_s) else [limit_s]
-    return math.floor(min(limits_s)) if limits_s else math.inf
 
 
 # Runs that share their draws
@@ -374,20 +372,6 @@ def first_alike(frame: pandas.DataFrame, alike: int = 0) -> pandas.Series[float]
     """
     alike = alike or runs_sharing_draw(frame)
     return (frame["run"] - 1) // alike * alike + 1
-
-
-def _with_draws(population: Missions) -> pandas.DataFrame:
-    """Return simulated missions, which must be of no sweep, with the numbers of their draws."""
-    if population.swept:
-        problem = (
-            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
-        )
-        raise InputError(
-            problem, place="population", remedy="draw the conditions, as perturbations"
-        )
-    frame = population.frame
-    drawn = frame.assign(draw=first_alike(frame))
-    return drawn.assign(draw=drawn.groupby(["seed", "draw"], sort=False, dropna=False).ngroup())
 
 
 def alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:

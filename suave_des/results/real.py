@@ -10,7 +10,9 @@ may be in them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Unpack
 
@@ -23,7 +25,8 @@ from suave_des.arguments import plain_arguments
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
 from suave_des.errors import InputError, line_error, located, number_of
-from suave_des.records.runs import Runs, read_runs
+from suave_des.records.metrics import FOUND, SEARCH_TIME, metric_of
+from suave_des.records.runs import COLUMNS, TIME_LIMIT, Runs, check_one_mission, read_runs
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario.models import Number, Strict, in_order, wrong
@@ -37,8 +40,23 @@ NUMBER_COLUMNS = (CONDITION, "block")
 """Columns of data files that may have that number."""
 _RELATIVE, _ABSOLUTE = 1e-3, 0.01
 """Data files give conditions rounded; values as near as this are the same."""
+_STARTS = {"start.x_m": "initial_x_m", "start.y_m": "initial_y_m"}
+"""Parameters that place the vehicle, and columns that say where missions began."""
 _START_M = 0.25
 """Starts under the same condition differ by no more, apart from a shift that all have."""
+_DRAW = "draw the conditions of the population as those of the real missions were drawn"
+_BEYOND, _BEYOND_OF_FEW = 0.05, 5.0
+"""How far a real condition may be beyond those drawn, in parts of their range: so much, and so much
+divided by the number of draws.
+"""
+_SURELY = 0.001
+"""p below which real conditions are not of a population."""
+_OF_CAMPAIGNS = ("source", "ensemble_member")
+_GIVE_NUMBERS = (
+    f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
+)
+_SAME_LIMIT_S = 1.5
+"""Programs write limits that differ by a second for the same one."""
 _TOLERANCE = 1e-6
 """Places come from sums of steps; an interval must contain the values that it names."""
 
@@ -145,17 +163,29 @@ def _condition_text(conditions: pandas.DataFrame, number: int) -> str:
     return ", ".join(f"{name}={value}" for name, value in conditions.iloc[number - 1].items())
 
 
-def numbered(runs: pandas.DataFrame, conditions: pandas.DataFrame) -> pandas.DataFrame:
+def numbered(
+    runs: pandas.DataFrame,
+    conditions: pandas.DataFrame,
+    runs_each: int | None = None,
+    starts: pandas.DataFrame | None = None,
+) -> pandas.DataFrame:
     """Return missions with a column `condition`, the number of each one's condition, from 1; as
     they are without any.
 
     Of columns named like the parameters, those that are there must agree; without any, one of
     NUMBER_COLUMNS has the numbers; without that, missions are in order, as the exemplar's runner
-    makes them: equally many of each condition.
+    makes them: of each condition equally many in a row, and of the last as many or fewer.
+
+    Args:
+        runs: missions.
+        conditions: as of conditions_of.
+        runs_each: how many missions of a condition are made in a row, if that is known.
+        starts: where missions of each condition begin, initial_x_m and initial_y_m; by default as
+            the conditions have it.
 
     Raises:
         InputError: about a row, counted from 0 as its place: it is of no condition, or of several;
-            or, without a place, a manager's missions do not divide evenly.
+            or, without a place, the order of a manager's missions does not tell their conditions.
     """
     if not len(conditions):
         return runs
@@ -163,7 +193,8 @@ def numbered(runs: pandas.DataFrame, conditions: pandas.DataFrame) -> pandas.Dat
         return runs.assign(**{CONDITION: _by_values(conditions, runs, named)})
     column = next((name for name in NUMBER_COLUMNS if name in runs), None)
     if column is None:
-        return runs.assign(**{CONDITION: _in_order(runs["manager"], len(conditions))})
+        starts = _starts_of(conditions) if starts is None else starts
+        return runs.assign(**{CONDITION: _in_order(runs, len(conditions), runs_each, starts)})
     numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
     for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(conditions) + 1)))[:1]:
         problem = f"{column}: there is no condition {runs[column].iloc[row]}"
@@ -191,16 +222,98 @@ def _by_values(
     return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
 
 
-def _in_order(managers: pandas.Series[str], conditions: int) -> NDArray[np.int64]:
-    by_manager = managers.groupby(managers, sort=False)
-    places, sizes = by_manager.cumcount().to_numpy(), by_manager.transform("size").to_numpy()
-    for row in np.flatnonzero(sizes % conditions)[:1]:
-        own = f"{number_of(int(sizes[row]), 'mission')} of manager {managers.iloc[row]}"
-        remedy = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
-        raise InputError(
-            f"has {own}, which {conditions} conditions do not share evenly", remedy=remedy
-        )
-    return np.asarray(1 + places // (sizes // conditions), dtype=np.int64)
+def _starts_of(conditions: pandas.DataFrame) -> pandas.DataFrame:
+    """Return where the vehicle is placed under each condition, as far as conditions differ in
+    it.
+    """
+    return conditions[[name for name in _STARTS if name in conditions]].rename(columns=_STARTS)
+
+
+def _in_order(
+    runs: pandas.DataFrame, conditions: int, runs_each: int | None, starts: pandas.DataFrame
+) -> NDArray[np.int64]:
+    """Number the conditions of missions by their order, manager by manager."""
+    numbers = np.zeros(len(runs), dtype=np.int64)
+    for manager, rows in runs.groupby("manager", sort=False).indices.items():
+        own = runs.iloc[rows]
+        block = _block(own, conditions, runs_each, starts)
+        if isinstance(block, str):
+            problem = f"has {number_of(len(own), 'mission')} of manager {manager}, {block}"
+            raise InputError(problem, remedy=_GIVE_NUMBERS)
+        numbers[rows] = _in_blocks(own, block)
+    return numbers
+
+
+def _block(
+    missions: pandas.DataFrame, conditions: int, runs_each: int | None, starts: pandas.DataFrame
+) -> int | str:
+    """Return how many missions of each condition are in a row, of the last as many or fewer; or why
+    that is not known.
+    """
+    number = len(missions)
+    possible = [each for each in range(1, number + 1) if -(-number // each) == conditions]
+    fitting = [
+        each for each in possible if _starts_fit(missions, _in_blocks(missions, each), starts)
+    ]
+    if runs_each is not None and runs_each in fitting:
+        return runs_each
+    if possible and not fitting:
+        return f"which do not begin where the {conditions} conditions have their starts, in order"
+    are_known = any(name in missions for name in starts)
+    if not possible or (number % conditions and not are_known):
+        return f"which {conditions} conditions do not share evenly"
+    if len(fitting) > 1:
+        each = f"{fitting[0]} or {fitting[1]}"
+        return f"which may be {each} in a row of each of {conditions} conditions"
+    return fitting[0]
+
+
+def _in_blocks(missions: pandas.DataFrame, block: int) -> NDArray[np.int64]:
+    return np.arange(len(missions), dtype=np.int64) // block + 1
+
+
+def _starts_fit(
+    missions: pandas.DataFrame, numbers: NDArray[np.int64], starts: pandas.DataFrame
+) -> bool:
+    """Return whether each mission begins where its condition has its start, as far as that is
+    known.
+    """
+    own = missions.assign(**{CONDITION: numbers})
+    return all(
+        (_starts_off(own, starts, name).abs() <= _START_M).all() for name in map(str, starts)
+    )
+
+
+def _starts_off(
+    missions: pandas.DataFrame, starts: pandas.DataFrame, name: str
+) -> pandas.Series[float]:
+    """Return how far missions with numbers of conditions begin from their condition's start, apart
+    from a shift that all have; empty if that is not known.
+    """
+    if name not in missions:
+        return pandas.Series(dtype=float)
+    recorded = pandas.to_numeric(missions[name], errors="coerce")
+    planned = pandas.to_numeric(starts[name], errors="coerce").to_numpy(float)
+    off: pandas.Series[float] = recorded - planned[missions[CONDITION].to_numpy() - 1]
+    return (off - off.median()).dropna()
+
+
+def _check_starts(missions: pandas.DataFrame, starts: pandas.DataFrame) -> None:
+    """Check that real missions with numbers of conditions begin where their conditions have their
+    starts, on average.
+
+    Raises:
+        InputError: those of one manager and condition begin elsewhere.
+    """
+    for name in map(str, starts):
+        off = _starts_off(missions, starts, name)
+        rows = missions.loc[off.index].assign(off=off)
+        means = rows.groupby(["manager", CONDITION], as_index=False, observed=True)["off"].mean()
+        for each in means[means["off"].abs() > _START_M].to_dict("records")[:1]:
+            whose = f"{name} of manager {each['manager']} under condition {each[CONDITION]}"
+            problem = f"{whose} is {each['off']:+.2f} m from where the other missions let expect it"
+            remedy = "give the conditions in the order, or with the numbers, that the missions have"
+            raise InputError(problem, remedy=remedy)
 
 
 def _same(column: pandas.Series[Any], value: Any) -> NDArray[np.bool_]:
@@ -216,7 +329,11 @@ def _same(column: pandas.Series[Any], value: Any) -> NDArray[np.bool_]:
 
 
 @plain_arguments
-def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None = None) -> Runs:
+def read_real(
+    paths: Sequence[str | Path],
+    conditions: pandas.DataFrame | None = None,
+    runs_each: int | None = None,
+) -> Runs:
     """Read real missions.
 
     Example:
@@ -229,10 +346,11 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
             a mission is of follows from columns that are named like the campaign's parameters, or
             `condition` or `block` with its number from 1, or else by order: equally many missions
             of each, one condition after the other, as the exemplar's runner makes them.
+        runs_each: how many missions of a condition are made in a row, if that is known.
 
     Raises:
-        InputError: with file and line: a file cannot be read, two are the same, or a condition
-            cannot be determined.
+        InputError: with file and line: a file cannot be read, two are the same, a manager has
+            several of the exemplar's missions, or a condition cannot be determined.
     """
     read, files = [read_runs(path) for path in paths], dict[Path, str]()
     for path, digest in (item for runs in read for item in runs.files.items()):
@@ -243,12 +361,14 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
         files[path] = digest
     notes = [f"{note}." for runs in read for note in runs.notes]
     frame = pandas.concat([runs.frame for runs in read], ignore_index=True)
+    check_one_mission(frame, ", ".join(map(str, files)))
     if conditions is not None and len(conditions):
         named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
         try:
-            frame = numbered(frame, conditions).drop(
+            frame = numbered(frame, conditions, runs_each).drop(
                 columns=[name for name in named if name != CONDITION]
             )
+            _check_starts(frame, _starts_of(conditions))
         except InputError as error:
             if error.place is not None:
                 lines = [
@@ -262,46 +382,158 @@ def read_real(paths: Sequence[str | Path], conditions: pandas.DataFrame | None =
                 error.problem, file=", ".join(map(str, files)), remedy=error.remedy
             ) from None
         if not named:
-            each = f"one after the other, as many missions of each of the {len(conditions)}"
             notes.append(
-                f"The data do not name the conditions of their missions: they are taken in order, {each}."
+                "The data do not name the conditions of their missions: they are taken in order,"
+                f" {_missions_each(frame)}."
             )
         texts = (_condition_text(conditions, number) for number in range(1, len(conditions) + 1))
         notes += (f"Condition {number}: {text}" for number, text in enumerate(texts, 1))
     return Runs(files, frame, tuple(notes))
 
 
-def matched(
-    real: pandas.DataFrame, simulated: pandas.DataFrame, names: Sequence[str]
-) -> tuple[pandas.DataFrame, pandas.DataFrame]:
-    """Return real and simulated missions with the numbers of their conditions, the points of a
-    sweep of these names.
+def _missions_each(frame: pandas.DataFrame) -> str:
+    """Say how many missions each manager has of each condition."""
+    sizes = frame.groupby(["manager", CONDITION], sort=False).size().unstack(fill_value=0)
+    texts = sizes.astype(str).agg(", ".join, axis=1)
+    if texts.nunique() == 1:
+        return f"{texts.iloc[0]} of each manager"
+    return "; ".join(f"{text} of {name}" for name, text in texts.items())
 
-    Conditions of real missions are found as by `numbered`; simulated ones are in the order of the
-    points.
+
+# Time limits
+
+
+def common_limit_s(sides: Mapping[str, pandas.DataFrame]) -> float:
+    """Check that missions that are compared had one time limit, and return it in whole seconds;
+    infinite if it is not known.
+
+    A limit is that of a column `time_limit_s`, or else the time at which the missions of a manager
+    ended that lasted longest, of those whose duration is known or that never found the pipeline.
+
+    Args:
+        sides: missions, by what errors call them.
 
     Raises:
-        InputError: nothing is swept, or the real missions are not of these conditions.
+        InputError: the missions of a manager had several limits.
+    """
+    limits_s = {place: _limits_s(frame, place) for place, frame in sides.items()}
+    longest_s = {
+        place: frame.groupby("manager", observed=True)[SEARCH_TIME].max()
+        for place, frame in sides.items()
+    }
+    for (other, theirs), (place, ours) in combinations(limits_s.items(), 2):
+        for manager in ours.index.intersection(theirs.index):
+            ends_s, others_s = float(ours[manager]), float(theirs[manager])
+            if math.isnan(ends_s):  # none of these found the pipeline later than the others' limit
+                ends_s = max(others_s, float(longest_s[place][manager]))
+            elif math.isnan(others_s):
+                others_s = max(ends_s, float(longest_s[other][manager]))
+            if abs(ends_s - others_s) > _SAME_LIMIT_S:
+                problem = f"missions of {manager} end after {ends_s:.0f} s, {other} after {others_s:.0f} s"
+                remedy = (
+                    f"give missions with one time limit, or, if they had one, a column {TIME_LIMIT}"
+                )
+                raise InputError(problem, place=place, remedy=remedy)
+    known_s = [each.max() for each in limits_s.values() if each.notna().any()]
+    return math.floor(min(known_s)) if known_s else math.inf
+
+
+def _limits_s(frame: pandas.DataFrame, place: str) -> pandas.Series[float]:
+    """Return the time limit of missions by manager; nan if it is not known."""
+    managers = frame["manager"].astype(str)
+    declared = frame.get(TIME_LIMIT, pandas.Series(math.nan, frame.index)).astype(float)
+    if declared.max() - declared.min() > _SAME_LIMIT_S:
+        problem = f"there are time limits of {declared.min():g} and of {declared.max():g} s"
+        raise InputError(problem, place=place, remedy="give missions with one time limit")
+    lost_s = frame[SEARCH_TIME].where(frame[FOUND].astype("Float64").eq(0.0).fillna(False))
+    durations_s = frame.get("mission_duration_s", lost_s).astype(float)
+    ends_s = declared.fillna(declared.max()).fillna(durations_s).fillna(lost_s)
+    return ends_s.groupby(managers).max()
+
+
+def matched(
+    real: pandas.DataFrame,
+    same: pandas.DataFrame,
+    population: pandas.DataFrame,
+    names: Sequence[str],
+) -> tuple[pandas.DataFrame, pandas.DataFrame, pandas.DataFrame]:
+    """Return real missions and those that assist them: with the numbers of their conditions, those
+    simulated under the same conditions, likewise, and a population with the numbers of its draws.
+
+    Conditions are the points of a sweep of these names. Those of real missions are found as by
+    `numbered`; simulated ones are in the order of the points. Missions of a population that have
+    the same values are of one draw.
+
+    Raises:
+        InputError: nothing is swept, the real missions are not of these conditions, or the
+            population is of another scenario, or drawn otherwise than the real conditions were.
     """
     if not names:
         remedy = (
             "give a campaign that sweeps the conditions, such as import-config --runner-seed writes"
         )
         raise InputError("these missions sweep no conditions", place="assisted by", remedy=remedy)
+    names = list(names)
+    by_point = same.groupby(names, sort=False, dropna=False)
+    starts = by_point[[name for name in _STARTS.values() if name in same]].mean()
     with located(place="real missions"):
-        real = numbered(real, simulated[list(names)].drop_duplicates().astype(object))
-    own = simulated.groupby(list(names), sort=False, dropna=False).ngroup() + 1
-    simulated = simulated.assign(**{CONDITION: own})
-    for name in real.columns.intersection(simulated.columns).intersection(
-        ["initial_x_m", "initial_y_m"]
-    ):
-        off = real.groupby(CONDITION)[name].mean() - simulated.groupby(CONDITION)[name].mean()
-        if ((off - off.median()).abs() > _START_M).any():
-            worst = int((off - off.median()).abs().to_numpy().argmax())
-            problem = f"{name} is {off.iloc[worst]:+.2f} m from the simulated one under condition {off.index[worst]}"
-            remedy = f"under the others it is {off.median():+.2f} m: simulate the same conditions, in the same order"
-            raise InputError(problem, place="real missions", remedy=remedy)
-    return real, simulated
+        conditions = same[names].drop_duplicates().astype(object).reset_index(drop=True)
+        real = numbered(real, conditions, starts=starts)
+        _check_starts(real, starts)
+    same = same.assign(**{CONDITION: by_point.ngroup() + 1})
+    with located(place="population"):
+        _check_scenario(same, population, names)
+        draws = population[names].drop_duplicates()
+        for name in names:
+            flown = conditions.loc[sorted(set(real[CONDITION] - 1)), name]
+            _check_drawn(name, flown, draws[name])
+    by_draw = population.groupby(names, sort=False, dropna=False)
+    return real, same, population.assign(draw=by_draw.ngroup())
+
+
+def _check_scenario(
+    same: pandas.DataFrame, population: pandas.DataFrame, names: Sequence[str]
+) -> None:
+    """Check that a population is of the scenario of the missions under the real conditions, and
+    varies in what these vary in.
+    """
+    scenarios = sorted(set(same["scenario"]) - {""}), sorted(set(population["scenario"]) - {""})
+    if all(scenarios) and scenarios[0] != scenarios[1]:
+        problem = f"it is of scenario {scenarios[1][0]}, and the missions under the real conditions of {scenarios[0][0]}"
+        raise InputError(problem, remedy="give campaigns of one scenario")
+    for name in names:
+        if name not in population:
+            problem = f"it does not draw {name}, in which the real conditions differ"
+            raise InputError(problem, remedy=_DRAW)
+    known = {*COLUMNS, *same, *_OF_CAMPAIGNS}
+    for name in map(str, population):
+        if name not in known and metric_of(name) is None and population[name].nunique() > 1:
+            problem = (
+                f"it draws {name}, which is one for all the missions under the real conditions"
+            )
+            raise InputError(problem, remedy=_DRAW)
+
+
+def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]) -> None:
+    """Check that the values of a parameter under the real conditions may be from those drawn."""
+    from scipy.stats import ks_2samp
+
+    values = pandas.to_numeric(flown, errors="coerce")
+    numbers = pandas.to_numeric(drawn, errors="coerce")
+    if values.isna().any() or numbers.isna().any():
+        known = set(drawn.astype(str))
+        for value in flown[~flown.astype(str).isin(known)][:1]:
+            raise InputError(f"it never draws {name}={value}, a real condition", remedy=_DRAW)
+        return
+    low, high = float(numbers.min()), float(numbers.max())
+    beyond = (high - low) * (_BEYOND + _BEYOND_OF_FEW / len(numbers)) + _ABSOLUTE
+    for value in values[(values < low - beyond) | (values > high + beyond)][:1]:
+        problem = f"it draws {name} from {low:g} to {high:g}, and a real condition has {value:g}"
+        raise InputError(problem, remedy=_DRAW)
+    if ks_2samp(values, numbers).pvalue < _SURELY:
+        problem = f"it draws {name} otherwise than the real conditions are spread"
+        ends = f"{low:g} to {high:g}, and these {values.min():g} to {values.max():g}"
+        raise InputError(f"{problem}: from {ends} (Kolmogorov-Smirnov p < {_SURELY})", remedy=_DRAW)
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:
@@ -321,6 +553,14 @@ def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) 
     except InputError as error:
         raise file.located(error) from None
     return conditions_of(varied[1].sweep)
+
+
+def runs_in_a_row(campaign: str | Path) -> int | None:
+    """Return how many missions of each condition a campaign file asks for, if it does."""
+    file = read_campaign_file(campaign)
+    if file is None or "runs" not in file.settings.model_fields_set:
+        return None
+    return file.settings.runs
 
 
 def published_for(scenario: str | Path) -> Path | None:

@@ -195,7 +195,16 @@ def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimat
     return _with_interval(first[0] / first[1] - second[0] / second[1], low, high, NEWCOMBE)
 
 
-def paired_share_difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimate:
+def wilson(count: float, n: int) -> Estimate:
+    """Estimate a share by Wilson (1927), as share_of does; what is counted may count in part."""
+    proportion = library(".stats.proportion")
+    low, high = proportion.proportion_confint(count, n, alpha=1.0 - CONFIDENCE, method="wilson")
+    return Estimate(count / n, float(low), float(high), "Wilson")
+
+
+def paired_share_difference(
+    first: NDArray[np.bool_] | Sample, second: NDArray[np.bool_] | Sample
+) -> Estimate:
     """Estimate the difference of two shares of the same runs, with its interval by Bonett and Price
     (2012).
 

@@ -158,7 +158,7 @@ sweep: {zip: {start.y_m: [2.5, 2.9], thruster_events.0.time_s: [35, 90]}}
 def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(validate, tmp_path):
     (tmp_path / "two.yaml").write_text(CAMPAIGN, encoding="utf-8")
     (tmp_path / "real.csv").write_text(
-        f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,251,0,False,2\n",
+        f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,301,0,False,2\n",
         encoding="utf-8",
     )
     ended = validate(
@@ -181,6 +181,23 @@ def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(vali
     assert again.returncode == 0
     same = "validation_conditions.csv"
     assert (tmp_path / "again" / same).read_bytes() == (tmp_path / "out" / same).read_bytes()
+
+
+def test_a_short_last_block_follows_from_the_runs_of_the_campaign_file(validate, tmp_path):
+    campaign = CAMPAIGN.replace("sweep:", "runs: 3\nsweep:")
+    (tmp_path / "two.yaml").write_text(campaign, encoding="utf-8")
+    (tmp_path / "real.csv").write_text(f"{HEADER}\n" + "none,180,30\n" * 4, encoding="utf-8")
+    ended = validate("two.yaml", "--data", "real.csv", "--runs", "1", "--workers", "1", "--quiet")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "they are taken in order, 3, 1 of each manager." in " ".join(ended.stdout.split())
+
+
+def test_real_missions_of_another_time_limit_are_refused(validate, tmp_path):
+    text = f"{HEADER},pipeline_found\nnone,100,30,True\nnone,151,0,False\n"
+    (tmp_path / "real.csv").write_text(text, encoding="utf-8")
+    ended = validate("--data", "real.csv", "--runs", "1", "--workers", "1", "--quiet")
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert "missions of none end after 300 s, real missions after 151 s" in ended.stderr
 
 
 def test_several_files_are_compared_as_one_data_set(validate, tmp_path):

@@ -3,16 +3,18 @@ it should.
 """
 
 import json
+import math
 
 import numpy as np
 import pandas
 import pytest
+from scipy.stats import mannwhitneyu
 
 from analysis.split_check import split_check
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.results.real import Share, Targets
-from suave_des.results.validation import JSON_FILE, TABLES, validate
+from suave_des.results.validation import JSON_FILE, TABLES, compare_with_paper, validate
 from suave_des.scenario.yamlfile import read_yaml, validated
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
@@ -66,6 +68,85 @@ def test_figures_of_a_cell(good):
 
 def ends(row, name):
     return [row[f"{name}_ci95_{end}"] for end in ("low", "high")]
+
+
+@pytest.mark.parametrize(
+    ("metric", "first_p", "second_p", "superiority", "better"),
+    [
+        # Of 25 pairs of values the first is greater in one.
+        ("search_time_s", "less", "greater", 0.96, "none"),
+        ("distance_inspected_m", "greater", "less", 0.04, "bt"),
+    ],
+)
+def test_a_pair_says_which_manager_the_tests_find_better(
+    missions, metric, first_p, second_p, superiority, better
+):
+    values = {"none": [10.0, 12.0, 14.0, 16.0, 19.0], "bt": [18.0, 20.0, 22.0, 24.0, 26.0]}
+    real = missions({name: [(each, each, 0.0) for each in own] for name, own in values.items()})
+    real = real.assign(mean_reaction_time_s=math.nan)
+    row = validate(real, real, ("none", "bt")).pairs.set_index("metric").loc[metric]
+    ps = {
+        side: mannwhitneyu(
+            values["none"], values["bt"], alternative=side, method="asymptotic"
+        ).pvalue
+        for side in ("less", "greater")
+    }
+    assert row["published_first_better_p"] == pytest.approx(ps[first_p])
+    assert row["published_second_better_p"] == pytest.approx(ps[second_p])
+    assert row["published_superiority"] == pytest.approx(superiority)
+    assert row["published_better"] == better
+
+
+def claims(found):
+    return [each for each in found.remarks() if "in the paper, metacontrol" in each]
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        (
+            {},
+            [
+                "As in the paper, metacontrol finds the pipeline sooner than the others, on average.",
+                "As in the paper, metacontrol inspects more of it than the others, on average.",
+            ],
+        ),
+        (
+            {"random": [(90, 20, 0), (92, 21, 0)]},
+            [
+                "Unlike in the paper, metacontrol does not find the pipeline sooner than all others, on average.",
+                "As in the paper, metacontrol inspects more of it than the others, on average.",
+            ],
+        ),
+        (
+            {"none": [(200, 50, 0), (202, 51, 0)]},
+            [
+                "As in the paper, metacontrol finds the pipeline sooner than the others, on average.",
+                "Unlike in the paper, metacontrol does not inspect more of it than all others, on average.",
+            ],
+        ),
+        (
+            {"random": [(90, 20, 0), (130, 21, 0)]},
+            [
+                "As in the paper, metacontrol finds the pipeline sooner than the others, on average;"
+                " the difference from random could be chance.",
+                "As in the paper, metacontrol inspects more of it than the others, on average.",
+            ],
+        ),
+    ],
+)
+def test_the_papers_claims_are_compared_with_every_other_manager(missions, changed, told):
+    own = {
+        "none": [(200, 10, 0), (202, 11, 0)],
+        "random": [(150, 20, 0), (152, 21, 0)],
+        "metacontrol": [(100, 40, 0), (102, 41, 0)],
+    }
+    assert claims(compare_with_paper(missions(own | changed))) == told
+
+
+def test_nothing_is_said_of_the_papers_claims_without_metacontrol_or_another(missions):
+    for name in ("none", "metacontrol"):
+        assert claims(compare_with_paper(missions({name: [(100, 10, 0), (102, 11, 0)]}))) == []
 
 
 def test_a_shifted_manager_fails_in_its_own_cell_alone(published, like_published):

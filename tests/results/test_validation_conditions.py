@@ -3,6 +3,7 @@ regions.
 """
 
 import math
+from collections.abc import Sequence
 
 import pandas
 import pytest
@@ -69,23 +70,84 @@ def test_a_mission_of_no_condition_or_of_several_is_named(columns, problem, row)
     assert error.value.place == row
 
 
-def test_in_order_each_manager_has_as_many_missions_of_each_condition():
-    managers = pandas.Series(["none"] * 3 + ["bt"] * 6)
-    assert numbered(managers.to_frame("manager"), CONDITIONS)["condition"].tolist() == [
-        1,
-        2,
-        3,
-        1,
-        1,
-        2,
-        2,
-        3,
-        3,
+def in_order(*numbers: int, starts: Sequence[float] = ()) -> pandas.DataFrame:
+    """Missions of managers, so many of each; or of one that began at these places."""
+    if starts:
+        return frame(manager=["none"] * len(starts), initial_y_m=list(starts))
+    names = [
+        name for name, number in zip(["none", "bt"], numbers, strict=False) for _ in range(number)
     ]
-    with pytest.raises(
-        InputError, match="5 missions of manager bt, which 3 conditions do not share evenly"
-    ):
-        numbered(managers[:-1].to_frame("manager"), CONDITIONS)
+    return frame(manager=names)
+
+
+def test_in_order_each_manager_has_as_many_missions_of_each_condition():
+    found = numbered(in_order(3, 6), CONDITIONS)["condition"].tolist()
+    assert found == [1, 2, 3, 1, 1, 2, 2, 3, 3]
+
+
+@pytest.mark.parametrize(
+    ("number", "problem"),
+    [
+        (5, "5 missions of manager none, which 3 conditions do not share evenly"),
+        (12, "12 missions of manager none, which may be 4 or 5 in a row of each of 3 conditions"),
+        (2, "2 missions of manager none, which 3 conditions do not share evenly"),
+    ],
+)
+def test_an_order_that_does_not_tell_the_conditions_is_refused(number, problem):
+    with pytest.raises(InputError, match=problem):
+        numbered(in_order(number), CONDITIONS)
+
+
+def test_a_short_last_block_follows_from_how_many_are_in_a_row():
+    found = numbered(in_order(12), CONDITIONS, runs_each=5)["condition"].tolist()
+    assert found == [1] * 5 + [2] * 5 + [3] * 2
+
+
+def test_a_short_last_block_follows_from_where_missions_began():
+    # Where missions begin is 0.4 m from the start, and differs by 0.35 m from condition to
+    # condition but for the last, whose start is that of the second.
+    conditions = CONDITIONS.assign(**{"start.y_m": [2.4, 2.8, 2.4]})
+    starts = [2.8] * 5 + [3.2] * 5 + [2.8] * 2
+    found = numbered(in_order(starts=starts), conditions)["condition"].tolist()
+    assert found == [1] * 5 + [2] * 5 + [3] * 2
+
+
+def test_an_even_order_that_the_starts_contradict_is_refused():
+    conditions = CONDITIONS.assign(**{"start.y_m": [2.4, 2.8, 3.2]})
+    with pytest.raises(InputError, match="do not begin where the 3 conditions have their starts"):
+        numbered(in_order(starts=[3.2, 3.2, 2.8, 2.8, 2.4, 2.4]), conditions)
+
+
+EXEMPLARS = (
+    'mission name,"initial pos (x,y)",mission duration (s),pipeline found,time searching pipeline (s),'
+    "distance inspected (m),mean reaction time (s)"
+)
+
+
+def of_exemplar(name: str, start_y_m: float, search_time_s: int = 50) -> str:
+    return f'{name},"(-17.0, {start_y_m})",300,True,{search_time_s},12.5,0.5'
+
+
+def test_the_starts_in_the_exemplars_own_files_are_checked(write):
+    conditions = conditions_of(Sweep(zip={"start.y_m": [2.2, 2.6, 3.0]}))
+    rows = [of_exemplar("suave bt", at) for at in (3.35, 2.95, 2.55)]
+    assert read_real(
+        [write("right.csv", "\n".join([EXEMPLARS, *reversed(rows)]))], conditions
+    ).frame["condition"].tolist() == [1, 2, 3]
+    with pytest.raises(InputError, match="do not begin where the 3 conditions have their starts"):
+        read_real([write("turned.csv", "\n".join([EXEMPLARS, *rows]))], conditions)
+
+
+def test_missions_of_the_exemplars_two_kinds_are_not_pooled_under_a_manager(write):
+    plain = write("bt.csv", "\n".join([EXEMPLARS, of_exemplar("suave bt", 2.5)]))
+    names = ("suave", "suave_extended")
+    files = [
+        write(f"{name}.csv", "\n".join([EXEMPLARS, of_exemplar(f"{name} random", 2.5)]))
+        for name in names
+    ]
+    assert read_real([plain, files[1]]).managers == ("bt", "random")
+    with pytest.raises(InputError, match="random has missions of suave and of suave_extended"):
+        read_real([plain, *files])
 
 
 def test_files_of_several_managers_are_one_data_set(write):
@@ -136,6 +198,12 @@ def test_simulated_missions_are_taken_in_the_real_ones_proportions():
     real = missions("bt", {1: [1.0] * 2, 2: [1.0]})
     simulated = missions("bt", {1: [1.0] * 5, 2: [1.0] * 9, 3: [1.0]})
     assert balanced(real, simulated, ["bt"])["condition"].value_counts().to_dict() == {1: 4, 2: 2}
+
+
+def test_a_condition_keeps_a_mission_where_fewer_are_simulated_than_real():
+    real = missions("bt", {1: [1.0] * 4, 2: [1.0]})
+    simulated = missions("bt", {1: [1.0] * 2, 2: [1.0] * 3})
+    assert balanced(real, simulated, ["bt"])["condition"].value_counts().to_dict() == {1: 2, 2: 1}
 
 
 def test_what_differs_between_conditions_is_not_taken_for_chance():
@@ -192,6 +260,52 @@ def test_missions_that_never_found_the_pipeline_do_not_differ_by_the_number_writ
 def test_a_find_after_the_limit_still_counts_as_sooner_than_none():
     real = missions("bt", {1: [255.0, 251.0]}).assign(pipeline_found=[True, False])
     assert validate(real, real, ["bt"]).not_found_s == 255.0
+
+
+def lost(times_s: Sequence[float], end_s: float, **columns: float) -> pandas.DataFrame:
+    """Missions of which the last never found the pipeline, and ended at that time."""
+    frame = missions("bt", {1: [*times_s, end_s]}).assign(**columns)
+    return frame.assign(pipeline_found=[True] * len(times_s) + [False])
+
+
+@pytest.mark.parametrize(
+    ("real", "simulated", "told"),
+    [
+        (lost([50.0], 151.0), lost([50.0], 250.0), "bt end after 250 s, real missions after 151 s"),
+        (
+            missions("bt", {1: [280.0, 50.0]}),
+            lost([50.0], 250.0),
+            "bt end after 250 s, real missions after 280 s",
+        ),
+        (
+            missions("bt", {1: [50.0]}).assign(time_limit_s=150),
+            missions("bt", {1: [50.0]}).assign(mission_duration_s=250.2),
+            "bt end after 250 s, real missions after 150 s",
+        ),
+        (
+            missions("bt", {1: [50.0, 60.0]}).assign(time_limit_s=[150, 250]),
+            lost([50.0], 250.0),
+            "there are time limits of 150 and of 250 s",
+        ),
+    ],
+)
+def test_missions_of_another_time_limit_are_refused(real, simulated, told):
+    with pytest.raises(InputError, match=told):
+        validate(real, simulated, ["bt"])
+
+
+def test_missions_that_ended_early_are_compared_under_the_limit_that_a_column_has():
+    simulated = lost([50.0], 300.0)
+    found = validate(lost([50.0], 75.0, time_limit_s=300.0), simulated, ["bt"])
+    assert found.not_found_s == 300.0
+    assert found.cells.loc[0, "difference_of_means"] == 0.0
+
+
+def test_a_mission_that_ended_early_counts_as_one_that_never_found_the_pipeline():
+    real = missions("bt", {1: [60.0, 75.0, 75.0, 300.0]})
+    real = real.assign(pipeline_found=[True, False, False, False])
+    found = validate(real, real, ["bt"])
+    assert found.not_found_s == 300.0
 
 
 def test_the_share_that_found_the_pipeline_is_compared():
