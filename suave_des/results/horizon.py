@@ -17,6 +17,7 @@ import numpy as np
 import pandas
 
 from suave_des.records.metrics import DETECTION_TIME, DURATION, FOUND, SEARCH_TIME
+from suave_des.records.runs import TIME_LIMIT
 
 TIMES = SEARCH_TIME, DETECTION_TIME
 """Metrics that are brought to a horizon."""
@@ -27,8 +28,6 @@ HORIZON = "horizon_s"
 """Column of these with the horizon."""
 ENDED = "ended_s"
 """Column of these with the time at which a mission ended without the pipeline."""
-TIME_LIMIT = "time_limit_s"
-"""Column of missions whose file has their time limit."""
 SAME_LIMIT_S = 1.5
 """Programs write limits that differ by a second for the same one."""
 

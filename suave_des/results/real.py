@@ -28,6 +28,7 @@ from suave_des.errors import InputError, line_error, located, number_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, metric_of
 from suave_des.records.runs import COLUMNS, TIME_LIMIT, Runs, check_one_mission, read_runs
 from suave_des.resources import shipped_folder
+from suave_des.results.horizon import SAME_LIMIT_S
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario.models import Number, Strict, in_order, wrong
 from suave_des.scenario.yamlfile import read_yaml, validated
@@ -55,8 +56,6 @@ _OF_CAMPAIGNS = ("source", "ensemble_member")
 _GIVE_NUMBERS = (
     f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
 )
-_SAME_LIMIT_S = 1.5
-"""Programs write limits that differ by a second for the same one."""
 _TOLERANCE = 1e-6
 """Places come from sums of steps; an interval must contain the values that it names."""
 
@@ -428,7 +427,7 @@ def common_limit_s(sides: Mapping[str, pandas.DataFrame]) -> float:
                 ends_s = max(others_s, float(longest_s[place][manager]))
             elif math.isnan(others_s):
                 others_s = max(ends_s, float(longest_s[other][manager]))
-            if abs(ends_s - others_s) > _SAME_LIMIT_S:
+            if abs(ends_s - others_s) > SAME_LIMIT_S:
                 problem = f"missions of {manager} end after {ends_s:.0f} s, {other} after {others_s:.0f} s"
                 remedy = (
                     f"give missions with one time limit, or, if they had one, a column {TIME_LIMIT}"
@@ -442,7 +441,7 @@ def _limits_s(frame: pandas.DataFrame, place: str) -> pandas.Series[float]:
     """Return the time limit of missions by manager; nan if it is not known."""
     managers = frame["manager"].astype(str)
     declared = frame.get(TIME_LIMIT, pandas.Series(math.nan, frame.index)).astype(float)
-    if declared.max() - declared.min() > _SAME_LIMIT_S:
+    if declared.max() - declared.min() > SAME_LIMIT_S:
         problem = f"there are time limits of {declared.min():g} and of {declared.max():g} s"
         raise InputError(problem, place=place, remedy="give missions with one time limit")
     lost_s = frame[SEARCH_TIME].where(frame[FOUND].astype("Float64").eq(0.0).fillna(False))
