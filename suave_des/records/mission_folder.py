@@ -55,8 +55,8 @@ TRAJECTORY_COLUMNS = tuple(
     field.name for field in fields(TrajectoryPoint) if field.name != "further"
 )
 """Columns that every trajectory.csv has."""
-_NEEDED = ("x_m", "y_m", "z_m")
-"""Columns of numbers that are in each row, besides the time."""
+_NEEDED = ("t_s", "x_m", "y_m", "z_m")
+"""Columns of numbers that are in each row."""
 _ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
 """Columns of trajectory.csv that may be missing."""
 LIBRARIES = (
@@ -72,6 +72,7 @@ LIBRARIES = (
 )
 """Distributions whose version can decide a result."""
 _REMEDY = "give the --out folder of suave-des run"
+_MISSION_REMEDY = f"{_REMEDY}; if another version wrote it, run the mission again"
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -184,7 +185,7 @@ def read_mission(folder: Path) -> MissionRecord:
     Raises:
         InputError: one of its files is missing, or is not what a mission writes.
     """
-    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _REMEDY)
+    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _MISSION_REMEDY)
     events = _read_table(folder / EVENTS_FILE, EVENT_COLUMNS)
     trajectory = _read_table(
         folder / TRAJECTORY_FILE, [name for name in TRAJECTORY_COLUMNS if name not in _ANGLES]
@@ -202,7 +203,7 @@ def read_states(folder: Path) -> tuple[Scenario, tuple[KnowledgeRecord, ...]]:
     """Read the scenario of a mission's folder, and its states of knowledge; raises as read_mission
     does.
     """
-    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _REMEDY)
+    mission = contents.read(contents.MissionFile, folder / MISSION_FILE, _MISSION_REMEDY)
     states = read_knowledge(folder / KNOWLEDGE_FILE)
     _check_listed(folder, mission)
     return mission.scenario, states
@@ -228,7 +229,6 @@ def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
     """Read a table that must have some columns: source, event, detail and mode are text, all others
     numbers, of which those that were not measured may be missing; times do not decrease.
     """
-    import numpy as np
     import pandas
 
     texts = ("source", "event", "detail", "mode")
@@ -242,21 +242,32 @@ def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
     if not numbered or len(set(header)) < len(header):
         problem = "has a column twice" if numbered else "is empty"
         raise InputError(problem, file=path, remedy=_REMEDY)
-    frame = pandas.DataFrame([row for _, row in numbered], columns=header, dtype=str)
+    lines = [line for line, _ in numbered]
+    frame = pandas.DataFrame([row for _, row in numbered], columns=header, index=lines, dtype=str)
     for name in frame.columns.difference(list(texts)):
-        cells = frame[name]
-        numbers = pandas.to_numeric(cells, errors="coerce").astype(float)
-        is_right = np.abs(numbers) <= contents.GREATEST
-        if name == "t_s":
-            is_right &= numbers.diff().fillna(0.0) >= 0.0
-        elif name not in _NEEDED:
-            is_right |= cells == ""
-        for at in np.flatnonzero(~is_right)[:1]:
-            wanted = "a finite number" + (" that is not before the last" if name == "t_s" else "")
-            problem = f"{name}: expected {wanted}, got {shown(cells.iloc[at])}"
-            raise line_error(path, numbered[at][0], problem, _REMEDY)
-        frame[name] = numbers
-    return frame
+        frame[name] = _numbers_of(path, frame[name])
+    backward = frame.index[frame["t_s"].diff() < 0.0]
+    if len(backward):
+        problem = f"t_s: {frame['t_s'][backward[0]]} s is before the time of the row above"
+        raise line_error(path, backward[0], problem, _REMEDY)
+    return frame.reset_index(drop=True)
+
+
+def _numbers_of(path: Path, cells: pandas.Series[str]) -> pandas.Series[float]:
+    """Convert a column, which has its name and is indexed by line, to numbers; of those that may be
+    missing, empty cells are nan.
+    """
+    import pandas
+
+    numbers = pandas.to_numeric(cells, errors="coerce").astype(float)
+    is_right = numbers.abs() <= contents.GREATEST
+    if cells.name not in _NEEDED:
+        is_right |= cells == ""
+    wrong = cells[~is_right]
+    if len(wrong):
+        problem = f"{cells.name}: expected a finite number, got {shown(wrong.iloc[0])}"
+        raise line_error(path, wrong.index[0], problem, _REMEDY)
+    return numbers
 
 
 # Knowledge states

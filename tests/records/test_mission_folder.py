@@ -10,7 +10,7 @@ import pytest
 
 from suave_des import Mission, load_scenario
 from suave_des.errors import InputError
-from suave_des.files import write_files
+from suave_des.files import write_beside, write_files
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records import mission_folder
@@ -26,6 +26,7 @@ from suave_des.records.mission_folder import (
     read_knowledge,
     read_mission,
     read_missions,
+    read_states,
     record_of,
     scenario_line,
 )
@@ -112,13 +113,18 @@ def test_where_it_comes_from_has_no_time_of_day(loaded):
 # What is wrong.
 
 
+def written(path: Path, text: str) -> None:
+    """Write a file of a mission's folder and list it in mission.json, as a mission would have."""
+    write_beside(path.parent, {path.name: text}, MISSION_FILE)
+
+
 def replaced(path: Path, line: int, column: str, text: str) -> None:
-    """Change a cell of a CSV file."""
+    """Write a CSV file with another text in a cell."""
     lines = path.read_text().splitlines()
     cells = lines[line - 1].split(",")
     cells[lines[0].split(",").index(column)] = text
     lines[line - 1] = ",".join(cells)
-    path.write_text("\n".join(lines) + "\n")
+    written(path, "\n".join(lines) + "\n")
 
 
 @pytest.mark.parametrize("text", ["soon", "inf", "nan"])
@@ -132,13 +138,22 @@ def test_a_cell_that_is_no_finite_number_is_named_with_its_line(folder, column, 
 
 
 def test_an_empty_cell_is_a_missing_value(folder):
-    replaced(folder / TRAJECTORY_FILE, 3, "x_m", "")
-    assert read_mission(folder).trajectory["x_m"].isna().to_list()[:3] == [False, True, False]
+    replaced(folder / TRAJECTORY_FILE, 3, "roll_rad", "")
+    assert read_mission(folder).trajectory["roll_rad"].isna().to_list()[:3] == [False, True, False]
 
 
-def test_but_each_point_has_a_time(folder):
-    replaced(folder / TRAJECTORY_FILE, 3, "t_s", "")
-    with pytest.raises(InputError, match="line 3: t_s: expected a finite number, got ''"):
+@pytest.mark.parametrize("column", ["t_s", "x_m", "y_m", "z_m"])
+def test_but_each_point_has_a_time_and_a_place(folder, column):
+    replaced(folder / TRAJECTORY_FILE, 3, column, "")
+    with pytest.raises(InputError, match=f"line 3: {column}: expected a finite number, got ''"):
+        read_mission(folder)
+
+
+def test_a_time_before_that_of_the_row_above_is_told_with_its_line(folder):
+    replaced(folder / TRAJECTORY_FILE, 3, "t_s", "100.0")
+    with pytest.raises(
+        InputError, match=r"line 4: t_s: 0\.4 s is before the time of the row above"
+    ):
         read_mission(folder)
 
 
@@ -149,7 +164,7 @@ def test_a_detail_that_is_the_word_none_is_no_missing_value(folder):
 
 @pytest.mark.parametrize("name", [EVENTS_FILE, TRAJECTORY_FILE])
 def test_a_file_without_rows_is_told(folder, name):
-    (folder / name).write_text((folder / name).read_text().splitlines()[0] + "\n")
+    written(folder / name, (folder / name).read_text().splitlines()[0] + "\n")
     with pytest.raises(InputError, match=f"{name}: is empty"):
         read_mission(folder)
 
@@ -163,14 +178,14 @@ def test_a_file_that_is_missing_is_told(folder, name):
 
 def test_a_column_that_is_missing_is_told(folder):
     path = folder / TRAJECTORY_FILE
-    path.write_text(path.read_text().replace("x_m", "x", 1))
+    written(path, path.read_text().replace("x_m", "x", 1))
     with pytest.raises(InputError, match="x_m is missing"):
         read_mission(folder)
 
 
 def test_angles_that_are_missing_are_zero(folder):
     path = folder / TRAJECTORY_FILE
-    path.write_text(path.read_text().replace("roll_rad", "roll", 1))
+    written(path, path.read_text().replace("roll_rad", "roll", 1))
     assert set(read_mission(folder).trajectory["roll_rad"]) == {0.0}
 
 
@@ -179,24 +194,38 @@ def test_a_metric_that_is_missing_is_told(folder, key):
     mission = json.loads((folder / MISSION_FILE).read_text())
     del mission["metrics"][key]
     (folder / MISSION_FILE).write_text(json.dumps(mission))
-    with pytest.raises(InputError, match=f"{key} is missing"):
+    with pytest.raises(InputError, match=rf"metrics\.{key}: is missing"):
         read_mission(folder)
 
 
-@pytest.mark.parametrize("content", [[], {}, {"metrics": 1, "scenario": 2}])
-def test_what_is_no_record_of_a_mission_is_told(folder, content):
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ([], r"\[\] should be a mapping"),
+        ({}, "metrics: is missing"),
+        ({"metrics": 1, "scenario": 2}, "metrics: 1 should be a mapping"),
+    ],
+)
+def test_what_is_no_record_of_a_mission_is_told(folder, content, told):
     (folder / MISSION_FILE).write_text(json.dumps(content))
-    with pytest.raises(InputError, match="is not the record of a mission"):
+    with pytest.raises(InputError, match=f"{MISSION_FILE}: {told}"):
         read_mission(folder)
 
 
-def test_a_scenario_that_cannot_be_read_today_is_told_when_it_is_needed(folder):
+def test_a_scenario_that_cannot_be_read_today_is_told_with_what_to_do(folder):
     mission = json.loads((folder / MISSION_FILE).read_text())
     mission["scenario"]["tide"] = 1
     (folder / MISSION_FILE).write_text(json.dumps(mission))
-    record = read_mission(folder)
-    with pytest.raises(InputError, match="one that this suave-des does not read"):
-        _ = record.settings
+    with pytest.raises(InputError, match=r"scenario\.tide: unknown key .* run the mission again"):
+        read_mission(folder)
+
+
+@pytest.mark.parametrize("read", [read_mission, read_states])
+def test_a_file_that_was_changed_since_the_mission_is_told(folder, read):
+    path = folder / KNOWLEDGE_FILE
+    path.write_text(path.read_text() + path.read_text().splitlines()[-1] + "\n")
+    with pytest.raises(InputError, match=f"{KNOWLEDGE_FILE}: is not as {MISSION_FILE} beside it"):
+        read(folder)
 
 
 # Knowledge states.

@@ -12,6 +12,8 @@ from suave_des.records.missions import SHARING, missions_in, missions_of
 from suave_des.records.store import MANIFEST_FILE, RUNS_FILE, STORE_FILE, Store
 
 HEAD = "scenario,manager,search_time_s,distance_inspected_m,run,seed"
+WHOLE = {"planned": 1, "left_out": 0, "failed": 0}
+"""Numbers of missions, as the manifest of a campaign that has all of them says."""
 EXEMPLARS = 'mission_name,datetime,"initial pos (x,y)",time budget (s),time search (s),distance inspected (m)'
 
 
@@ -84,7 +86,7 @@ def test_a_mission_at_another_swept_value_is_another(tmp_path):
 
 def test_the_manifest_says_what_is_swept_where_there_is_one(tmp_path):
     header = f"{HEAD},period_s,depth_m"
-    manifest = {"missions": {}, "sweep": {"grid": {"depth_m": [1, 2]}}}
+    manifest = {"missions": WHOLE, "sweep": {"grid": {"depth_m": [1, 2]}}}
     folder = campaign(tmp_path / "one", "sea,none,100,2,1,1,40,1", header=header, **manifest)
     assert missions_in(folder).swept == ("depth_m",)
 
@@ -104,8 +106,7 @@ def test_missions_that_a_campaign_lacks_are_noted(tmp_path):
 
 
 def test_nothing_is_noted_of_one_that_is_whole(tmp_path):
-    missions = {"planned": 1, "left_out": 0, "failed": 0}
-    folder = campaign(tmp_path / "one", "sea,none,100,2,1,1", missions=missions)
+    folder = campaign(tmp_path / "one", "sea,none,100,2,1,1", missions=WHOLE)
     assert missions_in(folder).notes == ()
 
 
@@ -134,7 +135,7 @@ def test_files_of_the_exemplar_that_are_no_results_are_left_out_with_a_note(tmp_
 
 def test_a_single_file_is_read_with_the_manifest_beside_it(tmp_path):
     header = f"{HEAD},period_s"
-    manifest = {"missions": {}, "sweep": {"grid": {"period_s": [40]}}}
+    manifest = {"missions": WHOLE, "sweep": {"grid": {"period_s": [40]}}}
     folder = campaign(tmp_path / "one", "sea,none,100,2,1,1,40", header=header, **manifest)
     assert missions_in(folder / RUNS_FILE).swept == ("period_s",)
 

@@ -11,14 +11,17 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.records import store as stores
-from suave_des.records.metrics import COLUMNS
+from suave_des.records.contents import Manifest
+from suave_des.records.metrics import COLUMN_TYPES, COLUMNS
 from suave_des.records.store import (
+    ENSEMBLE_FILE,
     MANIFEST_FILE,
     RUNS_FILE,
     STORE_FILE,
     SUAVE_FOLDER,
     MissionFailure,
     MissionKey,
+    Outcome,
     Store,
     StoreError,
     has_campaign,
@@ -30,7 +33,9 @@ from suave_des.records.store import (
 )
 
 FIRST, SECOND, THIRD = (MissionKey(0, 0, run) for run in (1, 2, 3))
-ROW = ("sea", "none", 1, 87.0, True, None)
+_CELLS = {"str": "sea", "int": 1, "float": 87.5, "bool": True}
+ROW = (*(_CELLS[kind] for kind in COLUMN_TYPES.values()), None, 0.25)
+"""Of runs.csv, with two columns of what was drawn."""
 PASSING = MissionFailure("none", 2, 50.0, "not done after 2 s (time-out)", lasting=False)
 LASTING = MissionFailure("none", 3, None, "ValueError: no", point=4)
 
@@ -43,22 +48,42 @@ def store(tmp_path: Path):
         yield opened
 
 
+def kept(store: Store) -> list[Outcome]:
+    """All outcomes of a store, whatever campaign they are of."""
+    return list(store.outcomes(lambda outcome: ""))
+
+
 def test_outcomes_come_back_in_the_order_of_their_keys(store):
     found = [(THIRD, LASTING), (FIRST, ROW), (SECOND, PASSING)]
     store.append(found)
-    assert list(store.outcomes()) == sorted(found, key=lambda each: each[0])
+    assert kept(store) == sorted(found, key=lambda each: each[0])
 
 
 def test_an_outcome_takes_the_place_of_an_earlier_one_of_its_mission(store):
     store.append([(FIRST, PASSING)])
     store.append([(FIRST, ROW)])
-    assert list(store.outcomes()) == [(FIRST, ROW)]
+    assert kept(store) == [(FIRST, ROW)]
 
 
 def test_only_failures_that_may_not_recur_are_forgotten(store):
     store.append([(FIRST, ROW), (SECOND, PASSING), (THIRD, LASTING)])
     store.forget_passing_failures()
-    assert [key for key, _ in store.outcomes()] == [FIRST, THIRD]
+    assert [key for key, _ in kept(store)] == [FIRST, THIRD]
+
+
+def test_an_outcome_that_the_campaign_cannot_have_is_damage(store):
+    store.append([(FIRST, ROW), (SECOND, ROW)])
+    outcomes = store.outcomes(lambda outcome: "it has run 2" if outcome[0] == SECOND else "")
+    assert next(outcomes) == (FIRST, ROW)
+    with pytest.raises(InputError, match="is damaged: it has run 2"):
+        next(outcomes)
+
+
+@pytest.mark.parametrize("row", [ROW[:3], ("sea", "none", "one", *ROW[3:])])
+def test_a_row_with_other_cells_than_a_mission_has_is_damage(store, row):
+    store.append([(FIRST, row)])
+    with pytest.raises(InputError, match="is damaged"):
+        kept(store)
 
 
 def test_settled_are_the_runs_of_one_manager_at_one_point(store):
@@ -85,7 +110,7 @@ def test_a_closed_store_can_still_be_read(tmp_path):
     with closing(Store(tmp_path / STORE_FILE)) as opened:
         opened.begin({})
         opened.append([(FIRST, ROW)])
-    assert list(opened.outcomes()) == [(FIRST, ROW)]
+    assert kept(opened) == [(FIRST, ROW)]
 
 
 def test_a_closed_store_is_one_file(tmp_path):
@@ -149,7 +174,7 @@ def closed(tmp_path: Path) -> Path:
 def test_an_outcome_that_was_changed_is_damage(closed, statement, problem):
     changed(closed, statement)
     with closing(Store(closed / STORE_FILE)) as opened, pytest.raises(InputError, match=problem):
-        list(opened.outcomes())
+        kept(opened)
 
 
 def test_what_was_noted_and_then_changed_is_damage(closed):
@@ -209,9 +234,10 @@ def test_a_folder_in_which_none_was_begun_has_none(tmp_path):
     assert not has_campaign(tmp_path)
 
 
-def test_one_that_is_in_use_counts_as_a_campaign(tmp_path):
-    with closing(Store(tmp_path / STORE_FILE)):
-        assert has_campaign(tmp_path)
+def test_one_that_is_in_use_counts_as_a_campaign(store, tmp_path):
+    store.append([(FIRST, ROW)])
+    store.commit()  # into a journal, which no other process may read now
+    assert has_campaign(tmp_path)
 
 
 def test_a_damaged_store_counts_as_a_campaign(tmp_path):
@@ -240,34 +266,60 @@ def test_what_was_drawn_has_all_its_digits_in_runs_csv():
 
 
 def test_files_of_an_earlier_campaign_that_are_not_written_again_are_gone(tmp_path):
-    write_campaign(tmp_path, {RUNS_FILE: "a", MANIFEST_FILE: "{}"}, {})
-    write_campaign(tmp_path, {RUNS_FILE: "b"}, {})
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {RUNS_FILE: "b"}
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a", ENSEMBLE_FILE: "a"}, {})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "b"}, {})
+    assert {path.name for path in tmp_path.iterdir()} == {RUNS_FILE, MANIFEST_FILE}
+
+
+def test_files_that_are_written_again_take_the_place_of_the_earlier_ones(tmp_path):
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "b"}, {})
+    assert (tmp_path / RUNS_FILE).read_text() == "b"
+
+
+def test_the_manifest_has_what_is_known_of_the_campaign_and_the_hash_of_each_file(tmp_path):
+    write_campaign(tmp_path, {"seed": 1}, {RUNS_FILE: "abc"}, {"none_suave.csv": ""})
+    assert json.loads((tmp_path / MANIFEST_FILE).read_text()) == {
+        "seed": 1,
+        "files_sha256": {  # as sha256sum prints them
+            RUNS_FILE: "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad",
+            f"{SUAVE_FOLDER}/none_suave.csv": (
+                "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
+            ),
+        },
+    }
 
 
 def test_the_exemplars_files_have_a_folder_of_their_own(tmp_path):
-    write_campaign(tmp_path, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
     assert (tmp_path / SUAVE_FOLDER / "none_suave.csv").read_text() == "b"
 
 
 def test_which_is_gone_when_a_campaign_has_none(tmp_path):
-    write_campaign(tmp_path, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
-    write_campaign(tmp_path, {RUNS_FILE: "a"}, {})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
     assert not (tmp_path / SUAVE_FOLDER).exists()
 
 
 def test_unless_the_user_has_put_something_into_it(tmp_path):
-    write_campaign(tmp_path, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
     (tmp_path / SUAVE_FOLDER / "notes.txt").write_text("mine")
-    write_campaign(tmp_path, {RUNS_FILE: "a"}, {})
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
     assert [path.name for path in (tmp_path / SUAVE_FOLDER).iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize(("is_new", "kept"), [(True, []), (False, [RUNS_FILE])])
-def test_the_results_of_an_earlier_campaign_are_removed_before_a_new_one(tmp_path, is_new, kept):
-    (tmp_path / RUNS_FILE).write_text("a")
+@pytest.mark.parametrize(("is_new", "left"), [(True, []), (False, [MANIFEST_FILE, RUNS_FILE])])
+def test_the_results_of_an_earlier_campaign_are_removed_before_a_new_one(tmp_path, is_new, left):
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
     tidy(tmp_path, is_new=is_new)
-    assert [path.name for path in tmp_path.iterdir()] == kept
+    assert sorted(path.name for path in tmp_path.iterdir()) == left
+
+
+def test_but_not_what_the_user_has_changed_in_them(tmp_path):
+    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    (tmp_path / RUNS_FILE).write_text("mine")
+    tidy(tmp_path, is_new=True)
+    assert (tmp_path / RUNS_FILE).read_text() == "mine"
 
 
 def test_a_link_in_place_of_the_exemplars_folder_is_not_followed(tmp_path):
@@ -278,13 +330,19 @@ def test_a_link_in_place_of_the_exemplars_folder_is_not_followed(tmp_path):
 
 
 def test_a_folder_without_a_manifest_has_an_empty_one(tmp_path):
-    assert read_manifest(tmp_path) == {}
+    assert read_manifest(tmp_path) == Manifest()
 
 
 def test_a_manifest_of_the_campaign_that_is_kept_is_read(closed):
-    manifest = {"campaign_sha256": "one", "runs": 3}
+    manifest = {"campaign_sha256": "one", "runs_per_draw": 3}
     (closed / MANIFEST_FILE).write_text(json.dumps(manifest))
-    assert read_manifest(closed) == manifest
+    assert read_manifest(closed) == Manifest(**manifest)
+
+
+def test_a_number_of_missions_that_a_manifest_lacks_is_told_with_what_writes_it(tmp_path):
+    (tmp_path / MANIFEST_FILE).write_text('{"missions": {"failed": 0, "left_out": 0}}')
+    with pytest.raises(InputError, match=r"missions\.planned: is missing .* campaign --resume"):
+        read_manifest(tmp_path)
 
 
 def test_a_manifest_of_another_campaign_is_told(closed):
