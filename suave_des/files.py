@@ -101,6 +101,11 @@ def sha256_of(path: Path, limit: int = LIMIT_BYTES) -> str:
     return hashlib.sha256(read_bytes(path, limit)).hexdigest()
 
 
+def real(path: Path) -> Path:
+    """Return a path without links; Path.resolve would raise a RuntimeError for a circle of them."""
+    return Path(os.path.realpath(path))
+
+
 def check_own(paths: Iterable[Path]) -> None:
     """Check that files that are to be changed in place are that: a link or a pipe may lead to
     anything.
@@ -323,7 +328,7 @@ def check_output_file(file: Path, *, overwrite: bool) -> None:
         (not file.name or os.path.isdir(file), "is a folder", "name a file in it"),  # noqa: PTH112
         (_is_circle(file), "is a link in a circle", "remove it"),
     )
-    final = file if _is_written_into(file) else file.resolve()
+    final = file if _is_written_into(file) else real(file)
     _check(
         file,
         (
@@ -454,12 +459,13 @@ def write_file(file: Path, content: str | bytes) -> None:
     Raises:
         InputError: it cannot be written.
     """
+    _check(file, (_is_circle(file), "is a link in a circle", "remove it"))
     with _user_errors(file.parent):
         if _is_written_into(file):
             with file.open("ab") as stream:
                 stream.write(content if isinstance(content, bytes) else _utf8(content))
             return
-        final = file.resolve()
+        final = real(file)
     write_files(final.parent, {final.name: content})
 
 

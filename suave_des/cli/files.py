@@ -12,7 +12,7 @@ import typer
 from suave_des.cli.console import output, plain, print_table
 from suave_des.cli.options import Overwrite, any_scenario
 from suave_des.errors import InputError
-from suave_des.files import check_output_file, make_output_folder, write_files
+from suave_des.files import check_output_file, make_output_folder, real, write_files
 from suave_des.resources import shipped_folder
 from suave_des.tables import Table
 
@@ -79,9 +79,7 @@ def import_config(
 
     targets = [out] if campaign is None else [out, campaign]
     for target in targets:
-        if target.resolve() in [
-            file.resolve() for file in (*files, *targets) if file is not target
-        ]:
+        if real(target) in [real(file) for file in (*files, *targets) if file is not target]:
             raise InputError(
                 "is one of the other files, too",
                 file=target,

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas
 
 from suave_des.errors import InputError
-from suave_des.files import read_csv
+from suave_des.files import read_csv, real
 from suave_des.records.contents import Manifest
 from suave_des.records.contents import Missions as ManifestMissions
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
@@ -73,7 +73,7 @@ def read_missions(paths: Sequence[Path]) -> Missions:
             "no results are given",
             remedy="give the --out folders of suave-des campaign, or CSV files",
         )
-    resolved = [path.resolve() for path in paths]
+    resolved = [real(path) for path in paths]
     for place, path in enumerate(paths):
         if resolved[place] in resolved[:place]:
             raise InputError("is given twice", file=path, remedy="name each folder of results once")
@@ -246,7 +246,7 @@ def _swept(manifest: Manifest, frame: pandas.DataFrame) -> tuple[str, ...]:
 
 def _short_names(paths: Sequence[Path]) -> list[str]:
     """Name sources by the last parts of their paths that tell them apart."""
-    parts = [path.resolve().with_suffix("").parts for path in paths]
+    parts = [real(path).with_suffix("").parts for path in paths]
     for depth in range(1, max(map(len, parts))):
         names = ["/".join(each[-depth:]) for each in parts]
         if len(set(names)) == len(names):

@@ -148,14 +148,13 @@ def test_a_mission_beside_files_of_another_is_told(command, name):
 WRITING = {
     "figure": ["figure", "out", "--out"],
     "compare": ["compare", "out", "--out"],
-    "policy": ["kb", "policy", "--csv"],
     "report": ["replay", "out", "--out"],
 }
 
 
 @pytest.mark.parametrize(
     ("name", "ending"),
-    [("figure", ".png"), ("compare", ".csv"), ("policy", ".csv"), ("report", ".html")],
+    [("figure", ".png"), ("compare", ".csv"), ("report", ".html")],
 )
 class TestFiles:
     @pytest.fixture(autouse=True)
