@@ -89,9 +89,8 @@ def _title(parameter: FreeParameter) -> str:
     """Name a parameter in lines that fit above its panel: the scenario if it is of one alone, then
     the key path.
     """
-    keys = parameter.path.split(".")[1:] or [
-        parameter.path
-    ]  # without the part of the scenario that it is in
+    # without the part of the scenario that it is in
+    keys = parameter.path.split(".")[1:] or [parameter.path]
     lines = [f"{', '.join(parameter.scenarios)}:"] if parameter.scenarios else []
     return "\n".join([*lines, *(f"{key}." for key in keys[:-1]), keys[-1]])
 

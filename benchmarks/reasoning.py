@@ -227,9 +227,8 @@ def measure(count: int, seed: int) -> dict[str, Any]:
         load_s = seconds(Ontology.load)
         summaries = measure_backends(kb, count, draw)
         first = {name: first_inference_s(name) for name in ("pellet", "cached")}
-        assert any(
-            (folder / "inferences").iterdir()
-        )  # or the last two of the three had no cached inference
+        # or the last two of the three had no cached inference
+        assert any((folder / "inferences").iterdir())
     filled_s, states = policy_s()
     results: dict[str, Any] = {
         "states": count,

@@ -114,9 +114,8 @@ class StockReasoner:
     def _choose(state: MissionState, suave: Any, terms: Any) -> Iterator[tuple[str, str]]:
         for function in state.functions:
             objective = suave[f"o_{function}"]
-            improvable = (
-                "search" in function
-            )  # revision 2023: adapted when the water gets clearer, too
+            # revision 2023: adapted when the water gets clearer, too
+            improvable = "search" in function
             if objective.o_status is None and True not in objective.o_updatable and not improvable:
                 continue
             candidates = {}

@@ -87,9 +87,8 @@ class Parameter:
         if isinstance(declared, ArgumentInfo):
             self.name = self.written = value
         else:
-            given = [
-                str(each) for each in (declared.default, *(declared.param_decls or ()))
-            ]  # the first is Annotated's
+            # the first is Annotated's
+            given = [str(each) for each in (declared.default, *(declared.param_decls or ()))]
             names = [each for each in given if each.startswith("-")] or [
                 f"--{parameter.name.replace('_', '-')}"
             ]

@@ -90,9 +90,10 @@ def run_mission(
         InputError: something given cannot be used; nothing is written then.
         MissionError: the manager raised; nothing is written then.
     """
+    # with the compiler, which campaigns load in their workers
     from suave_des.simulation.simulator import (
         Simulator,
-    )  # with the compiler, which campaigns load in their workers
+    )
 
     folder = None if out is None else Path(out)
     if folder is not None:

@@ -208,9 +208,8 @@ def as_number(text: str) -> float:
 
 def rounded(value: _Cell) -> _Cell:
     """Round a number as in result files; what is no float stays."""
-    return (
-        round(value, DECIMALS) + 0.0 if isinstance(value, float) else value
-    )  # + 0.0: no minus before a zero
+    # + 0.0: no minus before a zero
+    return round(value, DECIMALS) + 0.0 if isinstance(value, float) else value
 
 
 def cell(value: object) -> object:

@@ -59,9 +59,8 @@ _OWN = Path(__file__).parent
 _LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
 _MOST_SAID = 5_000  # characters of an exception's text
 _MAY_YIELD = ("adapt", "input_files")
-_checked: WeakSet[type] = (
-    WeakSet()
-)  # a class that is kept would keep its module open at the end of a worker
+# a class that is kept would keep its module open at the end of a worker
+_checked: WeakSet[type] = WeakSet()
 
 
 def is_built_in(name: str) -> bool:
@@ -268,9 +267,8 @@ def _imported(what: str, module: str) -> ModuleType:
             f"{what}: {error.msg}", file=error.filename, place=f"line {error.lineno}"
         ) from error
     except (Exception, SystemExit) as error:  # whatever the module's own code raises
-        if isinstance(
-            error.__cause__, KeyboardInterrupt
-        ):  # Python 3.11 wraps it while a class is made
+        # Python 3.11 wraps it while a class is made
+        if isinstance(error.__cause__, KeyboardInterrupt):
             raise error.__cause__ from None
         problem = f"{what}: {type(error).__name__}: {error}"
         own = [

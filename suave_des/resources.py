@@ -70,8 +70,7 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
         each.name if path.suffix else each.stem
         for each in shipped_folder(kind).glob(f"*{_KINDS[kind]}")
     )
-    known = [
-        each for each in names if "modes" not in each or each == similar(path.name, names)
-    ]  # no scenarios
+    # no scenarios
+    known = [each for each in names if "modes" not in each or each == similar(path.name, names)]
     remedy = did_you_mean(path.name, known, "give a path, or one of the shipped files")
     raise InputError("no such file", file=path, remedy=remedy)

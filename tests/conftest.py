@@ -52,9 +52,8 @@ users_environment = dict(os.environ)
 if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
     os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 
-os.environ.pop(
-    "COLUMNS", None
-)  # which several test processes at once are given, as if there were a terminal
+# which several test processes at once are given, as if there were a terminal
+os.environ.pop("COLUMNS", None)
 
 # A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their
 # children, need it.

@@ -10,10 +10,11 @@ class Learner(Threshold):
     """Searches in one mode, whatever the visibility; which one is learned."""
 
     def recall(self, learned, training):
+        # by mode: missions, and the sum of their search times
         self.learned, self.training = (
             learned,
             training,
-        )  # by mode: missions, and the sum of their search times
+        )
         stream = self.system.stream("learner")
         untried = [mode for mode in MODES if mode not in learned]
         if training and (untried or stream.random() < 0.3):

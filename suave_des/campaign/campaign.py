@@ -355,9 +355,8 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
         files.make_output_folder(folder)
         store = Store(folder / STORE_FILE, replace=True)
         try:
-            tidy(
-                folder, is_new=True
-            )  # first, or a kill would leave earlier results beside the new campaign
+            # first, or a kill would leave earlier results beside the new campaign
+            tidy(folder, is_new=True)
             store.begin(about)
             yield store
         finally:
@@ -444,9 +443,10 @@ def train(
         InputError: something given cannot be used, or nothing was learned; nothing is written then.
         MissionError: the manager raised; nothing is written then.
     """
+    # with the compiler, which campaigns load in their workers
     from suave_des.simulation.simulator import (
         Simulator,
-    )  # with the compiler, which campaigns load in their workers
+    )
 
     files.check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)

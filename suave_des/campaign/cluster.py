@@ -103,9 +103,8 @@ def _outcomes(
     submit = partial(client.submit, run, token, parcel, pure=False)
     try:
         while client.status == "running":
-            workers = max(
-                2, len(client.scheduler_info()["workers"])
-            )  # one that grows with its work begins with none
+            # one that grows with its work begins with none
+            workers = max(2, len(client.scheduler_info()["workers"]))
             size = max(1, min(total // (_SHARES * workers), _LARGEST_CHUNK))
             while len(under_way) < _AHEAD * workers and (chunk := tuple(islice(remaining, size))):
                 under_way[future := submit(chunk)] = chunk
@@ -136,9 +135,8 @@ def _outcomes(
             f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
         ) from error
     finally:
-        if (
-            client.status == "running"
-        ):  # have the cluster forget the campaign, which may be over or not
+        # have the cluster forget the campaign, which may be over or not
+        if client.status == "running":
             with suppress(Exception):
                 client.cancel([*under_way, parcel], force=True)
                 client.run(forget, token, on_error="ignore")
@@ -157,9 +155,8 @@ def pack(campaign: Campaign) -> bytes:
         )
     functions = [kind for each in campaign.scenarios() for kind in custom_functions(each).values()]
     modules = user_modules(campaign.spec.managers, functions).items()
-    sources = {
-        place: path.read_bytes() for place, path in modules if place != MAIN
-    }  # its classes are sent by value
+    # its classes are sent by value
+    sources = {place: path.read_bytes() for place, path in modules if place != MAIN}
     files = {
         path: path.read_bytes()
         for path in (*loaded.ontologies, *loaded.rules, *loaded.manager_files.values())

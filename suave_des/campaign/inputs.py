@@ -192,9 +192,8 @@ def check_inputs(
         files += _check_knowledge(scenarios[0])
     functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     code = user_modules(managers, functions)
-    for module in _defining(
-        managers, functions
-    ):  # of a class that a package has installed, its module
+    # of a class that a package has installed, its module
+    for module in _defining(managers, functions):
         path = Path(getattr(sys.modules[module], "__file__", None) or "")
         if path.is_file() and path not in code.values():
             code[f"{module.replace('.', '/')}{path.suffix}"] = path
@@ -371,10 +370,11 @@ def _imports(path: Path, package: str) -> Iterator[str]:
     """Yield the names that a file imports; some of them may be names in modules."""
     try:
         tree = ast.parse(path.read_bytes())
+    # compiled, or an import that is not reached, or it would have been raised
     except (
         SyntaxError,
         ValueError,
-    ):  # compiled, or an import that is not reached, or it would have been raised
+    ):
         return
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

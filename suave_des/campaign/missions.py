@@ -317,9 +317,10 @@ class MissionRunner:
 
     def _simulator_of(self, point: int, member: int | None) -> Simulator:
         """Make the simulator of a point and of a member of the ensemble."""
+        # with it comes the compiler, which takes a while
         from suave_des.simulation.simulator import (
             Simulator,
-        )  # with it comes the compiler, which takes a while
+        )
 
         variation = self._variation
         loaded = variation.scenario(self.campaign.loaded, point, member)

@@ -192,10 +192,11 @@ class CampaignResult:
         """Yield name and content of the exemplar's own files, one for each manager, named as its
         runner does.
         """
+        # with pandas, which takes a while
         from suave_des.records.runs import (
             exemplar_names,
             suave_pieces,
-        )  # with pandas, which takes a while
+        )
 
         scenario, runs, managers = (
             self.campaign.loaded.scenario,

@@ -293,9 +293,10 @@ def check_drawn(loaded: LoadedScenario, variation: Variation) -> None:
 
 def short_mission(loaded: LoadedScenario) -> MissionResult:
     """Run a mission of one second without a managing subsystem."""
+    # with it comes the compiler, which takes a while
     from suave_des.simulation.simulator import (
         Simulator,
-    )  # with it comes the compiler, which takes a while
+    )
 
     short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
     return Simulator(replace(loaded, scenario=short)).run("none", 1, 0)
@@ -358,9 +359,8 @@ def with_ensemble(
     """
     for name in ensemble.paths:
         for other in {*variation.drawn, *variation.paths.values()}:
-            if f"{name}.".startswith(f"{other}.") or f"{other}.".startswith(
-                f"{name}."
-            ):  # one is below the other
+            # one is below the other
+            if f"{name}.".startswith(f"{other}.") or f"{other}.".startswith(f"{name}."):
                 problem = f"varies {name}, as the campaign's sweep or perturbations do"
                 raise InputError(problem, file=path, remedy="vary each key once")
     found = replace(variation, ensemble=ensemble)

@@ -123,9 +123,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # ? for what the terminal's encoding lacks
     atexit.unregister(gc.freeze)  # as of an earlier call
-    atexit.register(
-        gc.freeze
-    )  # a last collection of all that was imported would take a tenth of a second
+    # a last collection of all that was imported would take a tenth of a second
+    atexit.register(gc.freeze)
     abandoned = _abandoned()
     try:
         with signals_raised():
@@ -134,9 +133,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             )
             if sys.stdout is not None:
                 sys.stdout.flush()  # what cannot be written is reported here, not while Python ends
-            if (
-                was_interrupted() and status == 128 + signal.SIGINT
-            ):  # typer's for any signal before the command began
+            # typer's for any signal before the command began
+            if was_interrupted() and status == 128 + signal.SIGINT:
                 status = _report("interrupted", exit_status())
     except _CommandInterruptedError as interruption:
         status = _report(str(interruption), exit_status())
@@ -149,10 +147,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _leave(_report("interrupted", exit_status()), by_force=False)
         if not isinstance(error, Exception):
             raise
+        # stdout: files have own errors
         if isinstance(error, OSError) and error.errno in (
             errno.ENOSPC,
             errno.EDQUOT,
-        ):  # stdout: files have own errors
+        ):
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
             _leave(
                 _report(f"the output cannot be written: {error.strerror}", BAD_INPUT),

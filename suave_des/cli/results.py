@@ -257,9 +257,8 @@ def validate(
             result = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
         simulated = result.frame()
         sources |= {"scenario": result.campaign.loaded.scenario.name, "runs": settings["runs"]}
-        if not set(result.campaign.spec.managers) <= set(
-            simulated["manager"]
-        ):  # one has no mission to compare
+        # one has no mission to compare
+        if not set(result.campaign.spec.managers) <= set(simulated["manager"]):
             exit_telling_failures(result)
     validation = compare(
         real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed

@@ -99,9 +99,8 @@ class _Program:
         """Send a message, and return its answer."""
         if self.has_ended:
             raise ProgramError("was ended after an error")
-        line = (
-            json.dumps(message, separators=(",", ":"), default=dict).encode() + b"\n"
-        )  # of mappings of other types
+        # of mappings of other types
+        line = json.dumps(message, separators=(",", ":"), default=dict).encode() + b"\n"
         try:
             while line:
                 line = line[os.write(self._in, line) :]
@@ -167,9 +166,8 @@ class _Program:
             stream.close()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_END_S)
-        with suppress(
-            ProcessLookupError, PermissionError
-        ):  # nobody is left; macOS says so by a PermissionError
+        # nobody is left; macOS says so by a PermissionError
+        with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         self._watcher.kill()

@@ -209,9 +209,8 @@ def _object(content: Any, known: Sequence[str]) -> Json:
 
 
 def _seconds(value: Any) -> float:
-    if (
-        type(value) not in (int, float) or not 0 <= value <= _LONGEST_S
-    ):  # true is an int, too, and nan in no range
+    # true is an int, too, and nan in no range
+    if type(value) not in (int, float) or not 0 <= value <= _LONGEST_S:
         raise InputError(
             f"{shown(value)} is not a time in seconds", remedy=f"a number from 0 to {_LONGEST_S:g}"
         )

@@ -326,9 +326,8 @@ def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
             for place, term in enumerate(atom.arguments):
                 operator = ""
                 others: Sequence[Term] = ()
-                if (
-                    isinstance(term, Variable) and in_body
-                ):  # the next one of the rule that stands for the same kind
+                # the next one of the rule that stands for the same kind
+                if isinstance(term, Variable) and in_body:
                     operator = "variable exchanged"
                     others = [
                         _next(term, [each for each in is_value if is_value[each] == is_value[term]])
@@ -341,9 +340,8 @@ def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
                     others = [Named(_next(term.iri, group)) for group in groups][:1]
                 elif isinstance(term, Lit) and term.datatype in EXACT:
                     operator, others = "threshold moved", list(_tenths(term))
-                elif (
-                    isinstance(term, Lit) and atom.kind == "data"
-                ):  # others that rules mention of the same property
+                # others that rules mention of the same property
+                elif isinstance(term, Lit) and atom.kind == "data":
                     operator = "status exchanged" if in_body else "conclusion changed"
                     known = literals[atom.predicate]
                     others = [each for each in sorted(known) if each.datatype == term.datatype]

@@ -351,9 +351,8 @@ def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) ->
     more: Iterable[Triple] = (
         InProcessPellet(base, base.content.all_terms()).infer(situation) if inferred else ()
     )
-    graph = rdflib.Graph(
-        "SimpleMemory"
-    )  # in the order in which they came: an answer with LIMIT is always the same
+    # in the order in which they came: an answer with LIMIT is always the same
+    graph = rdflib.Graph("SimpleMemory")
     lines = base.content.n_triples(base.content.rules) + "".join(map(n_triple, (*situation, *more)))
     names = {name: rdflib.BNode(name) for name in _UNNAMED.findall(lines)}
     graph.parse(data=lines, format="nt", bnode_context=names)

@@ -122,9 +122,8 @@ def make_policy(
     outcomes = [decided(Situation(state)) for state in every]
     cases = states.frame(every)
     add_decisions(cases, states, outcomes)
-    here = range(
-        0, len(every), len(states.tasks)
-    )  # states that differ in their task only follow one another
+    # states that differ in their task only follow one another
+    here = range(0, len(every), len(states.tasks))
     groups = (slice(first, first + len(states.tasks)) for first in here)
     flipping = [each for group in groups for each in _flipping(every[group], outcomes[group])]
     cases["marks"] = list(map(_marks, outcomes, flipping))
@@ -278,9 +277,8 @@ def _spans(
             by_place[at[number]][row_number, at[:number], at[number + 1 :]] = outcome
     spans: list[tuple[int, int]] = []
     for place, outcomes in enumerate(by_place):
-        if (
-            len(spans) > 1 and by_place[spans[-1][0]] == outcomes
-        ):  # nothing is joined to "not measured"
+        # nothing is joined to "not measured"
+        if len(spans) > 1 and by_place[spans[-1][0]] == outcomes:
             spans[-1] = spans[-1][0], place
         else:
             spans.append((place, place))

@@ -162,9 +162,8 @@ def _spans(content: bytes) -> list[_Span]:
     def end(_name: str) -> None:
         nonlocal depth
         if depth == 2:
-            tag = _TAG.match(
-                content, parser.CurrentByteIndex
-            )  # the end tag; of an empty element, its only tag
+            # the end tag; of an empty element, its only tag
+            tag = _TAG.match(content, parser.CurrentByteIndex)
             ends.append(tag.end() if tag else parser.CurrentByteIndex)
         depth -= 1
 

@@ -664,9 +664,8 @@ class States:
         tasks = tuple(_tasks(base, settings, space))
         scale, attributes = space.scale, space.attributes
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
-        if (
-            total <= LARGEST
-        ):  # else so many already that it does not matter how many values a range has
+        # else so many already that it does not matter how many values a range has
+        if total <= LARGEST:
             measured = tuple(
                 tuple(
                     (name, each)

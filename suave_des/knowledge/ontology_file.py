@@ -243,13 +243,13 @@ def _parse_rdf(path: Path, text: str) -> Graph:
     """
     # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
     text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
-    graph = Graph(
-        "SimpleMemory"
-    )  # goes through triples in the order of the file, each time the same
+    # goes through triples in the order of the file, each time the same
+    graph = Graph("SimpleMemory")
+    # it would write the ill-formed 1e3 as 1000
     before, rdflib.NORMALIZE_LITERALS = (
         rdflib.NORMALIZE_LITERALS,
         False,
-    )  # it would write the ill-formed 1e3 as 1000
+    )
     try:
         with without_log():
             graph.parse(data=text, format="xml", publicID=RELATIVE_TO + path.stem)

@@ -257,9 +257,8 @@ def value_of(value: str | Lit, names: Names) -> Value:
     if value.datatype == XSD + "boolean":
         return value.text.strip() in ("true", "1")
     with suppress(InvalidOperation):
-        if (
-            value.datatype in NUMERIC and not (number := Decimal(value.text.strip())).is_nan()
-        ):  # NaN never equals NaN
+        # NaN never equals NaN
+        if value.datatype in NUMERIC and not (number := Decimal(value.text.strip())).is_nan():
             return number
     return value.text
 

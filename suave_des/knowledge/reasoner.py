@@ -165,9 +165,8 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
     pairs = [
         (s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)
     ]
-    carriers = reached(
-        [HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)]
-    )  # properties with a measured value
+    # properties with a measured value
+    carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])
     for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in COMPARISONS:

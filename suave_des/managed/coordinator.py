@@ -116,9 +116,8 @@ class MissionCoordinator:
         yield self._next_poll()
         by_detection = self.revision.search_time == "detection"
         found_s = self.detector.detected_s if by_detection else self.env.now
-        self.search_time_s = float(
-            math.floor(found_s + 1e-9)
-        )  # a rounding error below a second counts as it
+        # a rounding error below a second counts as it
+        self.search_time_s = float(math.floor(found_s + 1e-9))
         self._end("task_done")
         self._begin(self._inspect)
         yield self.follow.finished

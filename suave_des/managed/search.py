@@ -107,9 +107,8 @@ class GenerateSearchPath(WaypointFunction):
     view_tangent: float
     phase_s: float
     start_latency_s: float = 0.0
-    _ready_s: float | None = field(
-        default=None, init=False
-    )  # earliest mission time of the first tick
+    # earliest mission time of the first tick
+    _ready_s: float | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self.state: Search = self.flight.state.search

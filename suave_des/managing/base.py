@@ -72,9 +72,8 @@ class System:
     _files: Mapping[str, Path]
     _open_knowledge: Callable[[], Reasoner]
     state_changed: Callable[[], None] = field(default=lambda: None, init=False)
-    unmeasured: set[str] = field(
-        default_factory=set, init=False
-    )  # names that nothing measures, for a remark
+    # names that nothing measures, for a remark
+    unmeasured: set[str] = field(default_factory=set, init=False)
 
     @property
     def now_s(self) -> float:

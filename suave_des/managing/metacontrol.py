@@ -76,13 +76,11 @@ class Metacontrol(ManagingSubsystem):
         self.components: dict[str, str] = {}
         self.measurements: dict[str, float] = {}
         self._listens_since_s = 0.0  # values that were published before are ignored
-        self._cancelled: set[str] = (
-            set()
-        )  # functions whose objectives were removed since the last cycle began
+        # functions whose objectives were removed since the last cycle began
+        self._cancelled: set[str] = set()
         self._recorded_statuses: frozenset[str] = frozenset()
-        self._without_design: frozenset[str] = (
-            frozenset()
-        )  # functions for which the last plan had no design
+        # functions for which the last plan had no design
+        self._without_design: frozenset[str] = frozenset()
         # Measured before the first cycle: signals of which function designs expect a value.
         expected = (
             self._reasoner.expected_attributes

@@ -51,9 +51,8 @@ class FurtherMetrics:
     adaptations_undone: int = 0
     reasoning_time_s: float = 0.0
     surfacing_time_s: float | None = None
-    _changes: dict[str, tuple[float, str]] = field(
-        default_factory=dict
-    )  # of each function: when, and from which mode
+    # of each function: when, and from which mode
+    _changes: dict[str, tuple[float, str]] = field(default_factory=dict)
     _in_force: dict[str, str] = field(default_factory=dict)
     _in_force_since_s: float = 0.0
     _configurations: set[frozenset[tuple[str, str]]] = field(default_factory=set)
@@ -155,9 +154,8 @@ class FurtherMetrics:
 
 def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: int) -> Array:
     """Find the value measured last at each row of a track, shape (rows,); nan before the first."""
-    since_rows = np.minimum(np.rint(np.array(times_s) / STEP_S), rows).astype(
-        np.int64
-    )  # rounded as Vehicle does
+    # rounded as Vehicle does
+    since_rows = np.minimum(np.rint(np.array(times_s) / STEP_S), rows).astype(np.int64)
     return np.repeat(np.append(np.nan, values), np.diff(since_rows, prepend=0, append=rows))
 
 

@@ -74,9 +74,8 @@ class ReactionMeter:
         )
         crossings_s, regions = self.visibility.crossings(thresholds_m[::-1])
         fitting_m = [None, *(altitude_m for altitude_m in altitudes_m[::-1] for _ in range(2))]
-        passed = (
-            bisect_right(crossings_s, self._entries[-1][0]) if self._entries else 0
-        )  # later ones are not answered
+        # later ones are not answered
+        passed = bisect_right(crossings_s, self._entries[-1][0]) if self._entries else 0
         return [(crossings_s[n], _OpenEvents.expect, fitting_m[regions[n]]) for n in range(passed)]
 
     def _low_battery(self) -> Iterator[_Entry]:
@@ -117,9 +116,8 @@ class _OpenEvents:
         """A message of the battery's level."""
         if low:
             self._since_s.setdefault("low battery", t_s)
-            self._since_s.pop(
-                "mismatch", None
-            )  # one that is open is dropped; if it lasts, it begins anew afterwards
+            # one that is open is dropped; if it lasts, it begins anew afterwards
+            self._since_s.pop("mismatch", None)
         elif self._battery_low:
             self._battery_low = False
             self._compare_at(self._next_message_s(t_s))

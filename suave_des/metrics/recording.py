@@ -34,9 +34,8 @@ class Recorder:
     metric: ReactionMetric
     events: list[Event] = field(default_factory=list)
     knowledge: list[KnowledgeRecord] = field(default_factory=list)
-    _reached: dict[str, int] = field(
-        default_factory=dict
-    )  # how many limits the last measured value has reached
+    # how many limits the last measured value has reached
+    _reached: dict[str, int] = field(default_factory=dict)
     _moving: str | None = None  # the function that the last of these modes is one of
     _modes: list[tuple[float, str]] = field(default_factory=lambda: [(0.0, "")])
 

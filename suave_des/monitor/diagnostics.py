@@ -59,9 +59,8 @@ class DiagnosticsBus:
 
     def __init__(self) -> None:
         self._subscribers: defaultdict[Kind, list[Subscriber]] = defaultdict(list)
-        self._waiting: defaultdict[Kind, list[Callable[[], object]]] = defaultdict(
-            list
-        )  # monitors, for a subscriber
+        # monitors, for a subscriber
+        self._waiting: defaultdict[Kind, list[Callable[[], object]]] = defaultdict(list)
 
     def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = EXEMPLAR_KINDS) -> None:
         """Pass every later diagnostic of some kinds to `subscriber`."""

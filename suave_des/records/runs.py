@@ -229,9 +229,8 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     for line, row in numbered:
         if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
             averages.append(str(line))
-        elif (
-            layout[DISTANCE] not in row
-        ):  # else it is the header again, as in files that were put together
+        # else it is the header again, as in files that were put together
+        elif layout[DISTANCE] not in row:
             if len(row) != len(header):
                 problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
                 raise line_error(
@@ -378,9 +377,8 @@ def _as_numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
     """
     cells = text.to_list()
     together = "".join(cells)
-    if (
-        together.isascii() and "_" not in together
-    ):  # else float() would accept more than numbers of a CSV file
+    # else float() would accept more than numbers of a CSV file
+    if together.isascii() and "_" not in together:
         with suppress(ValueError):
             return np.array([float(cell) if cell else math.nan for cell in cells])
     return pandas.to_numeric(text, errors="coerce").to_numpy(float)
@@ -449,9 +447,8 @@ def suave_pieces(
 
     def cells(number: int, row: Sequence[object]) -> list[object]:
         stamp = _FIRST_STAMP + timedelta(seconds=number)
-        mission: dict[str, Any] = dict(
-            zip(columns, row, strict=False)
-        )  # drawn and swept parameters follow
+        # drawn and swept parameters follow
+        mission: dict[str, Any] = dict(zip(columns, row, strict=False))
         mission |= {
             _LIMIT: time_limit_s,
             "stamp": stamp,

@@ -246,9 +246,8 @@ class Store:
 
     def commit(self) -> None:
         """Make appended outcomes durable."""
-        if (
-            self.path is not None and not self.path.exists()
-        ):  # the system would let this write on, and throw it away
+        # the system would let this write on, and throw it away
+        if self.path is not None and not self.path.exists():
             problem = f"{self.path} was removed while the campaign ran; its content is lost, so start a new campaign"
             raise StoreError(problem)
         with self.reading():
@@ -309,9 +308,8 @@ class Store:
         with suppress(SuaveDesError):
             is_empty = not keep_empty and (self.is_new or self.count() == 0)
         self._is_open = False
-        for cursor in list(
-            self._cursors
-        ):  # one that an interruption left unread would keep the file locked
+        # one that an interruption left unread would keep the file locked
+        for cursor in list(self._cursors):
             cursor.close()
         with suppress(sqlite3.Error):
             self._db.execute("COMMIT")
@@ -339,9 +337,8 @@ def store_read(path: Path | None) -> Iterator[None]:
     except (SuaveDesError, MemoryError):
         raise
     except sqlite3.OperationalError as error:
-        code = (
-            getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
-        )  # none: what is read is no text
+        # none: what is read is no text
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
         if code == sqlite3.SQLITE_BUSY and path is not None:
             problem, remedy = (
                 "another campaign is running in the output folder",

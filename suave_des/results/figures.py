@@ -213,11 +213,12 @@ def _draw_row_of_differences(
             "va": "center",
             "fontsize": 6.5,
         }
+        # lest the line at 0 cross the label
         place["bbox"] = {
             "facecolor": "white",
             "edgecolor": "none",
             "pad": 0.5,
-        }  # lest the line at 0 cross the label
+        }
         axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **place)
 
 

@@ -301,9 +301,8 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[
         for value in values
         if isinstance(value, float) and value == value
     }
-    form = (
-        "g" if len({f"{number:g}" for number in numbers}) == len(numbers) else ""
-    )  # or all digits
+    # or all digits
+    form = "g" if len({f"{number:g}" for number in numbers}) == len(numbers) else ""
 
     def text(value: object) -> str:
         if value != value:

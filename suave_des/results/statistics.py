@@ -244,9 +244,8 @@ def search_times(
         fitted = library(".duration.survfunc").SurvfuncRight(times_s, found)
         half = 0.5 - _ROUNDING
         median_s = float(np.nanmin([fitted.quantile(half), math.inf]))  # nan: less than half
-        ends_s = fitted.quantile_ci(
-            half, 1.0 - CONFIDENCE, method="cloglog"
-        )  # nan: no step is in it
+        # nan: no step is in it
+        ends_s = fitted.quantile_ci(half, 1.0 - CONFIDENCE, method="cloglog")
     is_before = fitted.surv_times < horizon_s
     steps_s = np.diff([0.0, *fitted.surv_times[is_before], horizon_s])
     restricted = Estimate(float(np.append(1.0, fitted.surv_prob[is_before]) @ steps_s))
@@ -356,9 +355,8 @@ def rank_sum_test(first: Sample, second: Sample) -> Test:
     with _quiet():
         ranks = library(".stats.nonparametric").rank_compare_2indep(first, second)
         low, high = ranks.conf_int(alpha=1.0 - CONFIDENCE)
-    effect = _with_interval(found["effect"], low, high, A12).cut(
-        0.0, 1.0
-    )  # none of one value, or without overlap
+    # none of one value, or without overlap
+    effect = _with_interval(found["effect"], low, high, A12).cut(0.0, 1.0)
     return found | effect.columns("effect")
 
 
@@ -460,9 +458,8 @@ def agreement(
         np.array([rng.choice(sample, size, replace=False) for _ in range(subsamples)])
         for sample, size in zip(samples, sizes, strict=True)
     ]
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # all values equal: p is nan, and no evidence
+    # all values equal: p is nan, and no evidence
+    with np.errstate(divide="ignore", invalid="ignore"):
         less, greater = (
             mannwhitneyu(*drawn, axis=-1, alternative=each, method="asymptotic").pvalue
             < SIGNIFICANCE

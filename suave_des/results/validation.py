@@ -208,9 +208,8 @@ def validate(
         if all(map(len, both := [sample(side, manager, metric) for side in sides]))
     }
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
-    cells = cells.drop(
-        columns=list(interval_names("simulated_std")), errors="ignore"
-    )  # so narrow that none needs it
+    # so narrow that none needs it
+    cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")
     of_one_metric = [both for both in combinations(samples, 2) if both[0][0] == both[1][0]]
     pairs = pandas.DataFrame(
         [_pair(*both, [samples[each] for each in both], generators) for both in of_one_metric]

@@ -36,10 +36,11 @@ def scenario_schema() -> dict[str, Any]:
         definitions["Scenario"]["properties"][named]["additionalProperties"] = (
             False  # other names than are allowed
         )
+    # over a base, a null removes an entry
     for name, key in (
         ("Scenario", "signals"),
         ("KnowledgeSettings", "values"),
-    ):  # over a base, a null removes an entry
+    ):
         entries = definitions[name]["properties"][key]
         allowed = entries.get("patternProperties", entries)
         for each in ("additionalProperties",) if allowed is entries else tuple(allowed):

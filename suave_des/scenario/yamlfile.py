@@ -451,10 +451,11 @@ def problem_and_remedy(
 def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, ErrorDetails]:
     """Return the first problem in the user's own file, or else in its base, with its key path."""
     found = ((_key_path(each, layer), each) for each in error.errors(include_url=False))
+    # a misspelt key is also a missing one, a list with a wrong entry too short
     late = {
         "missing": 1,
         "too_short": 2,
-    }  # a misspelt key is also a missing one, a list with a wrong entry too short
+    }
     return min(found, key=lambda each: (late.get(each[1]["type"], 0), *layer.place(each[0])[:2]))
 
 

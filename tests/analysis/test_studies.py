@@ -180,9 +180,8 @@ def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chan
         ("a - b", -21.0, 100.0, 10.0),
     ):
         assert (found[name]["mean"], found[name]["std"]) == pytest.approx((mean, chance**0.5))
-        variance = (
-            between - chance / 2.0 + chance / 5.0
-        )  # means of two simulated runs, and of five real ones
+        # means of two simulated runs, and of five real ones
+        variance = between - chance / 2.0 + chance / 5.0
         assert (found[name]["high90"] - mean) ** 2 == pytest.approx(
             quantile**2 * variance, rel=1e-5
         )

@@ -26,9 +26,8 @@ def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path,
         process.send_signal(number)
         status, told = chaos.ended(process)
         assert status in (0, -number, 128 + number), told
-        assert (
-            "Traceback" not in told or "in _get_module_details" in told
-        )  # of Python itself, while it starts
+        # of Python itself, while it starts
+        assert "Traceback" not in told or "in _get_module_details" in told
         again = (
             ["--resume", "killed"]
             if (tmp_path / "killed" / "campaign.sqlite").is_file()

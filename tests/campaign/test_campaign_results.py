@@ -25,9 +25,8 @@ def test_equal_campaigns_give_equal_bytes_on_one_and_two_workers(folder, tmp_pat
         run_campaign("seams2023", managers, 6, 3, workers, tmp_path / name)
     for file in ("runs.csv", "summary.csv"):
         one, two = ((tmp_path / name / file).read_bytes() for name in ("one", "two"))
-        assert one == two and one.startswith(
-            (folder / file).read_bytes()
-        )  # a manager more changes no other row
+        # a manager more changes no other row
+        assert one == two and one.startswith((folder / file).read_bytes())
     inputs = json.loads((tmp_path / "one" / "manifest.json").read_text())["inputs_sha256"]
     assert {"shipped/ontology/suave.owl", "shipped/ontology/tomasys.owl"} <= inputs.keys()
 
@@ -41,9 +40,8 @@ def test_summary_follows_from_runs(folder):
             values = [float(row[metric]) for row in rows if row["manager"] == line["manager"]]
             mean = sum(values) / 6
             std = (sum((value - mean) ** 2 for value in values) / 5) ** 0.5
-            half = (
-                2.570582 * std / 6**0.5
-            )  # Student's t, 5 degrees of freedom, 97.5%: any statistics table
+            # Student's t, 5 degrees of freedom, 97.5%: any statistics table
+            half = 2.570582 * std / 6**0.5
             assert line["n"] == "6"
             assert float(line[f"{metric}_mean"]) == pytest.approx(mean, abs=1e-5)
             assert float(line[f"{metric}_std"]) == pytest.approx(std, abs=1e-5)
@@ -94,10 +92,11 @@ class TestSuaveFormat:
         ]
         assert theirs[0]["mission_name"] == "time constrained none"
         assert theirs[4]["mission_name"] == "time constrained random"
+        # or the next lines show nothing
         assert {row["pipeline_found"] for row in ours} == {
             "True",
             "False",
-        }  # or the next lines show nothing
+        }
         for their, our in zip(theirs, ours, strict=True):
             found = our["pipeline_found"] == "True"
             assert their["time search (s)"] == (

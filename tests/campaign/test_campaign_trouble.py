@@ -145,11 +145,12 @@ def test_a_manager_whose_missions_all_take_too_long_is_given_up(workers, tmp_pat
     missions = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]
     assert missions["left_out"] == 200 - len(result.failures)
     later = run_campaign("seams2023", ["loops:LoopsLater"], 6, 1, time_out_s=0.3)
+    # one could be done: it is tried again
     assert (later.done, len(later.failures), later.remarks) == (
         1,
         5,
         (),
-    )  # one could be done: it is tried again
+    )
 
 
 def test_that_it_was_given_up_is_forgotten_when_it_is_resumed_and_other_remarks_are_not(

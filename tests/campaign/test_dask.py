@@ -238,9 +238,8 @@ def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(sm
         "seams2023", managers, 8, 1, scheduler=small_cluster.address, time_out_s=3.0
     )
     found = {failure.manager.partition(":")[2]: failure.cause for failure in result.failures}
-    found["HangsInSome"] = found["HangsInSome"].rpartition(", line ")[
-        0
-    ]  # whichever line of its loop
+    # whichever line of its loop
+    found["HangsInSome"] = found["HangsInSome"].rpartition(", line ")[0]
     assert found == causes
     assert len(result.rows) + len(result.failures) == 24
     idle = {row[2]: row[3:] for row in run_campaign("seams2023", ["none"], 8, 1).rows}
@@ -268,9 +267,8 @@ def test_ctrl_c_on_the_command_line(cluster, scenario, tmp_path):
     assert err.startswith("suave-des: interrupted; ")
     assert err.endswith("suave-des campaign --resume out runs the rest\n")
     assert err.count("\n") == 1
-    assert (
-        run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2
-    )  # workers are free for it
+    # workers are free for it
+    assert run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2
 
 
 def test_interrupted_there_and_resumed_here(cluster, scenario, tmp_path):

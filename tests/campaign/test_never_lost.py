@@ -113,9 +113,8 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario, undisturbed_l
 
     done = chaos.survive_forked(6, random.Random(7), run, out)
     assert done == sorted(done)
-    assert (
-        len({count for count in done if 0 < count < 2 * runs}) >= 2
-    )  # or the moments showed nothing
+    # or the moments showed nothing
+    assert len({count for count in done if 0 < count < 2 * runs}) >= 2
     resume_campaign(out)
     assert (out / "runs.csv").read_bytes() == undisturbed_long
     assert sorted(path.name for path in out.iterdir()) == [

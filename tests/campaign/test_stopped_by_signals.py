@@ -178,9 +178,8 @@ class TestInterruptedAtAnAwkwardMoment:
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 3, 1, out=out, overwrite=True)
         monkeypatch.undo()
-        resume_campaign(
-            out
-        )  # the results went first, so that none stand beside another campaign's missions
+        # the results went first, so that none stand beside another campaign's missions
+        resume_campaign(out)
         assert {
             path.name: path.read_bytes() for path in out.iterdir() if path.suffix == ".csv"
         } == {name: content for name, content in before.items() if name.endswith(".csv")}
@@ -189,9 +188,8 @@ class TestInterruptedAtAnAwkwardMoment:
         path = tmp_path / STORE_FILE
         store = Store(path)
         store.begin({})
-        store._db.execute(
-            "COMMIT"
-        )  # as commit() does, and is interrupted before it begins the next
+        # as commit() does, and is interrupted before it begins the next
+        store._db.execute("COMMIT")
         store.note("remarks", ["mine"])
         store.close()
         store = Store(path)

@@ -98,9 +98,8 @@ def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path):
     single = run_campaign(write(tmp_path, text), ["none"], 7).frame()
     firsts = [1, 1, 1, 4, 4, 4, 7]
     assert list(shared["start.x_m"]) == [single["start.x_m"][first - 1] for first in firsts]
-    assert list(shared["initial_y_m"]) == list(
-        single["initial_y_m"]
-    )  # drawn by the scenario, each run its own
+    # drawn by the scenario, each run its own
+    assert list(shared["initial_y_m"]) == list(single["initial_y_m"])
 
 
 def times_of_events(runs_per_draw: int) -> list[tuple[float, float]]:

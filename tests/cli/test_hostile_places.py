@@ -355,9 +355,8 @@ def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path):
     except OSError:
         pytest.skip("this file system has names in UTF-8 only")
     out.rmdir()
-    done = subprocess.run(
-        [*COMMAND, *CAMPAIGN[:-1], out], cwd=tmp_path, capture_output=True
-    )  # says the name: bytes
+    # says the name: bytes
+    done = subprocess.run([*COMMAND, *CAMPAIGN[:-1], out], cwd=tmp_path, capture_output=True)
     assert done.returncode == 0, done.stderr
     for command in (
         ["campaign", "--resume", str(out), "--runs", "3", "--quiet"],

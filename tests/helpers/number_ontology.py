@@ -42,10 +42,11 @@ def numbers_ontology(folder: Path) -> Ontology:
     things = [
         f":{name} a :Thing ; :first {text} ; :second {text} .\n" for name, text in NUMBERS.items()
     ]
+    # it would write numbers in one form
     before, rdflib.NORMALIZE_LITERALS = (
         rdflib.NORMALIZE_LITERALS,
         False,
-    )  # it would write numbers in one form
+    )
     rdflib.Graph().parse(data=HEADER + "".join(things), format="turtle").serialize(
         owl, format="xml"
     )

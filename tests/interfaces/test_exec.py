@@ -126,9 +126,8 @@ def test_it_is_told_what_happens():
 def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body, words):
     manager = program(body)
     told = re.search(r"within (\S+) s", words)
-    time_out_s = (
-        float(told[1]) if told else 60.0
-    )  # a busy machine takes its time to start a program
+    # a busy machine takes its time to start a program
+    time_out_s = float(told[1]) if told else 60.0
     assert words in failure(manager, manager_options={manager: {"time_out_s": time_out_s}})
 
 

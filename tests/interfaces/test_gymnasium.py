@@ -74,9 +74,8 @@ def test_an_observation_has_what_monitors_measured(simulator):
 
 
 def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simulator):
-    made = Simulator(
-        load_scenario("release15")
-    )  # there maintain_motion ends and begins with each task
+    # there maintain_motion ends and begins with each task
+    made = Simulator(load_scenario("release15"))
     environment = gymnasium.make(NAME, scenario=made)
     names = environment.unwrapped.observation_names
     seen, _, info = play(environment, [2, 1], seed=1)

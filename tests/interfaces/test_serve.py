@@ -210,9 +210,8 @@ def test_a_body_without_a_sensible_length_is_refused(port, head, status):
 def test_clients_that_leave_in_the_middle_are_not_reported(port, capfd):
     for _ in range(50):
         stream = socket.create_connection(("127.0.0.1", port), timeout=10.0)
-        stream.setsockopt(
-            socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)
-        )  # leave with a reset
+        # leave with a reset
+        stream.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         stream.sendall(b"PUT /execute HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9")
         stream.close()
     assert request(port, "GET", "/monitor")[0] == 200

@@ -104,9 +104,8 @@ def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_cons
     rules = f"""
 one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 2.2) -> fg_status(?fg, "IN_ERROR_FR")
 """
-    (error,) = errors(
-        found_by_pellet(tmp_path, rules)
-    )  # QAWaterVisibility says that it is IN_ERROR_NFR
+    # QAWaterVisibility says that it is IN_ERROR_NFR
+    (error,) = errors(found_by_pellet(tmp_path, rules))
     assert "contradiction" in error.message
     rules_in_it = (
         r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line \d+\)"

@@ -207,6 +207,5 @@ def test_rules_that_contradict_each_other_are_named(folder, command):
         refused(command, asked, (*STATE, *rules), named)
     status, text, _ = command("check", *rules)
     assert status == 1
-    assert (
-        "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text
-    )  # what follows from them may clash, too
+    # what follows from them may clash, too
+    assert "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text

@@ -71,9 +71,8 @@ def test_add_switch_and_remove(owl, style):
         n for n, (one, other) in enumerate(zip(original, added, strict=False)) if one != other
     )
     rest = original[at:]
-    assert (
-        original[:at] + added[at : len(added) - len(rest)] + rest == added
-    )  # nothing but an insertion
+    # nothing but an insertion
+    assert original[:at] + added[at : len(added) - len(rest)] + rest == added
 
     assert set_enabled(owl, "Battery", enabled=False)
     assert said(owl) == {*before, (new[0], new[1], False)}

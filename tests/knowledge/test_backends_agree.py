@@ -102,9 +102,8 @@ def _add_axiom(
         case 4:
             graph.add((name, RDF.type, OWL.SymmetricProperty))
         case 5:
-            graph.add(
-                (name, RDF.type, OWL.FunctionalProperty)
-            )  # two values are then the same individual
+            # two values are then the same individual
+            graph.add((name, RDF.type, OWL.FunctionalProperty))
         case 6:
             graph.add((name, RDFS.domain, one))
             graph.add((second, RDFS.range, other))
@@ -207,9 +206,8 @@ def test_both_backends_infer_the_same_on_random_states(kb, pellet, count):
     assert found == reference
     consistent = [one for one in found if isinstance(one, Inference)]
     assert any(isinstance(one, str) for one in found)
-    assert len({one.facts for one in consistent}) >= min(
-        10, count // 2
-    )  # what follows from the states does differ
+    # what follows from the states does differ
+    assert len({one.facts for one in consistent}) >= min(10, count // 2)
     for ours, theirs in zip(found, reference, strict=True):
         if isinstance(ours, Inference) and isinstance(theirs, Inference):
             assert pellet.plan(ours) == pellet.plan(theirs)

@@ -333,9 +333,8 @@ def test_files_of_2023_under_another_revision_are_one_error_that_names_the_cause
         "label>compRecov<"
         in (tmp_path / "mros.owl").read_text().splitlines()[(error.line or 0) - 1]
     )
-    with pytest.raises(
-        KnowledgeError, match="these are ontologies of revision 2023"
-    ):  # before a mission, too
+    # before a mission, too
+    with pytest.raises(KnowledgeError, match="these are ontologies of revision 2023"):
         open_base(loaded)
 
 

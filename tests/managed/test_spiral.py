@@ -110,9 +110,8 @@ def test_a_change_of_altitude_skips_one_angle_step_but_no_radius(before_m):
     for altitude_m in (*before_m, 2.0):
         search.node.apply(spiral_at(altitude_m))
     search.ticks(1)
-    assert search.spiral(ORIGIN)[-1] == point(
-        3 + 2, 5
-    )  # at 2 m a step widens the spiral twice as much
+    # at 2 m a step widens the spiral twice as much
+    assert search.spiral(ORIGIN)[-1] == point(3 + 2, 5)
 
 
 @BOTH

@@ -78,9 +78,8 @@ BOTH = pytest.mark.parametrize("name", ["seams2023", "release15"])
 )
 def test_the_search_is_as_high_as_the_measured_visibility_allows(name, value, design):
     found = mission(visibility(value), name=name, limit_s=10.0)
-    chosen = [
-        mode for t_s, mode in modes(found, SEARCH) if t_s < 10.0
-    ]  # at the limit the task is cancelled
+    # at the limit the task is cancelled
+    chosen = [mode for t_s, mode in modes(found, SEARCH) if t_s < 10.0]
     assert chosen[-1:] == ([design] if design else [])
     if design is None:
         assert "no function design is left" in told(found, "no_design_left")[0]
@@ -131,9 +130,8 @@ def test_a_plan_under_way_is_executed_though_its_objective_is_removed(executes):
     goes_on = set()
     for run in range(1, 9):
         found = mission(values, run=run, limit_s=150.0)
-        cycle_ends_s = modes(found, MOTION)[0][
-            0
-        ]  # 1 s after it began; the next one begins a second later
+        # 1 s after it began; the next one begins a second later
+        cycle_ends_s = modes(found, MOTION)[0][0]
         removed_s = next(t_s for t_s, mode in modes(found, SEARCH) if mode == "fd_unground")
         again = [(t_s, mode) for t_s, mode in modes(found, SEARCH) if removed_s < t_s < 149.0]
         under_way_s = (removed_s - cycle_ends_s) % 2.0 - 1.0

@@ -260,9 +260,8 @@ def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_nam
         "No difference of the mean search time is shown between a, which has, with others, the best mean, "
     )
     assert "b (equal in all 2 pairs)" in ties
-    frame = runs(
-        a=[120.0, 110.0, 50.0], b=[110.0, 110.0], c=[150.0]
-    )  # a is worse in its pairs with b
+    # a is worse in its pairs with b
+    frame = runs(a=[120.0, 110.0, 50.0], b=[110.0, 110.0], c=[150.0])
     more = compare_frame(frame).conclusion
     assert "between a, which has the best mean of all its runs, and b" in more
 

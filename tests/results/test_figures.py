@@ -278,9 +278,8 @@ class TestDifferences:
         rain = next(line for line in axes.get_lines() if len(line.get_xdata()) == 5)
         assert sorted(rain.get_xdata()) == [1.0, 2.0, 3.0, 4.0, 40.0]
         assert [text.get_text() for text in axes.texts] == ["run 1", "run 5"]
-        assert all(
-            text.get_bbox_patch() for text in axes.texts
-        )  # so that the line at 0 does not cross them
+        # so that the line at 0 does not cross them
+        assert all(text.get_bbox_patch() for text in axes.texts)
         low, high = axes.containers[0][2][0].get_segments()[0][:, 0]
         assert (low, high) == pytest.approx(mean_of([1.0, 2.0, 3.0, 4.0, 40.0]).interval)
 

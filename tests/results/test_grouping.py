@@ -111,9 +111,8 @@ def test_further_metrics_are_not_what_was_swept(tmp_path):
     sweep = {"grid": {"battery.discharge_time_s": [150.0, 200.0]}}
     run_campaign("extended", ["none", "metacontrol"], 3, 1, out=tmp_path / "out", sweep=sweep)
     runs = pandas.read_csv(tmp_path / "out" / "runs.csv")
-    assert (
-        runs.groupby(["manager", "run"])["battery_level"].nunique().max() == 2
-    )  # it differs between the points
+    # it differs between the points
+    assert runs.groupby(["manager", "run"])["battery_level"].nunique().max() == 2
     for comparison in (compare_folders([tmp_path / "out"]), compare_frame(runs)):
         (note,) = (note for note in comparison.notes if "averaged over" in note)
         assert "averaged over battery.discharge_time_s:" in note

@@ -84,9 +84,8 @@ def test_paired_shares_differ_by_the_formula_of_bonett_and_price():
     ],
 )
 def test_censored_search_times_are_those_of_lifelines(times_s, found, horizon_s, mean_s, half):
-    was_found = np.array(
-        [each == "y" for each in found]
-    )  # expected: lifelines 0.30, KaplanMeierFitter
+    # expected: lifelines 0.30, KaplanMeierFitter
+    was_found = np.array([each == "y" for each in found])
     restricted, estimated = statistics.search_times(np.array(times_s, float), was_found, horizon_s)
     assert restricted.value == pytest.approx(mean_s, rel=1e-12)
     assert (estimated.value, estimated.low, estimated.high) == half
@@ -107,9 +106,8 @@ def test_the_mean_to_the_limit_has_the_interval_of_a_sample_though_missions_end_
     assert found.interval == pytest.approx(
         stats.t.interval(0.95, 4, times_s.mean(), stats.sem(times_s))
     )
-    earlier, _ = statistics.search_times(
-        times_s, times_s < 300.0, 310.0
-    )  # two are censored before: no sample
+    # two are censored before: no sample
+    earlier, _ = statistics.search_times(times_s, times_s < 300.0, 310.0)
     assert earlier.interval is None
 
 
@@ -118,10 +116,11 @@ def test_the_effect_of_pairs_is_the_rank_biserial_correlation_of_those_that_diff
     # / 10.
     first, second = np.array([13.0, 9.0, 12.0, 14.0, 7.0]), np.array([10.0, 10.0, 10.0, 10.0, 7.0])
     assert statistics.signed_rank_test(first, second)["effect"] == pytest.approx(0.8)
+    # 1 - 6/7 is not quite 1/7
     first, second = (
         np.array([7, 1, 9, 3, 5, 4]),
         np.array([6, 0, 10, 1, 8, 4]),
-    )  # 1 - 6/7 is not quite 1/7
+    )
     assert statistics.signed_rank_test(first / 7, second / 7) == statistics.signed_rank_test(
         first, second
     )

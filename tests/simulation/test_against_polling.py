@@ -62,11 +62,12 @@ FRAMES = {
     "revision.set_points.node_frame_offset_z_m": normal(0.2),
 }
 FOLLOW_POLL, SPIRAL = "revision.follow.poll_period_s", "revision.spiral"
+# at a poll
 IN_STEP = {
     "managers.random.adaptation_period_s": 1.0,
     FOLLOW_POLL: 1.0,
     "latencies.mode_change_s": 1.7,
-}  # at a poll
+}
 LONG = {
     "mission.time_limit_s": 600.0,
     FOLLOW_POLL: 0.5,

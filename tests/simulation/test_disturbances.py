@@ -59,9 +59,8 @@ def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves
     )
     x_m = {round(point.t_s): point.x_m for point in result.trajectory}
     assert x_m[210] - x_m[110] == pytest.approx(0.05 * 100, abs=0.5)
-    half = (
-        0.05 * 50 + 0.2 * 100 / math.pi
-    )  # the integral over the half in which the sine is positive
+    # the integral over the half in which the sine is positive
+    half = 0.05 * 50 + 0.2 * 100 / math.pi
     assert x_m[150] - x_m[100] == pytest.approx(half, rel=0.15)
 
 

@@ -64,9 +64,8 @@ def test_the_search_goes_on_around_the_same_centre():
     on_way = is_on_the_way(result)
     left, back = on_way.index(True), len(on_way) - on_way[::-1].index(True)
     assert distance_m[back] > 10.0
-    assert (
-        distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0
-    )  # a turn of a minute adds up to 3.5 m
+    # a turn of a minute adds up to 3.5 m
+    assert distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0
 
 
 def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept():

@@ -61,9 +61,8 @@ def test_an_interrupted_leg_starts_anew_from_the_stopping_point():
     x_m, y_m, z_m = vehicle.position(2.0)
     u_m_per_s = nu(vehicle, 2.0)[0]
     vehicle.command(2.0, 3.0, 1.0, -18.0)
-    assert leg_start(vehicle, 2.1) == pytest.approx(
-        (x_m + u_m_per_s, y_m, z_m), abs=1e-3
-    )  # the position gain is 1 / s
+    # the position gain is 1 / s
+    assert leg_start(vehicle, 2.1) == pytest.approx((x_m + u_m_per_s, y_m, z_m), abs=1e-3)
 
 
 def test_an_interrupted_leg_loses_the_integral():

@@ -60,9 +60,8 @@ def test_without_a_measurement_nothing_is_seen():
 
 
 def test_height_of_the_detected_points_narrows_the_view():
-    raised = POINTS + np.array(
-        [0.0, 0.0, 0.75]
-    )  # revision 2023: 0.25 m below a vehicle at 1 m altitude
+    # revision 2023: 0.25 m below a vehicle at 1 m altitude
+    raised = POINTS + np.array([0.0, 0.0, 0.75])
     camera = above(30, 1.0, dy_m=0.2)
     assert first_point_in_view(*camera, 3.0, POINTS, HALF_WIDTH_AT_1_M) >= 0
     assert first_point_in_view(*camera, 3.0, raised, HALF_WIDTH_AT_1_M) == -1

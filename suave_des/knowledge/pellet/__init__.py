@@ -85,9 +85,8 @@ class TimeLimit:
         Raises:
             ReasonerTimeoutError: it took longer, or an earlier one still has not ended.
         """
-        if (
-            self._thread is None or self._process != os.getpid()
-        ):  # a process that was forked has none of the threads
+        # a process that was forked has none of the threads
+        if self._thread is None or self._process != os.getpid():
             self._thread, self._process = _ReasonerThread(), os.getpid()
             self._thread.start()
             self._abandoned = None
@@ -196,9 +195,8 @@ def _end_all() -> None:
     threads = [thread for thread in threading.enumerate() if isinstance(thread, _ReasonerThread)]
     for thread in threads:
         thread.jobs.put(None)
-    running = [
-        thread for thread in threads if thread.is_alive()
-    ]  # one that is just starting finds None first
+    # one that is just starting finds None first
+    running = [thread for thread in threads if thread.is_alive()]
     for thread in running:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(
             ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit)

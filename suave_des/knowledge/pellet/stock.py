@@ -154,9 +154,8 @@ def _value(term: Node) -> str | Lit:
     found = term_of(term)
     if isinstance(found, Lit) and found.datatype == _PLAIN:
         return Lit(owlready2.reasoning._unescape_pellet_str(found.text), XSD + "string")
-    return (
-        Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found
-    )  # () is how Pellet prints no text
+    # () is how Pellet prints no text
+    return Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found
 
 
 def _below(graph: Any, name: str) -> set[Node]:

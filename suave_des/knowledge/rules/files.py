@@ -568,9 +568,8 @@ _VARIABLES: Final = "urn:swrl:var#"
 _Term = TypeVar("_Term", str, str | Lit)
 
 
-@lru_cache(
-    maxsize=4
-)  # as many as there are files in the cache of those: their rules are read again and again
+# as many as there are files in the cache of those: their rules are read again and again
+@lru_cache(maxsize=4)
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
     rules, found, numbers = list[Rule](), list[tuple[str, Rule]](), count(1)

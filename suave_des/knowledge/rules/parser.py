@@ -87,9 +87,8 @@ def parse_rules(
                 errors.append(error)
                 at = builder.failed_at
             except UnexpectedInput as error:
-                state: Any = (
-                    error.interactive_parser
-                )  # which knows what is possible after all that was read
+                # which knows what is possible after all that was read
+                state: Any = error.interactive_parser
                 at = _BLANK.match(text, error.pos_in_stream or 0).end()  # type: ignore[union-attr]
                 at = (
                     len(text)
