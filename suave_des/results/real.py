@@ -250,7 +250,7 @@ def _block(
     that is not known.
     """
     number = len(missions)
-    possible = [each for each in range(1, number + 1) if -(-number // each) == conditions]
+    possible = _possible_blocks(number, conditions)
     fitting = [
         each for each in possible if _starts_fit(missions, _in_blocks(missions, each), starts)
     ]
@@ -258,13 +258,20 @@ def _block(
         return runs_each
     if possible and not fitting:
         return f"which do not begin where the {conditions} conditions have their starts, in order"
-    are_known = any(name in missions for name in starts)
-    if not possible or (number % conditions and not are_known):
+    is_uneven = number % conditions > 0
+    if not possible or (is_uneven and missions.columns.intersection(starts.columns).empty):
         return f"which {conditions} conditions do not share evenly"
     if len(fitting) > 1:
         each = f"{fitting[0]} or {fitting[1]}"
         return f"which may be {each} in a row of each of {conditions} conditions"
     return fitting[0]
+
+
+def _possible_blocks(number: int, conditions: int) -> list[int]:
+    """Return how many missions in a row may be of one condition, the last of which may have fewer,
+    so that there are so many conditions.
+    """
+    return [each for each in range(1, number + 1) if -(-number // each) == conditions]
 
 
 def _in_blocks(missions: pandas.DataFrame, block: int) -> NDArray[np.int64]:
