@@ -94,6 +94,8 @@ def run_campaign(
     if spec.out is not None:
         _check_is_free(spec.out, overwrite=spec.overwrite)
     file = read_campaign_file(spec.scenario) if loaded is None else None
+    if file is not None and managers is None and "managers" in file.settings.model_fields_set:
+        inputs.tell_code(file.path, file.settings.managers)
     if settings := settings_of(spec.with_file(file).managers):
         spec = spec.model_copy(
             update={"replacements": {**spec.replacements, "manager_options": settings}}

@@ -30,7 +30,7 @@ from suave_des.caches import SharedEntries, private_cache
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
 from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_ensemble
-from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, shown
+from suave_des.errors import MISTAKES_LOGGER, InputError, Level, ordered, relative_path, shown
 from suave_des.files import LIMIT_BYTES, sha256_of
 from suave_des.imports import find_here
 from suave_des.learned import read_file
@@ -186,6 +186,8 @@ def check_inputs(
         InputError: a function has no node; the knowledge base cannot be used; a manager refuses the
             scenario, or a file of it cannot be read.
     """
+    for each in scenarios:
+        tell_code(each.path, [settings.node for settings in each.scenario.functions.values()])
     files, kinds = list[Path](), {name: manager_class(name) for name in managers}
     given = any(replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
     if given or any(kind.needs_knowledge for kind in kinds.values()):
@@ -210,6 +212,21 @@ def check_inputs(
         place if place not in inputs else f"module {place}": path for place, path in code.items()
     }
     return inputs | {place: sha256_of(path) for place, path in code.items()}
+
+
+def tell_code(file: Path, names: Iterable[str]) -> None:
+    """Say, before it is run, that a file names code, and where that is; once in a process."""
+    for name in sorted(names):
+        if (file, name) in _told or ":" not in name or is_built_in(name):
+            continue
+        _told.add((file, name))
+        kind, _, command = name.partition(":")
+        what = f"the command {shown(command)}"
+        if not takes_argument(name):
+            spec = _spec(kind.partition(".")[0])
+            place = None if spec is None else spec.origin or kind
+            what = f"the code of {name}" + (f" ({relative_path(place)})" if place else "")
+        logging.getLogger("suave_des").warning("note: %s has %s run", shown_name(file), what)
 
 
 def _check_knowledge(loaded: LoadedScenario) -> Sequence[Path]:

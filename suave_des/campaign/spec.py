@@ -217,6 +217,11 @@ class CampaignFile:
     inputs: Mapping[str, str]
     layer: Layer = field(repr=False)
 
+    @property
+    def path(self) -> Path:
+        """Where it is."""
+        return self.layer.place(("campaign",)).file
+
     def located(self, error: InputError) -> InputError:
         """Return an error about a key path of this file with its line."""
         place = error.place or ""

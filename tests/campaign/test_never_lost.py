@@ -80,9 +80,9 @@ def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(
 
     outcomes = Store.outcomes
 
-    def ctrl_c(store: Store) -> Iterator[Outcome]:
+    def ctrl_c(store: Store, problem_of: Callable[[Outcome], str]) -> Iterator[Outcome]:
         monkeypatch.undo()
-        yield next(outcomes(store))
+        yield next(outcomes(store, problem_of))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Store, "outcomes", ctrl_c)

@@ -108,3 +108,30 @@ def test_a_manager_named_like_a_module_of_python_is_told_which_file_was_imported
     )
     assert done.returncode == 2
     assert "not test.py in this folder (rename your file" in done.stderr
+
+
+CAMPAIGN = "campaign: 1\nscenario: seams2023\nruns: 1\nmanagers: ['mine:Mine', 'exec:false']\n"
+FUNCTION = "base: seams2023\nfunctions: {f_generate_search_path: {node: 'mine:Node'}}\n"
+
+
+def test_code_that_a_file_names_is_told_before_it_is_run(tmp_path):
+    (tmp_path / "mine.py").write_text(f"raise ValueError('mine is run')\n{MINE}")
+    (tmp_path / "c.yaml").write_text(CAMPAIGN)
+    (tmp_path / "s.yaml").write_text(FUNCTION)
+    done = python("-P", "-m", "suave_des", "campaign", "c.yaml", "--out", "out", cwd=tmp_path)
+    first, second, last = done.stderr.splitlines()
+    assert first == "note: c.yaml has the command 'false' run"
+    assert second == "note: c.yaml has the code of mine:Mine (mine.py) run"
+    assert "mine is run" in last
+    done = python("-P", "-m", "suave_des", "run", "s.yaml", "--manager", "none", cwd=tmp_path)
+    first, last = done.stderr.splitlines()
+    assert first == "note: s.yaml has the code of mine:Node (mine.py) run"
+    assert "mine is run" in last
+
+
+def test_code_that_the_user_names_is_run_without_a_word(tmp_path):
+    (tmp_path / "mine.py").write_text(MINE)
+    done = python(
+        "-P", "-m", "suave_des", "run", "seams2023", "--manager", "mine:Mine", cwd=tmp_path
+    )
+    assert (done.returncode, done.stderr) == (0, "")
