@@ -90,22 +90,20 @@ def fly(
             return Ends.SIGHT.value
         if flight.next_tick_s > until_s:
             return Ends.THERE.value
-        is_search = search_s <= follow_s
+        is_search, arrives = search_s <= follow_s, True
         if is_search:
-            does, timer = search.tick(flight.search, track, row), flight.search.timer
+            does = search.tick(flight.search, track, row)
+            if does == Does.SENDS.value:
+                arrives = search.send_waypoint(flight.search, vehicle)
         else:
-            does, timer = follow.tick(flight.follow, track, row, path), flight.follow.timer
+            does = follow.tick(flight.follow, track, row, path)
+            if does == Does.SENDS.value:
+                arrives = follow.send_point(flight.follow, vehicle, path)
         if does == Does.FINISHES.value:
             return Ends.FINISH.value
-        if does == Does.SENDS.value:
-            if timer.messages_before_loss == 0.0:
-                flight.loses_search = is_search
-                return Ends.LOSS.value
-            timer.messages_before_loss -= 1.0
-            if is_search:
-                search.send_waypoint(flight.search, vehicle)
-            else:
-                follow.send_point(flight.follow, vehicle, path)
+        if not arrives:
+            flight.loses_search = is_search
+            return Ends.LOSS.value
 
 
 class Flight:

@@ -55,12 +55,16 @@ def next_tick_s(timer: Timer) -> float:
 
 
 @compiled
-def send(timer: Timer, vehicle: VehicleRecord, x_m: float, y_m: float, z_m: float) -> None:
-    """Give the autopilot a set-point, in the function's frame."""
+def send(timer: Timer, vehicle: VehicleRecord, x_m: float, y_m: float, z_m: float) -> bool:
+    """Give the autopilot a set-point, in the function's frame; return whether it arrives."""
+    if timer.messages_before_loss == 0.0:
+        return False
+    timer.messages_before_loss -= 1.0
     vehicle.set_point_x_m = x_m + timer.frame_x_m
     vehicle.set_point_y_m = y_m + timer.frame_y_m
     vehicle.set_point_z_m = z_m + timer.frame_z_m + timer.altitude_error_m
     vehicle.set_point_number += 1
+    return True
 
 
 @dataclass(eq=False)
