@@ -94,9 +94,7 @@ class WaypointFunction(FunctionNode):
         timer, now_s = self.timer, self.env.now
         timer.is_active, timer.is_due, timer.tick = True, not resumes, 0
         timer.start_s = now_s + (t_s - now_s) if t_s > now_s else now_s
-        flight = self.flight
-        flight.state.next_tick_s = min(flight.state.next_tick_s, timer.start_s)
-        flight.fly_to(now_s)  # a tick that is due now comes at once
+        self.flight.fly_to(now_s)  # a tick that is due now comes at once
 
     def stop(self) -> None:
         """Stop ticking; a tick at this very time came before."""
