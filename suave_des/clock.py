@@ -18,6 +18,9 @@ from simpy.core import StopSimulation
 Process = Generator[simpy.Event, Any, None]
 
 
+_process_next = simpy.Environment.step
+
+
 class MissionEnvironment(simpy.Environment):
     """A SimPy environment that has the vehicle flown to each event before the event is processed.
 
@@ -34,10 +37,10 @@ class MissionEnvironment(simpy.Environment):
 
     def step(self) -> None:
         """Fly to the next event, and process it, or one that the flight has brought about."""
-        next_s = self.peek()
+        next_s = self._queue[0][0] if self._queue else math.inf
         if self._now < next_s < math.inf:
             self.fly_to(next_s)
-        super().step()
+        _process_next(self)
 
     def schedule(
         self,
@@ -58,16 +61,17 @@ class MissionEnvironment(simpy.Environment):
         """Process all events before mission time t, and go there; stop at the event of the
         mission's end.
         """
+        queue = self._queue
         try:
-            while self.peek() < t_s or self._has_flown_into_event(t_s):
-                self.step()
+            while True:
+                while queue and queue[0][0] < t_s:
+                    self.step()
+                self.fly_to(t_s)  # which may add an event before then
+                if not queue or queue[0][0] >= t_s:
+                    break
         except StopSimulation:
             return
         self._now = t_s
-
-    def _has_flown_into_event(self, t_s: float) -> bool:
-        self.fly_to(t_s)
-        return self.peek() < t_s
 
 
 def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
@@ -161,7 +165,8 @@ class Alarm:
         """Call the function at mission time t (see `exactly_at`), or as the next thing now if t has
         passed.
         """
-        self._pending = event = (exactly_at if exactly else until)(self._env, t_s)
+        event = exactly_at(self._env, t_s) if exactly else until(self._env, t_s)
+        self._pending = event
         event.callbacks.append(self._ring)
 
     def cancel(self) -> None:

@@ -100,6 +100,18 @@ def shared(records: ctypes.Array[Any]) -> Records:
 _dtypes: dict[type, np.dtype[Any]] = {}  # to make one takes as long as some flights
 
 
+def for_types_of(function: _F, *arguments: object) -> _F:
+    """Compile a function for the types of some arguments, and leave out looking them up at each
+    call, which takes 1 us: arguments of other types would be misread.
+    """
+    dispatcher: Any = function
+    if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
+        return function
+    signature = tuple(map(numba.typeof, arguments))
+    dispatcher.compile(signature)
+    return cast(_F, dispatcher.overloads[signature].entry_point)
+
+
 class _CodeCache(caching._Cache):
     """Keeps machine code in the user's cache folder, by private interfaces of numba.
 

@@ -9,19 +9,20 @@ set-point is lost, for then the next loss has to be drawn.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from enum import IntEnum
+from functools import partial
 
 import numpy as np
 
-from suave_des.compiling import Array, Record, Records, compiled, record, shared
+from suave_des.compiling import Array, Record, Records, compiled, for_types_of, record, shared
 from suave_des.managed import follow, search
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import Follow, FollowPipeline
 from suave_des.managed.search import GenerateSearchPath, Search
 from suave_des.managed.waypoints import Does, next_tick_s
 from suave_des.vehicle.kernel import VehicleRecord, advance
-from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import Camera, first_detection
 
 
@@ -90,22 +91,30 @@ def fly(
             return Ends.SIGHT.value
         if flight.next_tick_s > until_s:
             return Ends.THERE.value
-        is_search = search_s <= follow_s
+        is_search, arrives = search_s <= follow_s, True
         if is_search:
-            does, timer = search.tick(flight.search, track, row), flight.search.timer
+            does = search.tick(flight.search, track, row)
+            if does == Does.SENDS.value:
+                arrives = search.send_waypoint(flight.search, vehicle)
         else:
-            does, timer = follow.tick(flight.follow, track, row, path), flight.follow.timer
+            does = follow.tick(flight.follow, track, row, path)
+            if does == Does.SENDS.value:
+                arrives = follow.send_point(flight.follow, vehicle, path)
         if does == Does.FINISHES.value:
             return Ends.FINISH.value
-        if does == Does.SENDS.value:
-            if timer.messages_before_loss == 0.0:
-                flight.loses_search = is_search
-                return Ends.LOSS.value
-            timer.messages_before_loss -= 1.0
-            if is_search:
-                search.send_waypoint(flight.search, vehicle)
-            else:
-                follow.send_point(flight.follow, vehicle, path)
+        if not arrives:
+            flight.loses_search = is_search
+            return Ends.LOSS.value
+
+
+_compiled: list[Callable[..., int]] = []
+
+
+def compiled_flight(*arrays: Array) -> Callable[..., int]:
+    """Return `fly` for arrays such as those of every flight."""
+    if not _compiled:
+        _compiled.append(for_types_of(fly, *arrays, 0.0))
+    return _compiled[0]
 
 
 class Flight:
@@ -124,8 +133,9 @@ class Flight:
         self.vehicle, self.path = vehicle, path
         records = _OneRecord()
         self.state: FlightRecord = records[0]
-        self.state.camera, self.state.next_tick_s = camera, -math.inf
-        self._arrays = shared(records), vehicle.records, vehicle.track, path, points, visibility
+        self.state.camera = camera
+        arrays = shared(records), vehicle.records, vehicle.track, path, points, visibility
+        self._fly = partial(compiled_flight(*arrays), *arrays)
 
     def begin(
         self, detector: PipelineDetector, search: GenerateSearchPath, follow: FollowPipeline
@@ -136,19 +146,17 @@ class Flight:
 
     def fly_to(self, t_s: float) -> None:
         """Fly to mission time t; what ends the flight earlier becomes an event."""
-        state, vehicle = self.state, self.vehicle
-        if t_s < state.next_tick_s and row_at(t_s) <= vehicle.state.row:
-            return
-        while ends := fly(*self._arrays, t_s):
+        while ends := self._fly(t_s):
             if ends == Ends.SIGHT:
-                seen_s = state.camera.next_row * STEP_S
-                self._detector.detect_at(seen_s, state.camera.point)
+                camera = self.state.camera
+                seen_s = camera.next_row * STEP_S
+                self._detector.detect_at(seen_s, camera.point)
                 t_s = min(t_s, seen_s)
             elif ends == Ends.LOSS:
-                lost = self._search if state.loses_search else self._follow
+                lost = self._search if self.state.loses_search else self._follow
                 lost.message_lost()
             else:
-                self._follow.reaches_end(state.next_tick_s)
+                self._follow.reaches_end(self.state.next_tick_s)
                 return
 
     def close(self) -> None:

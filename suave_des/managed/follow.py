@@ -87,10 +87,10 @@ def tick(follow: Follow, track: Array, row: int, path: Array) -> int:
 
 
 @compiled
-def send_point(follow: Follow, vehicle: VehicleRecord, path: Array) -> None:
+def send_point(follow: Follow, vehicle: VehicleRecord, path: Array) -> bool:
     """Send the next point."""
     to = follow.next_point
-    send(follow.timer, vehicle, path[to, 0], path[to, 1], follow.z_m)
+    return send(follow.timer, vehicle, path[to, 0], path[to, 1], follow.z_m)
 
 
 @dataclass(eq=False)

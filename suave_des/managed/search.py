@@ -84,10 +84,10 @@ def tick(search: Search, track: Array, row: int) -> int:
 
 
 @compiled
-def send_waypoint(search: Search, vehicle: VehicleRecord) -> None:
+def send_waypoint(search: Search, vehicle: VehicleRecord) -> bool:
     """Send the way-point, at the present altitude; it is reached at its own z."""
     z_m = SEA_BED_Z_M + search.altitude_m - search.below_m
-    send(search.timer, vehicle, search.x_m, search.y_m, z_m)
+    return send(search.timer, vehicle, search.x_m, search.y_m, z_m)
 
 
 @dataclass(eq=False)

@@ -55,12 +55,16 @@ def next_tick_s(timer: Timer) -> float:
 
 
 @compiled
-def send(timer: Timer, vehicle: VehicleRecord, x_m: float, y_m: float, z_m: float) -> None:
-    """Give the autopilot a set-point, in the function's frame."""
+def send(timer: Timer, vehicle: VehicleRecord, x_m: float, y_m: float, z_m: float) -> bool:
+    """Give the autopilot a set-point, in the function's frame; return whether it arrives."""
+    if timer.messages_before_loss == 0.0:
+        return False
+    timer.messages_before_loss -= 1.0
     vehicle.set_point_x_m = x_m + timer.frame_x_m
     vehicle.set_point_y_m = y_m + timer.frame_y_m
     vehicle.set_point_z_m = z_m + timer.frame_z_m + timer.altitude_error_m
     vehicle.set_point_number += 1
+    return True
 
 
 @dataclass(eq=False)
@@ -90,9 +94,7 @@ class WaypointFunction(FunctionNode):
         timer, now_s = self.timer, self.env.now
         timer.is_active, timer.is_due, timer.tick = True, not resumes, 0
         timer.start_s = now_s + (t_s - now_s) if t_s > now_s else now_s
-        flight = self.flight
-        flight.state.next_tick_s = min(flight.state.next_tick_s, timer.start_s)
-        flight.fly_to(now_s)  # a tick that is due now comes at once
+        self.flight.fly_to(now_s)  # a tick that is due now comes at once
 
     def stop(self) -> None:
         """Stop ticking; a tick at this very time came before."""

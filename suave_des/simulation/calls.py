@@ -57,7 +57,7 @@ class CallTimes:
             self._sleeps = False
             self._alarm.set(summed_tick(self._env.now, self._next_s, self.period_s))
 
-    def go_on(self, *, changed: bool, may_sleep: bool) -> None:
+    def go_on(self, changed: bool, may_sleep: bool) -> None:
         """Plan the next call when one is over.
 
         Args:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 from suave_des.domain import Task
@@ -120,21 +121,22 @@ class ManagerHost:
 
     def _adapt(self) -> None:
         """Call `adapt`, at one of its times."""
-        times, modes, began_s = self._times, self.system.modes, self.system.env.now
+        times, modes = self._times, self.system.modes
         assert times is not None  # it is they that call
         requests = modes.requests
         adaptation = self._guarded(self.manager.adapt)
-
-        def over(result: object) -> None:
-            in_time = self.system.env.now - began_s < times.period_s  # no call was due meanwhile
-            times.go_on(changed=True, may_sleep=in_time and result is True)
-
         if adaptation is None:
-            times.go_on(changed=modes.requests > requests, may_sleep=True)
+            times.go_on(modes.requests > requests, True)
         elif isinstance(adaptation, Generator):
+            over = partial(self._adapted, times, self.system.env.now)
             Adaptation(self.system.env, adaptation, over, self.error_of).resume()
         else:
             raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
+
+    def _adapted(self, times: CallTimes, began_s: float, result: object) -> None:
+        """Go on after a call of `adapt` that has taken mission time."""
+        in_time = self.system.env.now - began_s < times.period_s  # no call was due meanwhile
+        times.go_on(True, in_time and result is True)
 
     def _guarded(self, hook: Callable[..., _T], *arguments: Any) -> _T:
         try:

@@ -127,13 +127,13 @@ class Mission:
             MissionError: the manager raised.
         """
         self._check_open()
-        until_s = inf if until is None else float(until)
-        if isnan(until_s) or until_s < self.env.now:
+        until_s, now_s = inf if until is None else float(until), self.env.now
+        if isnan(until_s) or until_s < now_s:
             problem = f"the mission cannot go to {until_s:g} s: it is at {self.now_s:g} s"
             raise InputError(problem, remedy="give a later mission time")
         if until_s == inf:
             self.result()
-        elif until_s > self.env.now and not self.is_over:
+        elif until_s > now_s and not self.is_over:
             self._guarded(self.env.advance, until_s)
 
     def change_mode(self, function: str, mode: str) -> None:
@@ -330,5 +330,5 @@ class Mission:
         except MissionTimeOut as error:
             error.time_s = self.now_s
             raise
-        except RAISED as error:  # in a user-defined function, or in a process that the manager started by itself
+        except RAISED as error:  # in a user's function, or in a process that the manager started
             raise self._surroundings.error_of(error) from error

@@ -154,7 +154,7 @@ def fly_to(self: Flight, t_s: float) -> None:
 def begin(self: Flight, detector: Any, search: GenerateSearchPath, follow: FollowPipeline) -> None:
     """Look from each row."""
     self._detector, self._search, self._follow = detector, search, follow
-    env, (*_, points, (times_s, visibility_m)) = search.env, self._arrays
+    env, (*_, points, (times_s, visibility_m)) = search.env, self._fly.args
     rows, values = [row_at(t_s) for t_s in times_s.tolist()], visibility_m.tolist()
 
     def look(row: int) -> None:

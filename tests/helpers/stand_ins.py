@@ -46,7 +46,6 @@ class PlacedVehicle:
         self.vehicle._fly_to_control = lambda t_s: None  # and can be commanded all the same
         camera, points, visibility = NOTHING_TO_SEE
         self.flight = Flight(self.vehicle, camera, points, visibility, path)
-        self.flight.state.next_tick_s = float("inf")
         self.env.fly_to = self.flight.fly_to
         self.obeys, self.rise_m = obeys, rise_m
         self.commands: list[tuple[float, Place]] = []
