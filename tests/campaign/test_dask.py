@@ -231,7 +231,7 @@ def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(sm
     causes = {
         "DiesInSome": "the cluster's worker died while running it, 1 times (killed, out of memory, or stuck?)",
         "HangsInSome": "not done after 3 s (time-out), in adapt (awkward_managers.py",
-        "RaisesInHalf": "ValueError: I do not know what to do (awkward_managers.py, line 32)",
+        "RaisesInHalf": "ValueError: I do not know what to do (awkward_managers.py, line 34)",
     }
     managers = [f"{AWKWARD}:{name}" for name in causes]
     result = run_campaign(
