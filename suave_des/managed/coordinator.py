@@ -94,7 +94,7 @@ class MissionCoordinator:
         self._tasks = self.env.process(self._carry_out_tasks())
 
     def close(self) -> None:
-        """Let go of those who are told of tasks: there is none any more."""
+        """Tell nobody of tasks any more."""
         abandon(self._tasks)
         del self._request, self._cancel, self._tasks
 

@@ -121,7 +121,7 @@ class Flight:
     """Flies the vehicle of one mission, as its functions guide it.
 
     Attributes:
-        vehicle: that is flown.
+        vehicle: the vehicle that is flown.
         detector: is told of the first sight.
         path: that is followed, see `there_and_back`.
         state: the functions' numbers, and those of the camera.

@@ -18,8 +18,8 @@ from suave_des.scenario.models import RecoveryRevision
 
 @dataclass(eq=False)
 class MaintainMotion(ProcessNode):
-    """The motion function: recovers the thrusters one by one after a delay, and reports each that
-    can be recovered.
+    """The motion function: recovers the thrusters one by one after a delay, and reports each as
+    recovered that can be, healthy ones too.
 
     Attributes:
         delay_s: draws the time from the activation to the recovery of the first thruster.

@@ -25,8 +25,8 @@ class Thrusters:
     Attributes:
         revision: says how they fail, and from when on.
         unrecoverable: thrusters that f_maintain_motion cannot recover at present.
-        working: mission times at which thrusters failed or recovered, and how many worked from then
-            on.
+        working: mission times at which a thruster's state was set, also to what it was, and how many
+            worked from then on.
     """
 
     env: simpy.Environment

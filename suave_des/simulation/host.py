@@ -110,7 +110,7 @@ class ManagerHost:
             self._times.wake()
 
     def close(self) -> None:
-        """Let go of the manager's calls: there is none any more."""
+        """Call the manager no more."""
         self.system.state_changed = _nothing
         if self._times is not None:
             self._times.close()
@@ -122,7 +122,7 @@ class ManagerHost:
     def _adapt(self) -> None:
         """Call `adapt`, at one of its times."""
         times, modes = self._times, self.system.modes
-        assert times is not None  # it is they that call
+        assert times is not None  # only times cause calls
         requests = modes.requests
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:

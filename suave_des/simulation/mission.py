@@ -70,7 +70,7 @@ class Mission:
         bus: the diagnostics.
         mode_manager: takes requests for modes.
         manager: the managing subsystem.
-        components: the last reported statuses of components, FALSE or RECOVERED.
+        components: the last reported status of each component: FALSE or RECOVERED, or LEAK of the hull.
 
     Raises:
         InputError: something given cannot be used.
