@@ -9,7 +9,7 @@ import platform
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from enum import Enum
+from enum import Enum, EnumType
 from hashlib import sha256
 from importlib.metadata import version
 from inspect import CO_VARARGS, CO_VARKEYWORDS, isfunction, ismodule
@@ -220,6 +220,8 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[Any]) -> Iterator[
             yield from _ingredients(each, names, seen)
     elif isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape} {value.strides} {value.tobytes().hex()}"
+    elif isinstance(value, EnumType):
+        yield f"{value.__name__} {[(each.name, each.value) for each in value]!r}"
     elif value is None or isinstance(value, bool | int | float | complex | str | np.generic | Enum):
         yield f"{type(value).__name__} {value!r}"
     else:

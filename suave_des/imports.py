@@ -101,6 +101,8 @@ def find_here(name: str) -> ModuleSpec | None:
     Raises:
         ValueError: it is loaded, and not from a file.
     """
+    if not name:
+        raise ValueError("empty module name")
     if name in sys.modules or find_spec(name) is not None:
         return find_spec(name)
     here = str(Path.cwd())

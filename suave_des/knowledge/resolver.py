@@ -178,7 +178,7 @@ def _add_mros_if_used(files: list[OntologyFile], supplies: list[Supply]) -> None
     Until mros.owl was shipped, its terms stood in the shipped tomasys.owl.
     """
     is_described = any(subject.startswith(MROS) for file in files for subject, _, _ in file.triples)
-    if is_described:
+    if is_described or any(has_iri(file, MROS) for file in files):
         return
     for file in files:
         terms = (term for triple in file.triples for term in triple[1:])

@@ -11,14 +11,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
-from suave_des.compiling import Record, compiled, record
+from suave_des.compiling import Array, Record, compiled, record
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.vehicle.kernel import VehicleRecord
-
-if TYPE_CHECKING:
-    from suave_des.managed.flight import Flight
 
 
 class Does(IntEnum):
@@ -67,6 +64,21 @@ def send(timer: Timer, vehicle: VehicleRecord, x_m: float, y_m: float, z_m: floa
     return True
 
 
+class FliesFunctions(Protocol):
+    """The flight as functions know it; see `flight`, which knows them.
+
+    Attributes:
+        path: x and y of the points to follow, and the distance from the previous one to each.
+        state: the records of the functions, and `next_tick_s` of all of them.
+    """
+
+    path: Array
+    state: Any
+
+    def fly_to(self, t_s: float) -> None:
+        """Fly to mission time t."""
+
+
 @dataclass(eq=False)
 class WaypointFunction(FunctionNode):
     """Base of functions that generate way-points, each sent when the one before is reached.
@@ -77,7 +89,7 @@ class WaypointFunction(FunctionNode):
     """
 
     sender: SetPointSender
-    flight: Flight
+    flight: FliesFunctions
 
     def connect(self, timer: Timer, period_s: float) -> None:
         """Set up the timer."""

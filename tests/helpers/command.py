@@ -67,6 +67,7 @@ def command_here(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]
     at the end.
     """
     path, out, err = list(sys.path), io.StringIO(), io.StringIO()
+    finders = list(sys.meta_path)
     with contextlib.chdir(cwd), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             main(arguments)
@@ -74,6 +75,7 @@ def command_here(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]
             status = int(end.code or 0)
         finally:
             sys.path[:] = path
+            sys.meta_path[:] = finders
             for name, module in list(sys.modules.items()):
                 if str(getattr(module, "__file__", None) or "").startswith(str(cwd)):
                     del sys.modules[name]

@@ -2,12 +2,14 @@
 file as it was.
 """
 
+import json
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
 
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-from suave_des.metrics.result import KnowledgeRecord
+from suave_des.metrics.result import KnowledgeRecord, MissionMetrics
 from suave_des.records.mission_folder import KNOWLEDGE_FILE, knowledge_text
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
@@ -64,7 +66,10 @@ def folder(tmp_path, monkeypatch):
     state = KnowledgeState.of([ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_low"})
     (tmp_path / "flown" / KNOWLEDGE_FILE).write_text(knowledge_text([KnowledgeRecord(1.0, state)]))
     scenario = load_scenario("seams2023").scenario.model_dump_json()
-    (tmp_path / "flown" / "mission.json").write_text(f'{{"scenario": {scenario}}}')
+    values = {str: "x", bool: True}
+    metrics = {name: values.get(kind, 1) for name, kind in get_type_hints(MissionMetrics).items()}
+    mission = f'{{"scenario": {scenario}, "metrics": {json.dumps(metrics)}}}'
+    (tmp_path / "flown" / "mission.json").write_text(mission)
     return tmp_path
 
 
@@ -90,7 +95,7 @@ def refused(command, name, arguments, said):
         ),
         (
             ("infer", "--at", "c_thruster_1=false"),
-            "no rule mentions the c_status 'false' (did you mean 'FALSE'?",
+            "no rule mentions the c_status 'false', and nothing reports it (known: FALSE, ",
         ),
         (
             ("infer", "--at", "f_maintain_motion=ungrounded"),

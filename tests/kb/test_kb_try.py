@@ -154,7 +154,7 @@ def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(
     [
         ("", "line 1: is damaged"),
         ("{}\n{", "line 1: is damaged"),
-        ('{"scenario": 1}\n{"swept": {}}', "line 2: is damaged"),
+        ('{"scenario": 1}\n{"swept": {}}', "line 1: is damaged"),
     ],
 )
 def test_a_damaged_record_of_a_campaign_is_reported(tmp_path, command, line, said):

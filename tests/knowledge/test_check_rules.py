@@ -177,7 +177,7 @@ def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path):
         found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in"
     )
     assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
-    assert finding.message.endswith("tomasys.owl")
+    assert finding.message.endswith("mros.owl")
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
     findings = found(tmp_path, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
     assert not [one for one in findings if "replaces the rule of this name" in one.message]

@@ -823,7 +823,10 @@ class TestCommand:
                 ["mission.yaml", "--out", "mission.yaml", "--overwrite"],
                 "one of the other files, too",
             ),
-            (["mission.yaml", "--out", "nowhere/mine.yaml"], "no folder nowhere"),
+            (
+                ["mission.yaml", "--out", "nowhere/mine.yaml"],
+                "nowhere/mine.yaml: there is no folder",
+            ),
             (["mission.yaml", "--out", "."], "is a folder"),
             (
                 ["runner.yaml", "--out", "mine.yaml", "--campaign", "mine.yaml"],

@@ -315,4 +315,4 @@ def test_an_entry_that_a_list_does_not_have_is_refused(entry):
 def test_a_value_that_is_replaced_by_a_wrong_one_is_told_by_its_key():
     with pytest.raises(InputError) as caught:
         with_values(load_scenario("seams2023"), {"mission.time_limit_s": -1.0})
-    assert caught.value.place == "line 1, mission.time_limit_s"
+    assert caught.value.place == "mission.time_limit_s"
