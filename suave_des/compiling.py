@@ -221,7 +221,8 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[Any]) -> Iterator[
     elif isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape} {value.strides} {value.tobytes().hex()}"
     elif isinstance(value, EnumType):
-        yield f"{value.__name__} {[(each.name, each.value) for each in value]!r}"
+        members: list[Enum] = list(value)
+        yield f"{value.__name__} {[(each.name, each.value) for each in members]!r}"
     elif value is None or isinstance(value, bool | int | float | complex | str | np.generic | Enum):
         yield f"{type(value).__name__} {value!r}"
     else:
