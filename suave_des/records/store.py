@@ -9,6 +9,7 @@ and it comes with Python. In addition, each outcome carries a checksum.
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import time
 import zlib
@@ -296,7 +297,7 @@ class Store:
                 yield from checked(cursor)
                 return
             assert self.path is not None
-            with closing(_connected(self.path, is_read=True)) as db:
+            with closing(_connected(self.path, "ro")) as db:
                 yield from checked(db.execute(_ALL))
 
     def close(self, *, keep_empty: bool = True) -> None:
@@ -362,7 +363,7 @@ def has_campaign(folder: Path) -> bool:
     if not path.is_file():
         return False
     try:
-        with closing(_connected(path, is_read=True)) as db:
+        with closing(_connected(path, "ro")) as db:
             return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
     except (SuaveDesError, sqlite3.Error):
         return True
@@ -375,7 +376,7 @@ def read_note(path: Path, name: str) -> Any:
         InputError: the store is not a campaign's, or damaged.
         StoreError: it cannot be read now.
     """
-    with store_read(path), closing(_connected(path, is_read=True)) as db:
+    with store_read(path), closing(_connected(path, "immutable")) as db:
         _check_schema(db, path)
         return _about(db, path, name, None)
 
@@ -394,11 +395,12 @@ def _own(path: Path) -> list[Path]:
     return [path.with_name(f"{path.name}{ending}") for ending in _ENDINGS]
 
 
-def _connected(path: Path | None, *, is_read: bool = False) -> sqlite3.Connection:
+def _connected(path: Path | None, mode: str = "rwc") -> sqlite3.Connection:
     """Open a database that may come from elsewhere; None: a temporary one.
 
-    One that is read only is not changed, nor are the files beside it: what is in these counts only
-    where there are any.
+    Args:
+        mode: rwc, ro, or "immutable", with which nothing beside it is touched, nor are locks heeded;
+            where there are journals, which have a part of what is kept, it is as ro.
 
     Raises:
         InputError: one of its files is a link, or would have SQLite remove some other file.
@@ -406,18 +408,28 @@ def _connected(path: Path | None, *, is_read: bool = False) -> sqlite3.Connectio
     name = ""
     if path is not None:
         check_own(own := _own(path))
-        journals = [each for each in own[1:] if each.exists() and each.stat().st_size]
-        if any(each.read_bytes().endswith(_NAMES_ANOTHER) for each in journals):
+        end = _end(own[-1])
+        if end == _NAMES_ANOTHER:
             raise _damaged(path, "its journal names another file, which would be removed")
-        if is_read and own[-1] in journals:  # a campaign was killed as it began or ended
+        if mode != "rwc" and end and _end(path):  # a campaign was killed as it began or ended
             with closing(_connected(path)) as db:
                 db.execute("SELECT 1 FROM sqlite_master").fetchone()
-        mode = "mode=ro" if journals else "mode=ro&immutable=1"
-        name = f"{path.absolute().as_uri()}?{mode if is_read else 'mode=rwc'}"
+        journals = any(each.exists() for each in own[1:])
+        query = "mode=ro&immutable=1" if mode == "immutable" and not journals else "mode=ro"
+        query = "mode=rwc" if mode == "rwc" else query
+        name = f"{path.absolute().as_uri()}?{query}"
     db = sqlite3.connect(name, timeout=0.0, isolation_level=None, uri=True)
     db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST_BYTES)
     db.execute("PRAGMA trusted_schema = OFF")
     return db
+
+
+def _end(path: Path) -> bytes:
+    """Return the last bytes of a file; none if it is empty, or not there."""
+    with suppress(OSError), path.open("rb") as file:
+        file.seek(-min(len(_NAMES_ANOTHER), file.seek(0, os.SEEK_END)), os.SEEK_END)
+        return file.read()
+    return b""
 
 
 def _check_schema(db: sqlite3.Connection, path: Path | None) -> None:
