@@ -118,7 +118,7 @@ from numba.core.dispatcher import Dispatcher
 suave_des.run_mission("seams2023", "random")
 own = [each for each in gc.get_objects() if isinstance(each, Dispatcher) and each.overloads]
 own = [each for each in own if each.py_func.__module__.startswith("suave_des.")]
-print(len(own) > 3, [each.py_func.__name__ for each in own if each.stats.cache_misses])
+print(bool(own), [each.py_func.__name__ for each in own if each.stats.cache_misses])
 """
 
 
