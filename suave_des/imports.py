@@ -103,9 +103,14 @@ def find_here(name: str) -> ModuleSpec | None:
     """
     if not name:
         raise ValueError("empty module name")
-    if name in sys.modules or find_spec(name) is not None:
+    if name in sys.modules:
         return find_spec(name)
     here = str(Path.cwd())
+    for folder, finder in _finders.items():
+        if folder != here:  # one of this name that was imported from there, and is no longer loaded
+            finder.names.discard(name)
+    if (installed := find_spec(name)) is not None:
+        return installed
     finder = _finders.setdefault(here, _Beside(here))
     if finder not in sys.meta_path:
         sys.meta_path.append(finder)

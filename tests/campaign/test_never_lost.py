@@ -16,7 +16,7 @@ from suave_des.records import store as stores
 from suave_des.records.store import STORE_FILE, Outcome, Store, StoreError, has_campaign
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD
-from tests.helpers.command import python, wait_until
+from tests.helpers.command import has_size, python, wait_until
 
 MANAGERS = ["none", "random"]
 
@@ -188,7 +188,7 @@ class TestRefusals:
             [str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path
         )
         try:
-            wait_until(lambda: has_campaign(tmp_path / "out"))
+            wait_until(lambda: has_size(tmp_path / "out" / STORE_FILE, 10_000))  # it has begun
             taken = "another campaign is running in the output folder"
             with pytest.raises(InputError, match=taken):
                 resume_campaign(tmp_path / "out")
