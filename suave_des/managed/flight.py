@@ -123,14 +123,13 @@ class Flight:
     Attributes:
         vehicle: the vehicle that is flown.
         detector: is told of the first sight.
-        path: that is followed, see `there_and_back`.
         state: the functions' numbers, and those of the camera.
     """
 
     def __init__(
         self, vehicle: Vehicle, camera: Camera, points: Array, visibility: Array, path: Array
     ) -> None:
-        self.vehicle, self.path = vehicle, path
+        self.vehicle = vehicle
         records = _OneRecord()
         self.state: FlightRecord = records[0]
         self.state.camera = camera

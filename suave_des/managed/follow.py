@@ -95,20 +95,23 @@ def send_point(follow: Follow, vehicle: VehicleRecord, path: Array) -> bool:
 
 @dataclass(eq=False)
 class FollowPipeline(WaypointFunction):
-    """The follow function: its way-points are the points of the flight's path, each sent when the
-    previous one is reached.
+    """The follow function: its way-points are the points of a path, each sent when the previous one
+    is reached.
 
     Attributes:
+        state: its numbers, which the flight changes at each poll.
+        path: see `there_and_back`.
         detector: says from which of its points on the path is to be followed.
         finished: triggered when the last point of the path is reached.
     """
 
+    state: Follow
     revision: FollowRevision
+    path: Array
     detector: PipelineDetector
 
     def __post_init__(self) -> None:
         self.finished: simpy.Event = self.env.event()
-        self.state: Follow = self.flight.state.follow
         state, revision = self.state, self.revision
         self.connect(state.timer, revision.poll_period_s)
         state.z_m = SEA_BED_Z_M + revision.altitude_m
@@ -149,7 +152,7 @@ class FollowPipeline(WaypointFunction):
         state = self.state
         if self.revision.counts_interrupted_piece and state.has_arrived:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-            last_m = self.flight.path[state.next_point - 1, :2].tolist()
+            last_m = self.path[state.next_point - 1, :2].tolist()
             state.travelled_m += math.dist(last_m, (x_m, y_m))
             state.published_m = state.travelled_m
 

@@ -96,12 +96,14 @@ class GenerateSearchPath(WaypointFunction):
     reached.
 
     Attributes:
+        state: its numbers, which the flight changes at each tick.
         centre_m: x and y of the spiral's centre; in revision 2023 the local frame's origin.
         view_tangent: tangent of half the camera's field of view.
         phase_s: mission time of a tick of the node's timer.
         start_latency_s: from the first activation to the first tick.
     """
 
+    state: Search
     revision: SpiralRevision
     centre_m: tuple[float, float]
     view_tangent: float
@@ -111,7 +113,6 @@ class GenerateSearchPath(WaypointFunction):
     _ready_s: float | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        self.state: Search = self.flight.state.search
         state, revision = self.state, self.revision
         self.connect(state.timer, revision.tick_period_s)
         state.altitude_m = revision.initial_altitude_m

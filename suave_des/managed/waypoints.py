@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Protocol
 
-from suave_des.compiling import Array, Record, compiled, record
+from suave_des.clock import MissionEnvironment
+from suave_des.compiling import Record, compiled, record
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.vehicle.kernel import VehicleRecord
 
@@ -64,32 +64,17 @@ def send(timer: Timer, vehicle: VehicleRecord, x_m: float, y_m: float, z_m: floa
     return True
 
 
-class FliesFunctions(Protocol):
-    """The flight as functions know it; see `flight`, which knows them.
-
-    Attributes:
-        path: x and y of the points to follow, and the distance from the previous one to each.
-        state: the records of the functions, and `next_tick_s` of all of them.
-    """
-
-    path: Array
-    state: Any
-
-    def fly_to(self, t_s: float) -> None:
-        """Fly to mission time t."""
-
-
 @dataclass(eq=False)
 class WaypointFunction(FunctionNode):
     """Base of functions that generate way-points, each sent when the one before is reached.
 
     Attributes:
+        env: the clock, which has the vehicle flown, with the function's ticks.
         sender: the connection to the autopilot; `timer` has a copy for the flight.
-        flight: flies the vehicle, with the ticks.
     """
 
+    env: MissionEnvironment
     sender: SetPointSender
-    flight: FliesFunctions
 
     def connect(self, timer: Timer, period_s: float) -> None:
         """Set up the timer."""
@@ -106,7 +91,7 @@ class WaypointFunction(FunctionNode):
         timer, now_s = self.timer, self.env.now
         timer.is_active, timer.is_due, timer.tick = True, not resumes, 0
         timer.start_s = now_s + (t_s - now_s) if t_s > now_s else now_s
-        self.flight.fly_to(now_s)  # a tick that is due now comes at once
+        self.env.fly_to(now_s)  # a tick that is due now comes at once
 
     def stop(self) -> None:
         """Stop ticking; a tick at this very time came before."""

@@ -191,7 +191,7 @@ def _make_managed(order: Order, around: Surroundings) -> Managed:
     search = GenerateSearchPath(
         env,
         make_sender(domain.GENERATE_SEARCH_PATH),
-        flight,
+        flight.state.search,
         revision.spiral,
         around.origin_m,
         prepared.view_tangent,
@@ -199,7 +199,8 @@ def _make_managed(order: Order, around: Surroundings) -> Managed:
         draws.value("latencies.search_start_s"),
     )
     sender = make_sender(domain.FOLLOW_PIPELINE)
-    follow = FollowPipeline(env, sender, flight, revision.follow, detector)
+    state, path = flight.state.follow, prepared.path
+    follow = FollowPipeline(env, sender, state, revision.follow, path, detector)
     flight.begin(detector, search, follow)
     nodes: dict[str, FunctionNode] = {
         domain.MAINTAIN_MOTION: MaintainMotion(

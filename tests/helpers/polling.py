@@ -111,7 +111,7 @@ def next_on_the_spiral(self: GenerateSearchPath) -> None:
 
 def follow_poll(self: FollowPipeline) -> None:
     """Poll as the exemplar's node does: all points that are reached by now."""
-    state, node, path = self.state, self.revision, self.flight.path.tolist()
+    state, node, path = self.state, self.revision, self.path.tolist()
     polls = node.polls_before_resending
     first, again = (polls + 1, 1) if node.resends_at_each_poll else (polls, polls)
 

@@ -28,7 +28,8 @@ class Following:
         self.vehicle = PlacedVehicle(place, path=path, **vehicle)
         self.env = self.vehicle.env
         detector = SimpleNamespace(first_point=None if line is None else 0)
-        arguments = self.vehicle.sender, self.vehicle.flight, revision(name).follow, detector
+        state = self.vehicle.flight.state.follow
+        arguments = self.vehicle.sender, state, revision(name).follow, path, detector
         self.node = FollowPipeline(self.env, *arguments)
         self.vehicle.flight.begin(detector, None, self.node)
 

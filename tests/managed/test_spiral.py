@@ -28,7 +28,7 @@ class Search:
         self.node = GenerateSearchPath(
             self.env,
             vehicle.sender,
-            vehicle.flight,
+            vehicle.flight.state.search,
             revision(name).spiral,
             ORIGIN,
             VIEW_TANGENT,
