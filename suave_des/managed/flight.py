@@ -82,10 +82,7 @@ def fly(
             if camera.is_open:
                 vehicles[1] = vehicle
             advance(vehicles, track, row)
-        if camera.is_open and first_detection(
-            camera, track, vehicle.row, STEP_S, visibility, points
-        ):
-            camera.is_open = False
+        if first_detection(camera, track, vehicle.row, STEP_S, visibility, points):
             if camera.next_row < vehicle.row:  # control may change at the first sight
                 vehicles[0] = vehicles[1]
             return Ends.SIGHT.value

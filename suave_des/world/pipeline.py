@@ -77,7 +77,7 @@ def first_detection(
     is seen.
 
     Args:
-        camera: `next_row` becomes the row from which the point is seen, or that after the last.
+        camera: closed once a point is seen; `next_row` becomes the row from which the point is seen, or that after the last.
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
         row_s: time between rows.
         visibility: measured water visibility: the times, s, ascending, of the values, m, shape
@@ -87,6 +87,8 @@ def first_detection(
     Returns:
         Whether a point is seen.
     """
+    if not camera.is_open:
+        return False
     low_z, high_z, tangent = camera.low_z_m, camera.high_z_m, camera.tangent
     for row in range(camera.next_row, last + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
@@ -106,7 +108,7 @@ def first_detection(
             visibility_m = visibility[1, camera.measured - 1]
             camera.point = first_point_in_view(x, y, z, visibility_m, points, tangent)
             if camera.point >= 0:
-                camera.next_row = row
+                camera.next_row, camera.is_open = row, False
                 return True
     camera.next_row = last + 1
     return False
