@@ -13,7 +13,7 @@ from suave_des.compiling import Array, Record, Records, compiled, record
 
 # Columns of the track: the pose at each row; the world frame has x east, y north, z up.
 POSITION = slice(0, 3)  # p, world frame, m
-ATTITUDE = slice(3, 7)  # unit quaternion (w, x, y, z), body to world
+
 COLUMNS = 7
 
 ARRIVED_M = 2.0

@@ -9,6 +9,7 @@ exemplar, z up, and so do the signs).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import asin, atan2, cos, sin, sqrt
@@ -46,11 +47,9 @@ def quaternion(
     return w, x, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
 
 
-def euler_angles(attitude: Array) -> tuple[float, float, float]:
-    """Convert a unit quaternion (w, x, y, z), shape (4,), to roll, pitch and yaw in rad (Handbook,
-    2.2.3).
-    """
-    w, x, y, z = attitude.tolist()
+def euler_angles(attitude: Sequence[float]) -> tuple[float, float, float]:
+    """Convert a unit quaternion (w, x, y, z) to roll, pitch and yaw in rad (Handbook, 2.2.3)."""
+    w, x, y, z = attitude
     roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
     yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -140,13 +140,19 @@ class Vehicle:
 
     def position(self, t_s: float) -> Point:
         """Read the position at time t: x, y, z in m."""
-        row = row_at(t_s)
-        self.fly_to_row(row)
-        return self.track.item(row, 0), self.track.item(row, 1), self.track.item(row, 2)
+        x_m, y_m, z_m, *_ = self._flown_row(t_s)
+        return x_m, y_m, z_m
 
     def pose(self, t_s: float) -> Pose:
         """Read the pose eta at time t."""
-        return Pose(*self.position(t_s), *euler_angles(self.track[row_at(t_s), kernel.ATTITUDE]))
+        x_m, y_m, z_m, *attitude = self._flown_row(t_s)
+        return Pose(x_m, y_m, z_m, *euler_angles(attitude))
+
+    def _flown_row(self, t_s: float) -> list[float]:
+        row = row_at(t_s)
+        self.fly_to_row(row)
+        pose: list[float] = self.track[row].tolist()
+        return pose
 
     def fly_to_row(self, row: int) -> None:
         """Fly up to a row of the track under the present control, unless it is already flown.
