@@ -79,10 +79,15 @@ class ReactionMeter:
         return [(crossings_s[n], _OpenEvents.expect, fitting_m[regions[n]]) for n in range(passed)]
 
     def _low_battery(self) -> Iterator[_Entry]:
+        """The messages of a low battery, and each after these that says that it is not."""
         if self.battery is not None:
-            for message in range(self.battery.count_until(self.env.now)):
-                low = self.battery.values[message] < self.settings.battery_limit
-                yield self.battery.times_s[message], _OpenEvents.battery, low
+            was_low = False
+            count = self.battery.count_until(self.env.now)
+            for t_s, level in zip(self.battery.times_s[:count], self.battery.values, strict=False):
+                low = level < self.settings.battery_limit
+                if low or was_low:
+                    yield t_s, _OpenEvents.battery, low
+                was_low = low
 
 
 class _OpenEvents:

@@ -1132,7 +1132,12 @@ class Requirement(Strict):
     def satisfaction(self, value: float) -> float:
         """Compute the degree to which a value satisfies the requirement, from 0 to 1."""
         off = value - self.value
-        gap = {"at_least": -off, "at_most": off, "close_to": abs(off)}[self.relation]
+        if self.relation == "at_least":
+            gap = -off
+        elif self.relation == "at_most":
+            gap = off
+        else:
+            gap = abs(off)
         if gap <= 0.0:
             return 1.0
         if self.tolerance == 0.0:
