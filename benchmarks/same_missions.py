@@ -34,7 +34,8 @@ def scenarios() -> Iterator[str]:
 def everything(result: MissionResult) -> str:
     """Write all of a mission's result, with each float as its shortest exact text."""
     parts = result.metrics, result.further, result.drawn, result.remarks
-    return "\n".join(map(repr, (*parts, result.events, result.trajectory, result.knowledge)))
+    recorded = result.events, tuple(result.trajectory), result.knowledge
+    return "\n".join(map(repr, (*parts, *recorded)))
 
 
 def digest(simulator: Simulator, manager: str, missions: int, *, record: bool) -> str:

@@ -34,7 +34,7 @@ _cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Re
 """What follows and is planned, by symbolic state: missions of one scenario go through the same few
 states.
 """
-_MAX_CACHED: Final = 16384
+_MAX_CACHED: Final = 4096
 
 
 class Metacontrol(ManagingSubsystem):

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar, overload
 
 import simpy
 
+from suave_des.compiling import Array
 from suave_des.domain import BATTERY_LEVEL, MOVING_FUNCTIONS, WATER_VISIBILITY
 from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.monitor.diagnostics import HULL, Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import ReactionMetric
 from suave_des.scenario.modes import Mode
+from suave_des.vehicle.model import euler_angles
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
 
 TRAJECTORY_PERIOD_ROWS = 4
+_T = TypeVar("_T")
 
 
 @dataclass(eq=False)
@@ -88,19 +92,88 @@ class Recorder:
 
     def trajectory(
         self, vehicle: Vehicle, visibility: Measurements, battery: Measurements | None
-    ) -> tuple[TrajectoryPoint, ...]:
-        """The vehicle's path so far: at each point the mode in force, the visibility, and the
-        battery's level.
+    ) -> Sequence[TrajectoryPoint]:
+        """Return the vehicle's path so far: at each point the mode in force, the visibility, and
+        the battery's level.
         """
         if not self.enabled:
             return ()
-        points = []
-        mode_times = [t_s for t_s, _ in self._modes]
-        for row in range(0, int(self.env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
-            t_s = round(row * STEP_S, 6)
-            mode = self._modes[bisect_right(mode_times, t_s) - 1][1]
-            further = {} if battery is None else {battery.key: battery.value(t_s)}
-            points.append(
-                TrajectoryPoint(t_s, *vehicle.pose(t_s), mode, visibility.value(t_s), further)
-            )
-        return tuple(points)
+        vehicle.position(self.env.now)  # fills the track until now
+        rows = int(self.env.now / STEP_S) + 1
+        return Trajectory(
+            poses=vehicle.track[:rows:TRAJECTORY_PERIOD_ROWS].copy(),
+            modes=_Series(*zip(*self._modes, strict=True)),
+            visibility=_published(visibility),
+            further={} if battery is None else {battery.key: _published(battery)},
+        )
+
+
+@dataclass(frozen=True)
+class _Series(Generic[_T]):
+    """Values, and the mission times from which each of them holds, ascending."""
+
+    times_s: tuple[float, ...]
+    values: tuple[_T, ...]
+
+    def at(self, t_s: float) -> _T | None:
+        """Return the value that holds at mission time t; None if there is none yet."""
+        count = bisect_right(self.times_s, t_s)
+        return self.values[count - 1] if count else None
+
+
+def _published(measured: Measurements) -> _Series[float]:
+    return _Series(tuple(measured.times_s), tuple(measured.values))
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory(Sequence[TrajectoryPoint]):
+    """The points of a mission's trajectory, made as they are read: of a day's mission they would
+    take 200 MB.
+
+    Attributes:
+        poses: position and attitude at each point, as in the vehicle's track.
+        modes: the modes that moved the vehicle, by their names; empty before the first.
+        further: what was measured besides the visibility, by its column.
+    """
+
+    poses: Array
+    modes: _Series[str]
+    visibility: _Series[float]
+    further: Mapping[str, _Series[float]]
+
+    def __len__(self) -> int:
+        """Count the points."""
+        return len(self.poses)
+
+    @overload
+    def __getitem__(self, index: int) -> TrajectoryPoint: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[TrajectoryPoint, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> TrajectoryPoint | tuple[TrajectoryPoint, ...]:
+        """Make a point, or those of a slice."""
+        numbers = range(len(self))[index]
+        if isinstance(numbers, range):
+            return tuple(map(self._point, numbers))
+        return self._point(numbers)
+
+    def __eq__(self, other: object) -> bool:
+        """Compare the points."""
+        return isinstance(other, Trajectory) and tuple(self) == tuple(other)
+
+    __hash__ = None  # type: ignore[assignment]  # as of other containers that compare
+
+    def _point(self, number: int) -> TrajectoryPoint:
+        t_s = round(number * TRAJECTORY_PERIOD_ROWS * STEP_S, 6)
+        x_m, y_m, z_m, *attitude = self.poses[number].tolist()
+        return TrajectoryPoint(
+            t_s,
+            x_m,
+            y_m,
+            z_m,
+            *euler_angles(attitude),
+            mode=self.modes.at(t_s) or "",
+            visibility_m=self.visibility.at(t_s),
+            further={name: each.at(t_s) for name, each in self.further.items()},
+        )

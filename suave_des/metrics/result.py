@@ -97,7 +97,7 @@ class MissionResult:
 
     metrics: MissionMetrics
     events: tuple[Event, ...] = ()
-    trajectory: tuple[TrajectoryPoint, ...] = ()
+    trajectory: Sequence[TrajectoryPoint] = ()
     knowledge: tuple[KnowledgeRecord, ...] = ()
     drawn: dict[str, float] = field(default_factory=dict)
     """Values drawn for the scenario's distributions in this run, by key path."""
