@@ -35,17 +35,22 @@ def marks(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.glob("ran-*"))
 
 
-@pytest.mark.parametrize("safe", [["-P"], []], ids=["command", "python -m"])
-def test_nothing_of_it_is_run_where_nobody_names_it(folder, safe):
-    for command in (
-        ["campaign", "seams2023", "--managers", "none", "--runs", "1", "--out", "out", "--quiet"],
-        ["run", "seams2023", "--manager", "metacontrol"],
-        ["replay", "out"],
-        ["compare", "out"],
-    ):
-        done = python(*safe, "-m", "suave_des", *command, cwd=folder)
-        assert (done.returncode, done.stderr) == (0, ""), command
-    assert marks(folder) == []
+OF_NONE = "campaign seams2023 --managers none --runs 1 --out out --quiet"
+
+
+def assert_runs_nothing_of(folder: Path, *command: str) -> None:
+    done = python(*command, cwd=folder)
+    assert (done.returncode, done.stderr, marks(folder)) == (0, "", [])
+
+
+def test_nothing_of_it_is_run_where_nobody_names_it(folder):
+    commands = OF_NONE, "run seams2023 --manager metacontrol", "replay out", "compare out"
+    for command in commands:
+        assert_runs_nothing_of(folder, "-P", "-m", "suave_des", *command.split())
+
+
+def test_nothing_of_it_is_run_by_python_m_which_has_it_on_the_path(folder):
+    assert_runs_nothing_of(folder, "-m", "suave_des", *OF_NONE.split())
 
 
 @pytest.mark.parametrize("name", ["coverage", "cffi"])

@@ -173,6 +173,7 @@ EQUIVALENT_ONES = {
 }
 
 
+@pytest.mark.slow
 def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_random_states(
     tmp_path, small
 ):

@@ -236,6 +236,9 @@ RULES = {
     "equal values": f"own: {OF_TWO.replace('?w', '?v')} -> fd_realisability(fd_spiral_high, false)",
 }
 
+TAKE_LONG = ("two attributes are compared", "equal values")
+"""Rules like "values of any two are compared", in which most values differ."""
+
 
 def extended(tmp_path: Path, rule: str) -> KnowledgeBase:
     if not rule:
@@ -259,7 +262,13 @@ def check_like_deciding_each(knowledge: KnowledgeBase, policy: Policy, most: int
         )
 
 
-@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
+@pytest.mark.parametrize(
+    "rule",
+    [
+        pytest.param(rule, marks=[pytest.mark.slow] if name in TAKE_LONG else [], id=name)
+        for name, rule in RULES.items()
+    ],
+)
 def test_the_policy_of_two_attributes_is_that_of_deciding_each_state(tmp_path, rule):
     knowledge = extended(tmp_path, rule)
     space = PolicySpace.of(knowledge.base, knowledge.settings)

@@ -141,6 +141,4 @@ def test_a_time_belongs_to_the_nearest_row(row, offset):
 
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
 def test_euler_angles_come_back_from_the_quaternion(roll, pitch, yaw):
-    assert euler_angles(quaternion(roll, pitch, yaw)) == pytest.approx(
-        (roll, pitch, yaw), abs=1e-6
-    )
+    assert euler_angles(quaternion(roll, pitch, yaw)) == pytest.approx((roll, pitch, yaw), abs=1e-6)
