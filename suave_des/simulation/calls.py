@@ -69,7 +69,7 @@ class CallTimes:
             self._next_s += self.period_s
         if changed:
             self._known.clear()
-        if self._depends_on is not None and may_sleep and now_s >= self.period_s:
+        if self._depends_on is not None and may_sleep:
             self._sleep(self._depends_on, now_s)
         else:
             self._alarm.set(self._next_s)
