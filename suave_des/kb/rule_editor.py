@@ -8,6 +8,8 @@ change.
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
 import stat
 from collections.abc import Callable, Sequence
@@ -241,9 +243,19 @@ def _replace(
         raise _cannot(file.path)
     path = file.path.resolve()
     mode = stat.S_IMODE(path.stat().st_mode)
-    write_files(path.parent, {f"{path.name}.bak": file.content, path.name: content})
-    for each in (path, path.with_name(f"{path.name}.bak")):
+    backup = unused_backup(path)
+    write_files(path.parent, {backup.name: file.content, path.name: content})
+    for each in (path, backup):
         each.chmod(mode)
+
+
+def unused_backup(path: Path) -> Path:
+    """Return where the next change keeps a file's previous version: FILE.bak, or the first of
+    FILE.bak2, FILE.bak3, ... that is not there.
+    """
+    numbers = itertools.chain([""], itertools.count(2))
+    names = (path.with_name(f"{path.name}.bak{number}") for number in numbers)
+    return next(name for name in names if not os.path.lexists(name))
 
 
 def _statement(rule: Rule) -> tuple[object, ...]:

@@ -83,6 +83,16 @@ def test_add_switch_and_remove(owl, style):
     assert owl.read_bytes() == original
 
 
+def test_previous_versions_are_kept_and_what_has_their_name_stays(owl):
+    original, own = owl.read_bytes(), owl.parent / "suave.owl.bak"
+    own.write_text("mine")
+    add_rules(owl, BATTERY)
+    added = owl.read_bytes()
+    remove_rule(owl, "Battery")
+    kept = [path.read_bytes() for path in sorted(owl.parent.glob("suave.owl.bak?"))]
+    assert (own.read_text(), kept) == ("mine", [original, added])
+
+
 @pytest.mark.parametrize("style", STYLES)
 def test_each_rule_declares_what_it_uses_so_that_others_can_go(owl, style):
     STYLES[style](owl)

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
 OwlFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak is the previous version.")
+    Path,
+    typer.Argument(
+        metavar="FILE", help="An OWL file; its previous version is kept as FILE.bak, FILE.bak2, ..."
+    ),
 ]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
 FindingsFormat = Literal["text", "json"]
@@ -100,19 +103,22 @@ def add_rule(
     ],
 ) -> None:
     """Add a rule, or those of a file, to an OWL file; nothing else changes."""
-    from suave_des.kb.rule_editor import add_rules
+    from suave_des.kb.rule_editor import add_rules, unused_backup
 
+    backup = unused_backup(file)
     names = [added.name for added in add_rules(file, rule)]
     are = f"rule {names[0]} is" if len(names) == 1 else f"rules {', '.join(names)} are"
-    print(f"{are} in {file} now; {file}.bak is the previous version")
+    print(f"{are} in {file} now; {backup} is the previous version")
 
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
     """Remove a rule from an OWL file; nothing else changes."""
     from suave_des.kb.rule_editor import remove_rule as remove
+    from suave_des.kb.rule_editor import unused_backup
 
+    backup = unused_backup(file)
     remove(file, name)
-    print(f"rule {name} is not in {file} any more; {file}.bak is the previous version")
+    print(f"rule {name} is not in {file} any more; {backup} is the previous version")
 
 
 def enable_rule(file: OwlFile, name: RuleName) -> None:
@@ -126,11 +132,12 @@ def disable_rule(file: OwlFile, name: RuleName) -> None:
 
 
 def _switch(file: Path, name: str, *, enabled: bool) -> None:
-    from suave_des.kb.rule_editor import set_enabled
+    from suave_des.kb.rule_editor import set_enabled, unused_backup
 
+    backup = unused_backup(file)
     word = "enabled" if enabled else "disabled"
     if set_enabled(file, name, enabled=enabled):
-        print(f"rule {name} is {word} in {file} now; {file}.bak is the previous version")
+        print(f"rule {name} is {word} in {file} now; {backup} is the previous version")
     else:
         print(f"rule {name} is {word} in {file} already")
 
