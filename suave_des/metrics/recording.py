@@ -101,7 +101,7 @@ class Recorder:
         vehicle.position(self.env.now)  # fills the track until now
         rows = int(self.env.now / STEP_S) + 1
         return Trajectory(
-            poses=vehicle.track[:rows:TRAJECTORY_PERIOD_ROWS].copy(),
+            poses=vehicle.track[:rows:TRAJECTORY_PERIOD_ROWS],
             modes=_Series(*zip(*self._modes, strict=True)),
             visibility=_published(visibility),
             further={} if battery is None else {battery.key: _published(battery)},

@@ -182,7 +182,8 @@ class Mission:
         if self._is_closed:
             return
         self._is_closed = True
-        self._order.prepared.give_back(self._vehicle.track)
+        if not self._order.record:  # the trajectory is read from it
+            self._order.prepared.give_back(self._vehicle.track)
         # What refers to each other is freed at once if it no longer does: 5% of a mission's time.
         drop_events(self.env)
         self.bus.close()
