@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from decimal import Decimal
 from math import nan
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from suave_des.kb.difference import (
     METRICS,
+    PolicyDifference,
     compare_axioms,
     compare_decisions,
     compare_missions,
@@ -17,7 +19,7 @@ from suave_des.kb.difference import (
     paired,
 )
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.space import Outcome, Situation, States
+from suave_des.kb.space import Outcome, PolicySpace, Situation, States
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.state import Decision, Fact, Plan
@@ -255,3 +257,19 @@ class TestDiff:
             _, text, _ = command("diff", *files, "--max-failed", "0")
             assert f"{SEARCH}, now ungrounded: {texts}\n" in text
             assert not text.startswith("0 of") and " 0 of" not in text
+
+
+@pytest.mark.parametrize(
+    ("places", "said"),
+    [((0, 1, 2, 3), "whatever is measured: 8 states"), ((1, 2, 3), "any: 6 states")],
+)
+def test_a_difference_for_all_values_is_told_as_such(places, said):
+    row = {"states": 2, "f_now": "x", "f_then_a": "y", "f_then_b": "z", "state": "a state"}
+    cells = pandas.DataFrame([{"water_visibility": place, **row} for place in places])
+    space = PolicySpace(("water_visibility",), (Decimal(1),), (), ())
+    difference = PolicyDifference(8, cells, 0, space, ("f",), ())
+    assert list(difference.lines())[1:] == [
+        "f, now x: A y, B z",
+        f"  {said}",
+        "  for instance a state",
+    ]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
+import pandas
 import pytest
 
 from suave_des.errors import InputError
@@ -368,3 +369,26 @@ def test_attributes_that_are_the_same_by_a_functional_property_do_not_count_apar
 def test_a_value_that_is_not_measured_is_no_part_of_a_range():
     cells = {(0,): "stays", (1,): "stays", (2,): "stays", (3,): "none left"}
     assert _spans(0, 4, [cells]) == [(0, 0), (1, 2), (3, 3)]
+
+
+@pytest.mark.parametrize("numbers", [("0",), ("-2",), ("-2.5", "0", "1")])
+def test_values_stand_for_their_place_below_numbers_that_are_not_positive_too(numbers):
+    scale = Scale(tuple(map(Decimal, numbers)))
+    places = list(range(len(scale)))
+    assert [scale.place(scale.value(place)) for place in places] == places
+
+
+def test_what_has_an_effect_in_either_knowledge_base_is_told_apart():
+    one = PolicySpace(("a",), (Decimal(1),), (("c",),), ("FALSE",), ("f",))
+    other = PolicySpace(("b",), (Decimal(2),), (("d",),), ("HOT",), ("g",))
+    both = PolicySpace(
+        ("a", "b"), (Decimal(1), Decimal(2)), (("c",), ("d",)), ("FALSE", "HOT"), ("f", "g")
+    )
+    assert one.common(other) == both
+
+
+@pytest.mark.parametrize(("kinds", "said"), [(5, []), (6, ["  and 1 more kinds: see --csv"])])
+def test_more_kinds_of_wrong_states_than_are_shown_are_counted(kinds, said):
+    case = {"states": 1, "marks": "flip-flop", "state": "a state", "problem": ""}
+    policy = Policy(PolicySpace((), (), (), ()), pandas.DataFrame([case] * kinds), (), (), (), 0)
+    assert list(policy.lines())[3:] == [f"flip-flop: {kinds} states", *["  a state"] * 5, *said]

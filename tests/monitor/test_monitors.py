@@ -372,6 +372,13 @@ def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):
     assert (levels[160.5], levels[160.7], levels[161.5]) == pytest.approx((0.1975, 1.0, 0.996))
 
 
+def test_a_recharge_at_the_time_of_a_measurement_adds_one_and_no_more():
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 4.0)
+    level.recharge(2.5)
+    assert level.times_s == [0.5, 1.5, 2.5, 2.5, 3.5]
+    assert level.values == pytest.approx([0.9975, 0.9925, 0.9875, 1.0, 0.995])
+
+
 def test_a_level_looked_up_is_the_one_published_last(subscriber):
     received = battery_levels(subscriber, 200.0, 160.7)
     level = battery()

@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
+from scipy.stats import expon, norm, uniform
 
 from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario, with_values
-from suave_des.scenario.models import Distribution, draw, support
+from suave_des.scenario.models import CurrentDistribution, Distribution, draw, mean, support
 from suave_des.simulation.simulator import Simulator
 
 ADAPTER: TypeAdapter[Distribution] = TypeAdapter(Distribution)
@@ -98,3 +99,25 @@ def test_an_event_that_is_drawn_before_the_start_is_at_the_start():
             1,
             {"thruster_events.0.time_s": {"distribution": "uniform", "minimum": -9, "maximum": -1}},
         )
+
+
+@pytest.mark.parametrize("value", [-10.0, 10.0])
+def test_a_value_may_be_either_end_of_what_is_allowed(value):
+    adapter: TypeAdapter[CurrentDistribution] = TypeAdapter(CurrentDistribution)
+    choice = {"distribution": "choice", "values": [value]}
+    assert adapter.validate_python(value) == value
+    assert adapter.validate_python(choice).values == (value,)
+    with pytest.raises(ValidationError, match="out of range"):
+        adapter.validate_python(1.001 * value)
+
+
+@pytest.mark.parametrize(
+    ("raw", "expected"),
+    [
+        ({"distribution": "exponential", "mean": 2.0, "minimum": 3.0}, expon(3.0, 2.0)),
+        ({"distribution": "uniform", "minimum": -1.0, "maximum": 4.0}, uniform(-1.0, 5.0)),
+        ({"distribution": "normal", "mean": 1.5, "std": 2.0}, norm(1.5, 2.0)),
+    ],
+)
+def test_the_mean_is_that_of_scipy(raw, expected):
+    assert mean(ADAPTER.validate_python(raw)) == pytest.approx(expected.mean(), rel=1e-12)

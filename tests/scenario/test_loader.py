@@ -316,3 +316,10 @@ def test_a_value_that_is_replaced_by_a_wrong_one_is_told_by_its_key():
     with pytest.raises(InputError) as caught:
         with_values(load_scenario("seams2023"), {"mission.time_limit_s": -1.0})
     assert caught.value.place == "mission.time_limit_s"
+
+
+def test_a_manager_whose_module_begins_like_another_manager_has_settings_of_its_own(write):
+    path = write("mine.yaml", HEAD + "managers: {'bt.trees:Mine': {depth: 1}}\n")
+    loaded = with_values(load_scenario(path), {"managers.bt.trees:Mine.depth": 2})
+    assert loaded.manager_settings("bt.trees:Mine") == {"depth": 2}
+    assert loaded.scenario.managers.bt == load_scenario("seams2023").scenario.managers.bt
