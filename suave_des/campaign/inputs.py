@@ -36,7 +36,6 @@ from suave_des.imports import find_here
 from suave_des.learned import read_file
 from suave_des.records.mission_folder import versions
 from suave_des.registry import (
-    cause_of,
     custom_functions,
     declared_files,
     is_built_in,
@@ -45,6 +44,7 @@ from suave_des.registry import (
 )
 from suave_des.resources import hashes, shipped_folder, shown_name
 from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.tracebacks import cause_of
 
 _TIME_OUTS_S = {"owlready2": 1800.0}
 """Time that a mission may take with a reasoner, if not the default: owlready2 takes some two
