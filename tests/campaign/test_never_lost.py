@@ -13,7 +13,7 @@ from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.errors import InputError
 from suave_des.records import store as stores
-from suave_des.records.store import STORE_FILE, Outcome, Store, StoreError, has_campaign
+from suave_des.records.store import STORE_FILE, Outcome, Store, StoreError
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD
 from tests.helpers.command import has_size, python, wait_until
