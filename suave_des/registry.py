@@ -21,6 +21,7 @@ from suave_des.hooks import check_class
 from suave_des.imports import find_here
 from suave_des.managing.base import ManagingSubsystem
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Scenario
 from suave_des.tracebacks import import_place_of
 
 if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
@@ -139,27 +140,12 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
     Raises:
         InputError: a function that the mission needs has no node, or a class cannot be used.
     """
-    scenario = loaded.scenario
-    registered = _registered(FUNCTION_GROUP)
-    built_in = [*domain.MISSION_FUNCTIONS]
-    if scenario.battery is not None:
-        built_in.append(domain.GENERATE_RECHARGE_PATH)
-    if scenario.leak is not None:
-        built_in.append(domain.SURFACE)
-    own = [name for name in loaded.modes.functions if name not in built_in]
-    nodes = {name: name for name in own if name in registered}
-    nodes |= {name: settings.node for name, settings in scenario.functions.items()}
-    for name in scenario.needed_functions():
-        if name not in built_in and name not in nodes:
-            remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
-            if name == domain.GENERATE_RECHARGE_PATH:
-                remedy = "add battery: {}"
-            problem = f"function {name} has no node"
-            raise loaded.layer.error(problem, ("mission", "functions"), remedy)
+    nodes = _nodes(loaded)
     if not nodes:
         return {}
     from suave_des.managed.node import CustomFunction  # loads the vehicle
 
+    registered = _registered(FUNCTION_GROUP)
     found = {}
     for name, node in nodes.items():
         target = node if ":" in node else registered.get(node)
@@ -168,6 +154,32 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
             raise InputError(f"function {name}: no package registers {node!r}", remedy=remedy)
         found[name] = _load(f"function {name}, {node!r}", target, CustomFunction)
     return found
+
+
+def _nodes(loaded: LoadedScenario) -> dict[str, str]:
+    """Return the class of each further function, as it is named; check that none is missing."""
+    scenario = loaded.scenario
+    built_in = _built_in_functions(scenario)
+    own = [name for name in loaded.modes.functions if name not in built_in]
+    nodes = {name: name for name in own if name in _registered(FUNCTION_GROUP)}
+    nodes |= {name: settings.node for name, settings in scenario.functions.items()}
+    for name in scenario.needed_functions():
+        if name not in built_in and name not in nodes:
+            remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
+            if name == domain.GENERATE_RECHARGE_PATH:
+                remedy = "add battery: {}"
+            problem = f"function {name} has no node"
+            raise loaded.layer.error(problem, ("mission", "functions"), remedy)
+    return nodes
+
+
+def _built_in_functions(scenario: Scenario) -> list[str]:
+    functions = [*domain.MISSION_FUNCTIONS]
+    if scenario.battery is not None:
+        functions.append(domain.GENERATE_RECHARGE_PATH)
+    if scenario.leak is not None:
+        functions.append(domain.SURFACE)
+    return functions
 
 
 def declared_files(

@@ -130,11 +130,11 @@ def _outcomes(
     except SuaveDesError:
         raise
     except Exception as error:
-        if client.status != "running" or any(future.cancelled() for future in (parcel, *under_way)):
+        is_lost = any(future.cancelled() for future in (parcel, *under_way))
+        if is_lost or client.status != "running":
             raise WorkerError(f"the connection to the scheduler {scheduler} is lost") from None
-        raise WorkerError(
-            f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
-        ) from error
+        problem = f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
+        raise WorkerError(problem) from error
     finally:
         # have the cluster forget the campaign, which may be over or not
         if client.status == "running":
