@@ -20,6 +20,8 @@ from typing import Any, BinaryIO, TypeVar
 
 from suave_des.errors import InputError, line_error
 
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+"""Numbers of the system's errors about a disk that is full."""
 LIMIT_BYTES = 1_000_000_000
 """Of a file that has no smaller limit."""
 _PIECE_ROWS = 1000
@@ -510,4 +512,7 @@ def _user_errors(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         problem = f"the output folder cannot be written: {error.strerror}"
-        raise InputError(problem, file=folder, remedy="give a folder that is yours") from None
+        remedy = "give a folder that is yours"
+        if error.errno in NO_SPACE:
+            remedy = "make room there, or give a folder on another disk"
+        raise InputError(problem, file=folder, remedy=remedy) from None

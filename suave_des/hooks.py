@@ -14,6 +14,8 @@ from suave_des.errors import InputError, shown, similar
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Kind
 
+LEAST_PERIOD_S = 0.001
+"""Of a manager, as of what scenarios have happen periodically: a slip must not stop the clock."""
 _MAY_YIELD = ("adapt", "input_files")
 
 
@@ -105,9 +107,10 @@ def times_of(manager: ManagingSubsystem) -> tuple[float, float] | None:
     if period_s is None:
         return None
     are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
-    if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
+    if not (are_numbers and LEAST_PERIOD_S <= period_s < inf and 0.0 <= starts_s < inf):
         problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
-        raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
+        least = f"at least {LEAST_PERIOD_S:g} and 0"
+        raise ValueError(f"{problem}; they must be numbers, {least}, or period_s None")
     return period_s, starts_s
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import errno
 import gc
 import os
 import signal
@@ -11,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
+from traceback import walk_tb
 from typing import Annotated, Any, ClassVar
 
 import typer
@@ -21,6 +21,7 @@ from suave_des.cli.console import plain
 from suave_des.cli.kb import commands as kb
 from suave_des.cli.options import CONTEXT, CommandsUnderHeadings, Headings, remember_command_line
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.files import NO_SPACE
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted
 
 BAD_INPUT, MISSIONS_MISSING = 2, 3
@@ -159,14 +160,29 @@ def _status_of(error: BaseException) -> int:
     if was_interrupted():  # in the middle of an import, whose own error this may be
         return _report("interrupted", exit_status())
     # of standard output: files have errors of their own
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if isinstance(error, OSError) and error.errno in NO_SPACE:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
         return _report(f"the output cannot be written: {error.strerror}", BAD_INPUT)
+    settings = _unread_settings(error)
+    if settings is not None:
+        return _status_of(
+            InputError(f"cannot be read: {error}", file=settings, remedy="correct or remove it")
+        )
     # A wrong option or argument: a class that is private to typer, and was click's in earlier
     # versions of it.
     if hasattr(error, "format_message"):
         return _report(_usage_problem(error), BAD_INPUT)
     raise error
+
+
+def _unread_settings(error: BaseException) -> str | None:
+    """Return the file of matplotlib's settings, such as ./matplotlibrc, that its import could not
+    read.
+    """
+    for frame, _ in walk_tb(error.__traceback__):
+        if frame.f_code.co_name == "_rc_params_in_file":
+            return str(frame.f_locals["fname"])
+    return None
 
 
 def _usage_problem(error: Any) -> str:
