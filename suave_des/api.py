@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 from suave_des.arguments import check_names, plain_arguments
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
-from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.progress import OnProgress, is_live, shown
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range
 from suave_des.files import check_output_folder, make_output_folder, own_files, write_files
@@ -20,6 +19,7 @@ from suave_des.metrics.result import MissionResult
 from suave_des.records.mission_folder import MISSION_FILE, mission_files, record_of
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
+from suave_des.simulation.inputs import check_inputs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,6 +20,8 @@ from typing import Any, BinaryIO, TypeVar
 
 from suave_des.errors import InputError, line_error
 
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+"""Numbers of the system's errors about a disk that is full."""
 LIMIT_BYTES = 1_000_000_000
 """Of a file that has no smaller limit."""
 _PIECE_ROWS = 1000
@@ -264,24 +266,17 @@ def check_output_folder(
     """
     with _user_errors(folder):
         entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
-        found = min((name for name in entries if not left_over(name)), default=None)
-        is_there, has_parent = folder.exists() or folder.is_symlink(), folder.parent.is_dir()
-    for other, names in FAMILIES.items():
-        known = min((name for name in names if name in entries), default=None)
-        if other != family and known is not None:
-            problem = f"the output folder has a {other}'s results in it ({known}), which this command does not replace"
-            raise InputError(
-                problem, file=folder, remedy="give another folder, or remove them first"
-            )
+        is_there = folder.exists() or folder.is_symlink()
+        has_parent = folder.parent.is_dir()
+    _check_family(folder, family, entries)
     if overwrite and is_there:
         _check_replaced(folder, family, entries)
-    may_be_written = os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK)
-    not_empty = f"the output folder is not empty: it has {found}"
+    counting = sorted(name for name in entries if not left_over(name))
     _check(
         folder,
         (
-            found and not overwrite,
-            not_empty,
+            counting and not overwrite,
+            f"the output folder is not empty: it has {', '.join(counting[:1])}",
             "give another folder, or --overwrite to replace the results in it",
         ),
         (
@@ -294,8 +289,22 @@ def check_output_folder(
             f"there is no folder {folder.parent} to make it in",
             "make that folder first",
         ),
-        (not may_be_written, "the output folder cannot be written", "give a folder that is yours"),
+        (
+            not os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK),
+            "the output folder cannot be written",
+            "give a folder that is yours",
+        ),
     )
+
+
+def _check_family(folder: Path, family: str, entries: Collection[str]) -> None:
+    """Check that no results of another family are in a folder."""
+    for other, names in FAMILIES.items():
+        known = sorted(set(entries).intersection(names))
+        if other != family and known:
+            problem = f"the output folder has a {other}'s results in it ({known[0]}), which this command does not replace"
+            remedy = "give another folder, or remove them first"
+            raise InputError(problem, file=folder, remedy=remedy)
 
 
 def _check_replaced(folder: Path, family: str, entries: Collection[str]) -> None:
@@ -503,4 +512,7 @@ def _user_errors(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         problem = f"the output folder cannot be written: {error.strerror}"
-        raise InputError(problem, file=folder, remedy="give a folder that is yours") from None
+        remedy = "give a folder that is yours"
+        if error.errno in NO_SPACE:
+            remedy = "make room there, or give a folder on another disk"
+        raise InputError(problem, file=folder, remedy=remedy) from None

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, SkipValidation
+from pydantic.dataclasses import dataclass
 
 from suave_des.errors import InputError
 from suave_des.files import read_bytes
@@ -18,7 +21,7 @@ _KEY = "suave_des_learned"
 _LIMIT_BYTES = 100_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=ConfigDict(strict=True))
 class Learned:
     """A file with a manager's training result.
 
@@ -33,9 +36,9 @@ class Learned:
     manager: str
     scenario: str
     seed: int
-    missions: int
+    missions: Annotated[int, Field(ge=1)]
     inputs_sha256: dict[str, str]
-    learned: dict[str, Any]
+    learned: Annotated[dict[str, Any], SkipValidation]
 
     def text(self) -> str:
         """Write the file's content; an InputError if what was learned cannot be written as JSON."""

@@ -1,35 +1,28 @@
 """Managers and functions by name: built in, registered by a package, or a user's own module:Class,
 which is checked.
-
-What users' code does wrong is told with its place in their code.
 """
 
 from __future__ import annotations
 
 import importlib
-import inspect
-import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.metadata import entry_points
-from itertools import chain, product
-from math import inf, isnan
-from numbers import Real
+from itertools import product
 from pathlib import Path
-from sysconfig import get_path
-from traceback import FrameSummary, extract_tb
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeGuard, TypeVar
 from weakref import WeakSet
 
 from suave_des import domain
-from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
+from suave_des.errors import InputError, did_you_mean, nearest, shown
+from suave_des.hooks import check_class
 from suave_des.imports import find_here
-from suave_des.managing.base import Dependencies, ManagingSubsystem, System
-from suave_des.monitor.diagnostics import Kind
+from suave_des.managing.base import ManagingSubsystem
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Scenario
+from suave_des.tracebacks import import_place_of
 
 if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
     from suave_des.managed.node import CustomFunction
@@ -55,10 +48,6 @@ _FAMILIES = {
 """Managers with an argument after a colon: module and function that make the class, and what the
 argument is.
 """
-_OWN = Path(__file__).parent
-_LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
-_MOST_SAID = 5_000  # characters of an exception's text
-_MAY_YIELD = ("adapt", "input_files")
 # a class that is kept would keep its module open at the end of a worker
 _checked: WeakSet[type] = WeakSet()
 
@@ -151,36 +140,46 @@ def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
     Raises:
         InputError: a function that the mission needs has no node, or a class cannot be used.
     """
-    scenario, registered = loaded.scenario, _registered(FUNCTION_GROUP)
-    recharge = () if scenario.battery is None else (domain.GENERATE_RECHARGE_PATH,)
-    built_in = (
-        *domain.MISSION_FUNCTIONS,
-        *recharge,
-        *(() if scenario.leak is None else (domain.SURFACE,)),
-    )
-    types = {
-        name: name for name in loaded.modes.functions if name in registered and name not in built_in
-    }
-    types |= {name: settings.node for name, settings in scenario.functions.items()}
-    for name in scenario.needed_functions():
-        if name not in built_in and name not in types:
-            remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
-            remedy = "add battery: {}" if name == domain.GENERATE_RECHARGE_PATH else remedy
-            raise loaded.layer.error(
-                f"function {name} has no node", ("mission", "functions"), remedy
-            )
-    if not types:
+    nodes = _nodes(loaded)
+    if not nodes:
         return {}
     from suave_des.managed.node import CustomFunction  # loads the vehicle
 
+    registered = _registered(FUNCTION_GROUP)
     found = {}
-    for name, node in types.items():
+    for name, node in nodes.items():
         target = node if ":" in node else registered.get(node)
         if target is None:
             remedy = f"{did_you_mean(node, sorted(registered), 'registered')}; or give module:Class"
             raise InputError(f"function {name}: no package registers {node!r}", remedy=remedy)
         found[name] = _load(f"function {name}, {node!r}", target, CustomFunction)
     return found
+
+
+def _nodes(loaded: LoadedScenario) -> dict[str, str]:
+    """Return the class of each further function, as it is named; check that none is missing."""
+    scenario = loaded.scenario
+    built_in = _built_in_functions(scenario)
+    own = [name for name in loaded.modes.functions if name not in built_in]
+    nodes = {name: name for name in own if name in _registered(FUNCTION_GROUP)}
+    nodes |= {name: settings.node for name, settings in scenario.functions.items()}
+    for name in scenario.needed_functions():
+        if name not in built_in and name not in nodes:
+            remedy = f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package for it"
+            if name == domain.GENERATE_RECHARGE_PATH:
+                remedy = "add battery: {}"
+            problem = f"function {name} has no node"
+            raise loaded.layer.error(problem, ("mission", "functions"), remedy)
+    return nodes
+
+
+def _built_in_functions(scenario: Scenario) -> list[str]:
+    functions = [*domain.MISSION_FUNCTIONS]
+    if scenario.battery is not None:
+        functions.append(domain.GENERATE_RECHARGE_PATH)
+    if scenario.leak is not None:
+        functions.append(domain.SURFACE)
+    return functions
 
 
 def declared_files(
@@ -220,46 +219,33 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     module_name, _, attribute = target.partition(":")
     module = _imported(what, module_name)
     found = getattr(module, attribute, None)
-    if not (isinstance(found, type) and issubclass(found, base)):
-        classes = {
-            name
-            for name, each in vars(module).items()
-            if isinstance(each, type) and issubclass(each, base)
-        }
+    if not _is_derived(found, base):
         problem = f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}"
-        here, imported = (
-            Path(f"{module_name.replace('.', '/')}.py"),
-            getattr(module, "__file__", ""),
-        )
-        if here.is_file() and not (imported and here.samefile(imported)):
+        file = getattr(module, "__file__", None)
+        here = Path(f"{module_name.replace('.', '/')}.py")
+        if here.is_file() and not (file and here.samefile(file)):
             raise InputError(
-                f"{problem}: it is {imported or 'a part of Python'}, not {here} in this folder",
+                f"{problem}: it is {file or 'a part of Python'}, not {here} in this folder",
                 remedy="rename your file, as installed modules come first",
             )
-        raise InputError(
-            problem,
-            remedy=nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}",
-        )
+        classes = [name for name, each in vars(module).items() if _is_derived(each, base)]
+        remedy = nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}"
+        raise InputError(problem, remedy=remedy)
     if found not in _checked and not module_name.startswith("suave_des."):
-        _check_hooks(what, found, base)
-        subscribed: Any = getattr(found, "subscribes_to", ())
-        are_kinds = isinstance(subscribed, Collection) and all(
-            each in list(Kind) for each in subscribed
-        )
-        if not (are_kinds or isinstance(subscribed, property)):
-            remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
-            raise InputError(f"{what}: subscribes_to is {shown(subscribed)}", remedy=remedy)
+        check_class(what, found, base)
         _checked.add(found)
     return found
 
 
-# Users' code.
+def _is_derived(found: object, base: type[_Base]) -> TypeGuard[type[_Base]]:
+    return isinstance(found, type) and issubclass(found, base)
 
 
 def _imported(what: str, module: str) -> ModuleType:
     """Import a module of a user's; `what` names what it is imported for."""
     try:
-        if (top := module.partition(".")[0]) not in sys.modules:
+        top = module.partition(".")[0]
+        if top not in sys.modules:
             find_here(top)  # in the current folder, too, which is not on the import path
         return importlib.import_module(module)
     except SyntaxError as error:
@@ -271,166 +257,10 @@ def _imported(what: str, module: str) -> ModuleType:
         if isinstance(error.__cause__, KeyboardInterrupt):
             raise error.__cause__ from None
         problem = f"{what}: {type(error).__name__}: {error}"
-        own = [
-            each for each in extract_tb(error.__traceback__)[1:] if "importlib" not in each.filename
-        ]
-        own = [each for each in own if not _LIBRARY.match(each.filename)] or own
-        if own:
-            raise InputError(
-                problem, file=own[-1].filename, place=f"line {own[-1].lineno}"
-            ) from error
+        place = import_place_of(error)
+        if place is not None:
+            raise InputError(problem, file=place.filename, place=f"line {place.lineno}") from error
         remedy = (
             "module must be importable: installed, or in the current folder or one on PYTHONPATH"
         )
         raise InputError(problem, remedy=remedy) from error
-
-
-def _check_hooks(what: str, kind: type, root: type) -> None:
-    """Check that hooks can be called as hooks are called, and that no method is most likely a
-    misspelt one.
-    """
-    own = {
-        name: each
-        for base in root.__mro__[:-1]
-        for name, each in vars(base).items()
-        if inspect.isroutine(each)
-    }
-    forms = {
-        name: _form(root, name) for name in own if name == "__init__" or not name.startswith("_")
-    }
-    for hook, form in forms.items():
-        function = getattr(kind, hook)
-        never_runs = inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function)
-        try:
-            inspect.signature(function).bind(*inspect.signature(getattr(root, hook)).parameters)
-        except TypeError:
-            never_runs = True
-        except ValueError:  # no signature: compiled
-            continue
-        if never_runs or (inspect.isgeneratorfunction(function) and hook not in _MAY_YIELD):
-            raise InputError(
-                f"{what}: {hook} cannot be called as a hook",
-                remedy=f"write {form}; only adapt may yield",
-            )
-    classes = kind.__mro__[: kind.__mro__.index(root)]
-    for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
-        for each in sorted(
-            name for name, member in vars(base).items() if inspect.isfunction(member)
-        ):
-            near = similar(each, forms, cutoff=0.8)
-            inherits = any(hasattr(parent, each) for parent in base.__bases__)
-            if (
-                near is not None
-                and near not in vars(base)
-                and not inherits
-                and each not in names_in(base)
-            ):
-                remedy = f"did you mean {forms[near]}? give a method of your own a name that differs more"
-                raise InputError(
-                    f"{what}: {each} is not a hook, and nothing calls it", remedy=remedy
-                )
-
-
-def _form(root: type, hook: str) -> str:
-    """Write how a hook is defined: def adapt(self)."""
-    is_of_class = isinstance(inspect.getattr_static(root, hook), classmethod)
-    parameters = list(inspect.signature(getattr(root, hook)).parameters)
-    arguments = ", ".join(["cls", *parameters] if is_of_class else parameters)
-    return f"{'@classmethod ' if is_of_class else ''}def {hook}({arguments})"
-
-
-def times_of(manager: ManagingSubsystem) -> tuple[float, float] | None:
-    """Return a manager's period and first time; None if it is not called periodically.
-
-    Raises:
-        ValueError: they are no such times.
-    """
-    period_s, starts_s = manager.period_s, manager.starts_s
-    if period_s is None:
-        return None
-    are_numbers = isinstance(period_s, Real) and isinstance(starts_s, Real)
-    if not (are_numbers and 0.0 < period_s < inf and 0.0 <= starts_s < inf):
-        problem = f"period_s is {period_s!r}, starts_s is {starts_s!r}"
-        raise ValueError(f"{problem}; they must be numbers, above 0 and from 0, or period_s None")
-    return period_s, starts_s
-
-
-def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
-    """Return what a manager's class itself declares to depend on: one derived from it may depend on
-    more.
-
-    Raises:
-        ValueError: it is no mapping from measured quality attributes to numbers.
-    """
-    declared = manager.depends_on if "depends_on" in vars(type(manager)) else None
-    if declared is None:
-        return None
-    known = measured_somewhere(manager.system)
-    with suppress(AttributeError, TypeError, ValueError):
-        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
-        if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
-            return found
-    form = f"{{'{domain.WATER_VISIBILITY}': (2.25, 3.25)}}"
-    raise ValueError(
-        f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None"
-    )
-
-
-def measured_somewhere(system: System) -> list[str]:
-    """List what is measured, here or in some shipped scenario: a manager may be written for all of
-    them.
-    """
-    return sorted({*system.measurements, domain.WATER_VISIBILITY, domain.BATTERY_LEVEL})
-
-
-def names_in(kind: type) -> set[str]:
-    """Return the attributes and functions that the methods of a class name."""
-    return {
-        name
-        for each in vars(kind).values()
-        if inspect.isfunction(each)
-        for name in each.__code__.co_names
-    }
-
-
-def cause_of(error: BaseException, function: str = "") -> str:
-    """Say what was raised, in which function, and where in the user's code: "ValueError: no plan
-    (mine.py, line 7)".
-
-    The text is the same in each run: it has no memory addresses.
-    `function` is the user-defined one that raised it.
-    """
-    of = f"function {function}: " if function else ""
-    said = "its text cannot be made"
-    with suppress(Exception):
-        said = str(error)
-    text = re.sub(r" at 0x[0-9a-f]+", "", f"{of}{type(error).__name__}: {said[:_MOST_SAID]}")
-    frames = _users_frames(error)
-    return f"{text} ({_line(frames[-1])})" if frames else text
-
-
-def place_of(error: BaseException) -> str:
-    """Say which hook of a user's class an exception came from, and from which line: "adapt
-    (mine.py, line 7)".
-    """
-    frames = _users_frames(error)
-    return f"{frames[0].name} ({_line(frames[-1])})" if frames else ""
-
-
-def _users_frames(error: BaseException) -> list[FrameSummary]:
-    """Return what ran outside the project when an exception was raised, outermost first; libraries
-    if nothing else.
-    """
-    while error.__cause__ is not None and repr(error.__cause__) == repr(error):
-        error = error.__cause__  # SimPy raises a copy of what a process has raised
-    frames = [
-        each
-        for each in extract_tb(error.__traceback__)
-        if not Path(each.filename).is_relative_to(_OWN)
-    ]
-    return [each for each in frames if not _LIBRARY.match(each.filename)] or frames
-
-
-def _line(frame: FrameSummary) -> str:
-    file = Path(frame.filename)
-    return f"{f'{file.name}, ' if file.is_file() else ''}line {frame.lineno}"

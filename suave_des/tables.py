@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -71,11 +71,9 @@ class Table:
         """Return the width of each column; of a table that is too wide, columns of text are made
         narrower.
         """
-        cells = [self.headings, *(row for row in self.rows if len(row) > 1)]
-        widths = [
-            max(len(line) for cell in column for line in cell.split("\n"))
-            for column in zip(*cells, strict=True)
-        ]
+        rows = [self.headings, *(row for row in self.rows if len(row) > 1)]
+        columns = list(zip(*rows, strict=True))
+        widths = list(map(_widest_line, columns))
         narrow = [place for place, side in enumerate(self._alignment) if side == "l"]
         while width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
             widest = max(narrow, key=lambda place: widths[place], default=None)
@@ -83,10 +81,8 @@ class Table:
                 break
             widths[widest] -= 1
         for place in narrow:  # what was broken into lines may need even less
-            lines = (
-                line for row in cells for line in broken_name(row[place], widths[place]).split("\n")
-            )
-            widths[place] = max(map(len, lines))
+            room = widths[place]
+            widths[place] = _widest_line(broken_name(cell, room) for cell in columns[place])
         return widths
 
     def text(self, width: int | None = None) -> str:
@@ -94,6 +90,12 @@ class Table:
         into lines.
         """
         return "\n".join(self._lines(self._widths(width)))
+
+    def without_effect(self, width: int) -> Table:
+        """Return the table without its last column if that is the effect, and makes it wider."""
+        if self.headings[-1] != EFFECT or _widest_line([self.text()]) <= width:
+            return self
+        return Table(self.headings[:-1], [row[:-1] for row in self.rows])
 
     def _lines(self, widths: Sequence[int]) -> Iterator[str]:
         for row in (self.headings, *self.rows):
@@ -166,6 +168,10 @@ class Table:
         return f"{markdown_text(self.title)}\n\n{self.markdown()}"
 
 
+def _widest_line(cells: Iterable[str]) -> int:
+    return max(len(line) for cell in cells for line in cell.split("\n"))
+
+
 class Section(NamedTuple):
     """A part of what is written: tables under a title, what is said below them, and what follows
     from them.
@@ -219,20 +225,14 @@ class Written(ABC):
         parts = [folded(self.conclusion, width)]
         for title, tables, sentences, below in self.sections():
             for place, table in enumerate(tables):
-                heading = (
-                    f"{title}\n"
-                    if place == 0
-                    else f"{title}, {table.title}\n"
-                    if table.title
-                    else ""
-                )
-                fits = (
-                    table.headings[-1] != EFFECT or max(map(len, table.text().split("\n"))) <= width
-                )
-                shown = (
-                    table if fits else Table(table.headings[:-1], [row[:-1] for row in table.rows])
-                )
-                parts.append(heading + shown.text(width) + (f"\n{below}" if below else ""))
+                lines = [table.without_effect(width).text(width)]
+                if place == 0:
+                    lines.insert(0, title)
+                elif table.title:
+                    lines.insert(0, f"{title}, {table.title}")
+                if below:
+                    lines.append(below)
+                parts.append("\n".join(lines))
             parts.append("\n".join(folded(f"- {each}", width) for each in sentences))
         parts.append("\n".join(folded(line, width) for line in self.remarks()))
         return "\n\n".join(filter(None, parts)) + "\n"

@@ -13,7 +13,7 @@ from typing import Any, Unpack
 
 from suave_des import files
 from suave_des.arguments import plain_arguments
-from suave_des.campaign import inputs
+from suave_des.campaign import identity, inputs, trust
 from suave_des.campaign.missions import (
     GIVEN_UP,
     Campaign,
@@ -50,6 +50,8 @@ from suave_des.records.store import (
 )
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
+from suave_des.simulation.inputs import check_inputs
+from suave_des.user_code import tell_code
 
 __all__ = ["CampaignInterrupted", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
 _MORE_MANAGERS = "for other managers, run a campaign with the same seed into another folder: compare pairs their runs"
@@ -95,7 +97,7 @@ def run_campaign(
         _check_is_free(spec.out, overwrite=spec.overwrite)
     file = read_campaign_file(spec.scenario) if loaded is None else None
     if file is not None and managers is None and "managers" in file.settings.model_fields_set:
-        inputs.tell_code(file.path, file.settings.managers)
+        tell_code(file.path, file.settings.managers)
     if settings := settings_of(spec.with_file(file).managers):
         spec = spec.model_copy(
             update={"replacements": {**spec.replacements, "manager_options": settings}}
@@ -202,7 +204,7 @@ def _stored(
         problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
         remedy = f"{did_you_mean(unknown[0], sorted(known), 'its managers')}; {_MORE_MANAGERS}"
         raise InputError(problem, file=folder, remedy=remedy)
-    inputs.check_trusted(campaign, named, folder, confirmed=confirmed)
+    trust.check_trusted(campaign, named, folder, confirmed=confirmed)
     with closing(Store(path)) as store:
         if store.about("request") != noted:
             raise InputError("changed while it was read", file=path, remedy="try it again")
@@ -249,11 +251,11 @@ def _checked(stack: ExitStack, spec: CampaignSpec, read: Callable[[], Campaign])
     decided_by = inputs.check_campaign(campaign)
     if spec.scheduler is not None:
         executor = stack.enter_context(_connected(spec.scheduler))
-    decides = inputs.deciding(campaign, decided_by)
+    decides = identity.deciding(campaign, decided_by)
     about = {
         "request": campaign.request.stored(),
         "deciding": decides,
-        "identity": inputs.identity(decides),
+        "identity": identity.identity(decides),
     }
     return _Checked(campaign, executor, decided_by, about)
 
@@ -272,7 +274,7 @@ def _new(stack: ExitStack, checked: _Checked) -> Store:
     """Begin the store of a new campaign, which `stack` closes."""
     store = stack.enter_context(_new_store(checked.folder, checked.about))
     if checked.folder is not None:
-        inputs.note_own(checked.campaign, checked.folder)
+        trust.note_own(checked.campaign, checked.folder)
     return store
 
 
@@ -283,7 +285,7 @@ def _resume(store: Store, checked: _Checked, folder: Path) -> None:
         InputError: something that determines results is not what it was.
     """
     with store.reading():
-        inputs.check_same(store.about("deciding"), checked.about["deciding"], folder)
+        identity.check_same(store.about("deciding"), checked.about["deciding"], folder)
     tidy(folder, is_new=False)
     store.forget_passing_failures()
     for name, value in checked.about.items():
@@ -454,7 +456,7 @@ def train(
     check_range("missions", missions, 1, RUNS_LIMIT)
     check_range("seed", seed, 0, SEED_LIMIT)
     loaded = load_scenario(scenario, **replacements)
-    hashes = inputs.check_inputs([loaded], [manager], {})
+    hashes = check_inputs([loaded], [manager], {})
     learned: dict[str, Any] = {}
     simulator = Simulator(loaded, training={manager: learned})
     for run in range(1, missions + 1):

@@ -27,7 +27,7 @@ from typing import Any
 
 from distributed import Client, KilledWorker, get_worker
 
-from suave_des.campaign.inputs import MAIN, code_versions, user_modules
+from suave_des.campaign.identity import code_versions
 from suave_des.campaign.missions import (
     Campaign,
     Chunk,
@@ -40,6 +40,7 @@ from suave_des.campaign.workers import finished, packed, unpacked
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.records.store import MissionKey
 from suave_des.registry import custom_functions, declared_files, manager_class
+from suave_des.user_code import MAIN, user_modules
 
 ANSWER_TIMEOUT_S, _LOOK_S = 10.0, 1.0
 """Time for a scheduler to answer at all; and after which to look whether it is still there."""
@@ -129,11 +130,11 @@ def _outcomes(
     except SuaveDesError:
         raise
     except Exception as error:
-        if client.status != "running" or any(future.cancelled() for future in (parcel, *under_way)):
+        is_lost = any(future.cancelled() for future in (parcel, *under_way))
+        if is_lost or client.status != "running":
             raise WorkerError(f"the connection to the scheduler {scheduler} is lost") from None
-        raise WorkerError(
-            f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
-        ) from error
+        problem = f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
+        raise WorkerError(problem) from error
     finally:
         # have the cluster forget the campaign, which may be over or not
         if client.status == "running":

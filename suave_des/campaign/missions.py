@@ -32,8 +32,9 @@ from suave_des.metrics.result import MissionResult
 from suave_des.records.metrics import COLUMNS, Row, further_of, row_of
 from suave_des.records.mission_folder import mission_line
 from suave_des.records.store import MissionFailure, MissionKey, Outcome
-from suave_des.registry import is_built_in, is_installed, place_of
+from suave_des.registry import is_built_in, is_installed
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.tracebacks import place_of
 
 if TYPE_CHECKING:
     from suave_des.simulation.simulator import Simulator

@@ -122,9 +122,9 @@ def plain(given: Any) -> Any:
 
 def cell_of(value: Any) -> str | int | float | bool | None:
     """Return a parameter's value as in runs.csv: lists and mappings as JSON."""
-    return (
-        value if value is None or isinstance(value, str | int | float | bool) else json.dumps(value)
-    )
+    if value is None or isinstance(value, str | int | float | bool):
+        return value
+    return json.dumps(value)
 
 
 @dataclass(frozen=True)
@@ -233,29 +233,34 @@ def vary(
     drawn = {path_of(f"perturbations.{name}", name): name for name in perturbations}
     for path, name in drawn.items():
         with located(place=f"perturbations.{name}"):
-            if not isinstance(distribution := perturbations[name], Mapping):
+            distribution = perturbations[name]
+            if not isinstance(distribution, Mapping):
+                problem = f"expected a distribution, got {shown(distribution)}"
                 remedy = "such as {distribution: normal, mean: 1, std: 2}"
-                raise InputError(
-                    f"expected a distribution, got {shown(distribution)}", remedy=remedy
-                )
+                raise InputError(problem, remedy=remedy)
             loaded = with_values(loaded, {path: dict(distribution)})
     found, places = _sweep(sweep)
     paths = {name: path_of(places[name], name) for name in found.parameters}
-    for names in (*([name] for name in found.grid), list(found.zip)):
-        rows = zip(*[(found.grid | found.zip)[name] for name in names], strict=True)
-        points = [
-            tuple(float(cell) if isinstance(cell, int | float) else repr(cell) for cell in row)
-            for row in rows
-        ]
-        if len(set(points)) < len(points):
-            raise InputError(
-                "has a point twice", place=places[names[0]], remedy="give each point once"
-            )
+    for name, values in found.grid.items():
+        _check_once(places[name], [values])
+    if found.zip:
+        _check_once(places[next(iter(found.zip))], list(found.zip.values()))
     variation = Variation(found, drawn, paths, runs_per_draw)
     with located(place=next(iter(places.values())) if len(places) == 1 else "sweep"):
         for point in islice(found.each_value(), _CHECKED_POINTS):
             variation.scenario(loaded, point)
     return loaded, variation
+
+
+def _check_once(place: str, columns: Sequence[Sequence[Any]]) -> None:
+    """Check that no two rows of a sweep's values are equal, as 1 and 1.0 are."""
+    points = [tuple(map(_comparable, row)) for row in zip(*columns, strict=True)]
+    if len(set(points)) < len(points):
+        raise InputError("has a point twice", place=place, remedy="give each point once")
+
+
+def _comparable(value: Any) -> float | str:
+    return float(value) if isinstance(value, int | float) else repr(value)
 
 
 def _sweep(given: Mapping[str, Any]) -> tuple[Sweep, dict[str, str]]:
@@ -293,10 +298,7 @@ def check_drawn(loaded: LoadedScenario, variation: Variation) -> None:
 
 def short_mission(loaded: LoadedScenario) -> MissionResult:
     """Run a mission of one second without a managing subsystem."""
-    # with it comes the compiler, which takes a while
-    from suave_des.simulation.simulator import (
-        Simulator,
-    )
+    from suave_des.simulation.simulator import Simulator  # with the compiler, which takes a while
 
     short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
     return Simulator(replace(loaded, scenario=short)).run("none", 1, 0)
@@ -398,34 +400,31 @@ def differences(
         for (metric, place), (second, first) in product(
             metrics.items(), combinations(sorted(by_manager), 2)
         ):
-            ours, theirs = by_manager[first], by_manager[second]
-            by_run: dict[int, Any] = {
-                run: ours[run][place] - theirs[run][place] for run in ours if run in theirs
-            }
-            if not by_run:
-                continue
-            by_member: dict[int, list[float]] = {}
-            for run, value in by_run.items():
-                by_member.setdefault(variation.ensemble.member(run), []).append(value)
-            means, mean = list(map(fmean, by_member.values())), fmean(by_run.values())
-            interval = mean_of(
-                list(by_run.values()), [(run - 1) // variation.runs_sharing_draw for run in by_run]
-            )
-            members, half = len(means), math.nan
-            if members > 1:
-                half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)
-            ends = (known(each) for each in (interval.low, interval.high))
-            signs = (sum(each > 0.0 for each in means), sum(each < 0.0 for each in means))
-            ranges = (known(mean - half), known(mean + half))
-            cells = (
-                managers[first],
-                managers[second],
-                metric,
-                len(by_run),
-                mean,
-                *ends,
-                members,
-                *signs,
-                *ranges,
-            )
-            yield {**dict(zip(ENSEMBLE_COLUMNS, cells, strict=True)), "point": point}
+            ours = by_manager[first]
+            theirs = by_manager[second]
+            by_run = {run: ours[run][place] - theirs[run][place] for run in ours if run in theirs}
+            if by_run:
+                names = (managers[first], managers[second], metric)
+                cells = (*names, *_difference(variation, variation.ensemble, by_run))
+                yield {**dict(zip(ENSEMBLE_COLUMNS, cells, strict=True)), "point": point}
+
+
+def _difference(
+    variation: Variation, ensemble: Ensemble, by_run: Mapping[int, float]
+) -> tuple[Any, ...]:
+    """Describe the differences of runs, by chance and over parameter sets: cells of ensemble.csv."""
+    by_member: dict[int, list[float]] = {}
+    for run, value in by_run.items():
+        by_member.setdefault(ensemble.member(run), []).append(value)
+    draws = [(run - 1) // variation.runs_sharing_draw for run in by_run]
+    by_chance = mean_of(list(by_run.values()), draws)
+    mean = fmean(by_run.values())
+    means = list(map(fmean, by_member.values()))
+    half = math.nan
+    if len(means) > 1:
+        half = t_quantile(len(means) - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / len(means))
+    return (
+        *(len(by_run), mean, known(by_chance.low), known(by_chance.high)),
+        *(len(means), sum(each > 0.0 for each in means), sum(each < 0.0 for each in means)),
+        *(known(mean - half), known(mean + half)),
+    )

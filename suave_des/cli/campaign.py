@@ -85,24 +85,19 @@ def campaign(
     override it. Finished missions are kept; after an interruption, --resume DIR runs those that are
     missing.
     """
-    if resume is not None:
+    if resume is None:
+        check_no_use({"--yes": yes}, "without --resume")
+        if scenario is None or "out" not in options:
+            missing = "SCENARIO" if scenario is None else "--out DIR"
+            raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
+    else:
         fixed = {name: value for name, value in options.items() if name not in _MAY_CHANGE}
+        own = {"SCENARIO": scenario, "--format": form, "--manager-option": manager_option}
         check_no_use(
-            {
-                "SCENARIO": scenario,
-                "--format": form,
-                "--manager-option": manager_option,
-                **flags(fixed),
-                **files.given,
-            },
+            {**own, **flags(fixed), **files.given},
             "with --resume: the settings of a campaign cannot be changed",
             "remove it, or start a new campaign in another folder",
         )
-    elif scenario is None or "out" not in options:
-        missing = "SCENARIO" if scenario is None else "--out DIR"
-        raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
-    else:
-        check_no_use({"--yes": yes}, "without --resume")
     from suave_des.campaign.campaign import resume_campaign, run_campaign
 
     with progress.shown(str(resume or scenario), quiet=quiet) as show:
@@ -119,21 +114,28 @@ def campaign(
             result = run_campaign(
                 scenario, settings_of=partial(manager_options, manager_option), **settings
             )
+    _print_result(result)
+    exit_telling_failures(result)
+
+
+def _print_result(result: CampaignResult) -> None:
+    """Print the summary of a campaign, how managers differ, and where its missions are."""
     console = output()
     print_table(console, _summary(result))
-    if (sharing := result.campaign.variation.runs_sharing_draw) > 1:
+    sharing = result.campaign.variation.runs_sharing_draw
+    if sharing > 1:
         console.print(
             f"{sharing} runs share each draw: intervals treat draws as independent, not runs"
         )
     if len(result.summary) > _ROWS_SHOWN:
         more = f"... and {len(result.summary) - _ROWS_SHOWN + 1} rows more"
         console.print(f"{more}, all in {result.folder}/summary.csv")
-    if found := result.differences():
+    found = result.differences()
+    if found:
         console.print()
         print_table(console, _differences(found, result.campaign.variation.sweep.parameters))
     kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
     console.print(f"{kept} in {result.folder}/runs.csv")
-    exit_telling_failures(result)
 
 
 def _summary(result: CampaignResult) -> Table:

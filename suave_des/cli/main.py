@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import errno
 import gc
 import os
 import signal
@@ -11,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
+from traceback import walk_tb
 from typing import Annotated, Any, ClassVar
 
 import typer
@@ -21,6 +21,7 @@ from suave_des.cli.console import plain
 from suave_des.cli.kb import commands as kb
 from suave_des.cli.options import CONTEXT, CommandsUnderHeadings, Headings, remember_command_line
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.files import NO_SPACE
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted
 
 BAD_INPUT, MISSIONS_MISSING = 2, 3
@@ -128,50 +129,69 @@ def main(arguments: Sequence[str] | None = None) -> None:
     abandoned = _abandoned()
     try:
         with signals_raised():
-            status = (
-                _command_line().main(arguments, prog_name="suave-des", standalone_mode=False) or 0
-            )
-            if sys.stdout is not None:
-                sys.stdout.flush()  # what cannot be written is reported here, not while Python ends
-            # typer's for any signal before the command began
-            if was_interrupted() and status == 128 + signal.SIGINT:
-                status = _report("interrupted", exit_status())
-    except _CommandInterruptedError as interruption:
-        status = _report(str(interruption), exit_status())
-    except SuaveDesError as error:
-        status = _report(
-            str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING
-        )
+            status = _run(arguments)
     except BaseException as error:
-        if was_interrupted():  # in the middle of an import, whose own error this may be
-            _leave(_report("interrupted", exit_status()), by_force=False)
-        if not isinstance(error, Exception):
-            raise
-        # stdout: files have own errors
-        if isinstance(error, OSError) and error.errno in (
-            errno.ENOSPC,
-            errno.EDQUOT,
-        ):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
-            _leave(
-                _report(f"the output cannot be written: {error.strerror}", BAD_INPUT),
-                by_force=False,
-            )
-        # A wrong option or argument: a class that is private to typer, and was click's in earlier
-        # versions of it.
-        if not hasattr(error, "format_message"):
-            raise
-        context: Any = getattr(error, "ctx", None)
-        path = "suave-des" if context is None else context.command_path
-        names = (
-            "several names have commas between them, without blanks; "
-            if "extra argument" in str(error)
-            else ""
+        status = _status_of(error)
+    if _abandoned() > abandoned:
+        _leave_by_force(status)
+    sys.exit(status)
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Run a command; return its exit status."""
+    line = _command_line()
+    status = line.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+    if sys.stdout is not None:
+        sys.stdout.flush()  # what cannot be written is reported here, not while Python ends
+    # typer's for any signal before the command began
+    if was_interrupted() and status == 128 + signal.SIGINT:
+        return _report("interrupted", exit_status())
+    return int(status)
+
+
+def _status_of(error: BaseException) -> int:
+    """Report an error that is meant for the user, and return the exit status; raise any other."""
+    if isinstance(error, _CommandInterruptedError):
+        return _report(str(error), exit_status())
+    if isinstance(error, InputError):
+        return _report(str(error), BAD_INPUT)
+    if isinstance(error, SuaveDesError):
+        return _report(str(error), MISSIONS_MISSING)
+    if was_interrupted():  # in the middle of an import, whose own error this may be
+        return _report("interrupted", exit_status())
+    # of standard output: files have errors of their own
+    if isinstance(error, OSError) and error.errno in NO_SPACE:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
+        return _report(f"the output cannot be written: {error.strerror}", BAD_INPUT)
+    settings = _unread_settings(error)
+    if settings is not None:
+        return _status_of(
+            InputError(f"cannot be read: {error}", file=settings, remedy="correct or remove it")
         )
-        status = _report(
-            f"{error.format_message().rstrip('.')} ({names}see {path} --help)", BAD_INPUT
-        )
-    _leave(status, by_force=_abandoned() > abandoned)
+    # A wrong option or argument: a class that is private to typer, and was click's in earlier
+    # versions of it.
+    if hasattr(error, "format_message"):
+        return _report(_usage_problem(error), BAD_INPUT)
+    raise error
+
+
+def _unread_settings(error: BaseException) -> str | None:
+    """Return the file of matplotlib's settings, such as ./matplotlibrc, that its import could not
+    read.
+    """
+    for frame, _ in walk_tb(error.__traceback__):
+        if frame.f_code.co_name == "_rc_params_in_file":
+            return str(frame.f_locals["fname"])
+    return None
+
+
+def _usage_problem(error: Any) -> str:
+    context = getattr(error, "ctx", None)
+    path = "suave-des" if context is None else context.command_path
+    advice = f"see {path} --help"
+    if "extra argument" in str(error):
+        advice = f"several names have commas between them, without blanks; {advice}"
+    return f"{error.format_message().rstrip('.')} ({advice})"
 
 
 def _abandoned() -> int:
@@ -180,12 +200,8 @@ def _abandoned() -> int:
     return 0 if limit is None else int(limit.times_abandoned())
 
 
-def _leave(status: int, *, by_force: bool) -> None:
-    """Exit with a status, even while an abandoned reasoner still runs in Java, which cannot be
-    stopped.
-    """
-    if by_force:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
-    sys.exit(status)
+def _leave_by_force(status: int) -> None:
+    """Exit while an abandoned reasoner still runs in Java, which cannot be stopped."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)

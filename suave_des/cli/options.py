@@ -188,13 +188,9 @@ def _types_in(annotation: Any) -> set[Any]:
 
 
 def _written(default: Any) -> str:
-    return (
-        ",".join(default)
-        if isinstance(default, tuple)
-        else str(default)
-        if _is_given(default)
-        else ""
-    )
+    if isinstance(default, tuple):
+        return ",".join(default)
+    return str(default) if _is_given(default) else ""
 
 
 def flags(given: Given) -> dict[str, Any]:
@@ -312,26 +308,29 @@ def manager_options(
     Raises:
         InputError: a word has another form, or is for no manager of these.
     """
-    from suave_des.registry import is_built_in
-
     settings: dict[str, dict[str, Any]] = {}
-    own = [name for name in managers if not is_built_in(name)]
     for word in words or ():
-        named = max(
-            (name for name in managers if word.startswith(f"{name}.")), key=len, default=None
-        )
+        named = max((name for name in managers if word.startswith(f"{name}.")), key=len, default="")
         key, value = key_and_value(word.removeprefix(f"{named}."), "--manager-option")
-        targets = [named] if named is not None else managers if len(managers) == 1 else own
-        if not targets or (named is None and ":" in key):
+        targets = [named] if named else _taking_options(key, managers)
+        if not targets:
             remedy = f"write MANAGER.KEY=VALUE, with one of {', '.join(managers) or '--managers'}"
-            raise InputError(
-                f"{shown(word)} is for none of the managers",
-                place="--manager-option",
-                remedy=remedy,
-            )
+            problem = f"{shown(word)} is for none of the managers"
+            raise InputError(problem, place="--manager-option", remedy=remedy)
         for target in targets:
             settings.setdefault(target, {})[key] = value
     return settings
+
+
+def _taking_options(key: str, managers: Sequence[str]) -> Sequence[str]:
+    """Return the managers that an option without a manager's name is for."""
+    from suave_des.registry import is_built_in
+
+    if ":" in key:  # another manager's name
+        return ()
+    if len(managers) == 1:
+        return managers
+    return [name for name in managers if not is_built_in(name)]
 
 
 _arguments: list[str] = []

@@ -98,31 +98,29 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
                 f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}"
             )
         self._weights = REWARD | dict(reward)
-        self._simulator = (
-            scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
-        )
-        self._period_s, self.render_mode = period_s, render_mode
-        loaded, duration_s = self._simulator.loaded, self._simulator.duration_s
+        if not isinstance(scenario, Simulator):
+            scenario = Simulator(load_scenario(scenario))
+        self._simulator = scenario
+        self._period_s = period_s
+        self.render_mode = render_mode
+        loaded = self._simulator.loaded
         self._limit_s = loaded.scenario.mission.time_limit_s
-        has_battery = loaded.scenario.battery is not None
-        self._attributes = (
-            *sorted(loaded.scenario.signals),
-            *((BATTERY_LEVEL,) if has_battery else ()),
-        )
+        self._attributes = sorted(loaded.scenario.signals)
+        functions = [*MISSION_FUNCTIONS]
+        if loaded.scenario.battery is not None:
+            self._attributes.append(BATTERY_LEVEL)
+            functions.append(GENERATE_RECHARGE_PATH)
         self.mode_names = {
             function: modes
             for function in loaded.modes.functions
-            if (
-                function in MISSION_FUNCTIONS
-                or (function == GENERATE_RECHARGE_PATH and has_battery)
-            )
+            if function in functions
             and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
         }
         entries = (
             *((name, *_bounds(loaded, name)) for name in self._attributes),
             *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
             ("distance_inspected_m", 0.0, 2.0 * sum(self._simulator.path[:, 2].tolist())),
-            ("time_share", 0.0, duration_s / self._limit_s),
+            ("time_share", 0.0, self._simulator.duration_s / self._limit_s),
             *((function, -1.0, len(modes) - 1.0) for function, modes in self.mode_names.items()),
         )
         self.observation_names, low, high = zip(*entries, strict=True)

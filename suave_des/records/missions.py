@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import pandas
@@ -19,6 +20,7 @@ from suave_des.records.runs import (
     REMEDY,
     SIZE_LIMIT_BYTES,
     TIME_LIMIT,
+    Content,
     check_one_mission,
     is_foreign,
     runs_in,
@@ -73,72 +75,89 @@ def read_missions(paths: Sequence[Path]) -> Missions:
             "no results are given",
             remedy="give the --out folders of suave-des campaign, or CSV files",
         )
-    resolved = [real(path) for path in paths]
-    for place, path in enumerate(paths):
-        if resolved[place] in resolved[:place]:
+    seen = set[Path]()
+    for path in paths:
+        if real(path) in seen:
             raise InputError("is given twice", file=path, remedy="name each folder of results once")
-    sources = [_read_source(path) for path in paths]
-    names = _short_names(paths)
-    frames = [each.frame.assign(source=name) for each, name in zip(sources, names, strict=True)]
-    swept = tuple(dict.fromkeys(name for source in sources for name in source.swept))
-    notes = tuple(note for source in sources for note in source.notes)
-    folders = {
-        name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()
-    }
-    return Missions(pandas.concat(frames, ignore_index=True), swept, notes, folders)
+        seen.add(real(path))
+    named = dict(zip(_short_names(paths), paths, strict=True))
+    sources = {name: _read_source(path) for name, path in named.items()}
+    frames = [each.frame.assign(source=name) for name, each in sources.items()]
+    return Missions(
+        pandas.concat(frames, ignore_index=True),
+        tuple(dict.fromkeys(chain.from_iterable(each.swept for each in sources.values()))),
+        tuple(chain.from_iterable(each.notes for each in sources.values())),
+        {name: path for name, path in named.items() if (path / STORE_FILE).is_file()},
+    )
 
 
 def _read_source(path: Path) -> Missions:
-    """Read the folder of a campaign, a folder of the exemplar's files, or a single file.
+    """Read the folder of a campaign, a folder of the exemplar's files, or a single file."""
+    if (path / RUNS_FILE).exists():
+        return _read_file(path / RUNS_FILE, is_of_folder=True)
+    if path.is_dir():
+        return _read_exemplars(path)
+    return _read_file(path)
 
-    Of the exemplar's folder, files that are no results, such as its statistics, are left out.
+
+def _read_file(file: Path, *, is_of_folder: bool = False) -> Missions:
+    """Read a file; `is_of_folder`: it stands for its folder, a campaign's."""
+    folder = file.parent
+    manifest = read_manifest(folder) if (folder / RUNS_FILE).exists() else Manifest()
+    read = _checked(file, read_csv(file, SIZE_LIMIT_BYTES, REMEDY), manifest)
+    is_ours = _is_simulated(read.frame)
+    frame = read.frame if is_ours else in_papers_order(read.frame)
+    notes = read.notes
+    if is_of_folder or (file.name == RUNS_FILE and manifest.missions is not None):
+        sharing = manifest.runs_per_draw if manifest.perturbations else 1
+        frame = frame.assign(**{SHARING: sharing})
+        notes += tuple(_unfinished(folder, manifest.missions))
+    elif is_ours:
+        frame = frame.assign(**{SHARING: _sharing_seen(frame, read.swept)})
+    return Missions(frame, read.swept, notes)
+
+
+def _read_exemplars(folder: Path) -> Missions:
+    """Read a folder of the exemplar's files; those that are no results, such as its statistics, are
+    left out.
     """
-    is_campaign, is_file = (path / RUNS_FILE).exists(), not path.is_dir()
-    is_exemplars = not (is_campaign or is_file)
-    folder = path.parent if is_file else path
-    is_ours = (folder / RUNS_FILE).exists()
-    manifest = read_manifest(folder) if is_ours else Manifest()
-    if is_file and path.name == RUNS_FILE and manifest.missions is not None:
-        is_campaign = True
-    if is_exemplars and (path / STORE_FILE).is_file():
-        remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
+    if (folder / STORE_FILE).is_file():
+        remedy = f"suave-des campaign --resume {folder} runs the rest and writes them"
         raise InputError(
-            "the campaign ended before its result files were written", file=path, remedy=remedy
+            "the campaign ended before its result files were written", file=folder, remedy=remedy
         )
-    files = [path]
-    if not is_file:
-        files = sorted(path.glob("*.csv")) if is_exemplars else [path / RUNS_FILE]
+    files = sorted(folder.glob("*.csv"))
     contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
     own = [file for file in files if not is_foreign(contents[file])] or files[:1]
     if not own:
         remedy = (
             "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
         )
-        raise InputError("has no result files", file=path, remedy=remedy)
+        raise InputError("has no result files", file=folder, remedy=remedy)
+    read = [_checked(file, contents[file], Manifest()) for file in own]
+    frame = pandas.concat([each.frame for each in read], ignore_index=True)
+    check_one_mission(frame, str(folder))
+    frame = in_papers_order(frame)
+    if _is_simulated(read[-1].frame):
+        frame = frame.assign(**{SHARING: _sharing_seen(frame, ())})
     notes = [
         f"{file} is left out: it has no columns of missions" for file in files if file not in own
     ]
-    frames = []
-    for file in own:
-        runs = runs_in(file, contents[file])
-        runs.check_simulated()
-        frame = runs.frame.reset_index(drop=True)
-        is_ours = bool(frame["scenario"].iloc[0])
-        swept = _swept(manifest, frame) if is_ours else ()
-        _check_once(frame, swept, file)
-        frames.append(frame)
-        notes += runs.notes
-    frame = pandas.concat(frames, ignore_index=True)
-    check_one_mission(frame, str(path))
-    if is_exemplars or not is_ours:
-        frame, swept = in_papers_order(frame), ()
-    if is_campaign:
-        sharing = manifest.runs_per_draw if manifest.perturbations else 1
-        frame = frame.assign(**{SHARING: sharing})
-        notes += _unfinished(folder, manifest.missions)
-    elif is_ours:
-        frame = frame.assign(**{SHARING: _sharing_seen(frame, swept)})
-    return Missions(frame, swept, tuple(notes))
+    return Missions(frame, (), (*notes, *chain.from_iterable(each.notes for each in read)))
+
+
+def _checked(file: Path, content: Content, manifest: Manifest) -> Missions:
+    """Take the missions from the content of a file."""
+    runs = runs_in(file, content)
+    runs.check_simulated()
+    frame = runs.frame.reset_index(drop=True)
+    swept = _swept(manifest, frame) if _is_simulated(frame) else ()
+    _check_once(frame, swept, file)
+    return Missions(frame, swept, runs.notes)
+
+
+def _is_simulated(frame: pandas.DataFrame) -> bool:
+    return bool(frame["scenario"].iloc[0])
 
 
 def _check_once(frame: pandas.DataFrame, swept: Sequence[str], file: Path | None = None) -> None:
@@ -168,25 +187,26 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
         raise InputError(
             "the data frame has no missions", remedy="one row for each mission is needed"
         )
-    plain = pandas.DataFrame(frame).reset_index(drop=True)
-    texts = ("scenario", "manager", "seed")
-    missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in plain}
-    plain = plain.assign(**missing, source="")
-    plain = plain.assign(**{name: plain[name].astype(str) for name in texts})
-    numbers = [
-        str(name) for name in plain if name == "run" or (name not in texts and metric_of(str(name)))
-    ]
-    try:
-        plain = plain.astype(dict.fromkeys(numbers, "Float64")).astype(
-            dict.fromkeys(numbers, float)
-        )
-    except (ValueError, TypeError) as error:
-        problem = f"the data frame's columns of metrics have something that is no number: {error}"
-        raise InputError(problem, remedy="it needs the columns of runs.csv") from None
+    plain = _as_read(pandas.DataFrame(frame).reset_index(drop=True))
     swept = _swept(Manifest(), plain)
     _check_once(plain, swept)
     sharing = frame.attrs.get(SHARING) or _sharing_seen(plain, swept)
     return Missions(plain.assign(**{SHARING: int(sharing)}), swept)
+
+
+def _as_read(frame: pandas.DataFrame) -> pandas.DataFrame:
+    """Give a frame the columns and types that one has which was read from a file."""
+    texts = ("scenario", "manager", "seed")
+    missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in frame}
+    frame = frame.assign(**missing, source="")
+    frame = frame.astype(dict.fromkeys(texts, str))
+    metrics = [str(name) for name in frame if metric_of(str(name)) is not None]
+    numbers = {*metrics, "run"} - {*texts}
+    try:
+        return frame.astype(dict.fromkeys(numbers, "Float64")).astype(dict.fromkeys(numbers, float))
+    except (ValueError, TypeError) as error:
+        problem = f"the data frame's columns of metrics have something that is no number: {error}"
+        raise InputError(problem, remedy="it needs the columns of runs.csv") from None
 
 
 def in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:

@@ -159,11 +159,8 @@ class Runs:
         for manager in wanted:
             if manager not in self.managers:
                 remedy = f"{did_you_mean(manager, self.managers, 'its managers')}; choose with --managers"
-                problem, files = (
-                    f"has no mission of manager {manager!r}",
-                    ", ".join(map(str, self.files)),
-                )
-                raise InputError(problem, file=files, remedy=remedy)
+                problem = f"has no mission of manager {manager!r}"
+                raise InputError(problem, file=", ".join(map(str, self.files)), remedy=remedy)
         return tuple(dict.fromkeys(wanted)) or self.managers
 
     def check_simulated(self) -> None:
@@ -217,14 +214,7 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
 def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     """Take the missions from the content of a file; see read_runs."""
     header, numbered, digest = content
-    for column in filter(None, header):
-        if header.count(column) > 1:
-            raise line_error(path, 1, f"has column {shown(column)} twice", "name each column once")
-    layout = max(_LAYOUTS, key=lambda layout: sum(layout[name] in header for name in _NEEDED))
-    for column in (wanted := (*(layout[name] for name in _NEEDED), *needed)):
-        if column not in header:
-            remedy = f"the columns {', '.join(wanted)} are needed, separated by commas"
-            raise line_error(path, 1, f"has no column {column!r}", remedy)
+    layout = _layout_of(path, header, needed)
     rows, lines, averages = [], [], []
     for line, row in numbered:
         if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
@@ -233,20 +223,35 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
         elif layout[DISTANCE] not in row:
             if len(row) != len(header):
                 problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
-                raise line_error(
-                    path, line, problem, "give each column a value, if only an empty one"
-                )
+                remedy = "give each column a value, if only an empty one"
+                raise line_error(path, line, problem, remedy)
             rows.append(row)
             lines.append(line)
     if not rows:
         raise line_error(path, 1, "has no missions under its header", REMEDY)
-    text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str).apply(
-        lambda column: column.str.strip()
-    )
-    left_out = f"{path}: line{'s' * (len(averages) > 1)} {', '.join(averages)} left out: averages, not missions"
-    return Runs(
-        {path: digest}, _Cells(path, text, layout).missions(), (left_out,) if averages else ()
-    )
+    text = pandas.DataFrame(rows, columns=header, index=lines, dtype=str)
+    text = text.apply(lambda column: column.str.strip())
+    notes = []
+    if averages:
+        which = "line" if len(averages) == 1 else "lines"
+        notes = [f"{path}: {which} {', '.join(averages)} left out: averages, not missions"]
+    return Runs({path: digest}, _Cells(path, text, layout).missions(), tuple(notes))
+
+
+def _layout_of(path: Path, header: Sequence[str], needed: Sequence[str]) -> Mapping[str, str]:
+    """Return the names of the columns in the kind of file that a header is of; check that it has
+    those that are needed.
+    """
+    for column in filter(None, header):
+        if header.count(column) > 1:
+            raise line_error(path, 1, f"has column {shown(column)} twice", "name each column once")
+    layout = max(_LAYOUTS, key=lambda layout: sum(layout[name] in header for name in _NEEDED))
+    wanted = (*(layout[name] for name in _NEEDED), *needed)
+    for column in wanted:
+        if column not in header:
+            remedy = f"the columns {', '.join(wanted)} are needed, separated by commas"
+            raise line_error(path, 1, f"has no column {column!r}", remedy)
+    return layout
 
 
 def is_foreign(content: Content) -> bool:
@@ -261,54 +266,57 @@ class _Cells:
         ours = {column: name for name, column in layout.items()}
         if "detection_x_m" not in text:
             ours[_INFERRED_PLACE] = "detection_x_m"
-        self.path, self.layout, self.text = path, layout, text.rename(columns=ours)
+        self.path = path
+        self._is_own = layout is _OWN
+        self.text = text.rename(columns=ours)
         self.names = {name: column for column, name in ours.items()}
 
     def missions(self) -> pandas.DataFrame:
         """Check and convert the cells; a frame with COLUMNS and the further ones. Errors name the
         line.
         """
-        is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
-        managers = [str(name) for name in self.text["manager"].unique()]
         names = self.text["manager"]
-        are_names = {name: bool(name.strip()) for name in managers}  # one of exec: has spaces
-        self._check("manager", self.text["manager"].map(are_names), "a manager's name")
-        if not is_own:
-            self._split_names(managers)
-        search_time_s = self._numbers(SEARCH_TIME)
+        self._check("manager", names != "", "a manager's name")
+        if not self._is_own:
+            self._split_names([str(name) for name in names.unique()])
         limit_s = self._numbers(_LIMIT, least=0.0) if _LIMIT in self.text else None
-        if limit_s is not None and not is_own:
-            search_time_s = np.where(search_time_s == -1.0, limit_s, search_time_s)
-        self._check(SEARCH_TIME, search_time_s >= 0.0, "a finite number, at least 0")
-        found: Any = math.nan
-        if FOUND in self.text:
-            words = self.text[FOUND].str.lower()
-            self._check(FOUND, words.isin(("true", "false")), "True or False")
-            found = (words == "true").to_numpy(float)
-        elif limit_s is not None:
-            found = (search_time_s < limit_s).astype(float)
-        values: dict[str, Any] = {
-            name: "" if name in ("scenario", "seed") else math.nan for name in COLUMNS
-        }
-        values |= {
-            name: self._converted(name) for name in map(str, self.text) if name not in ("", FOUND)
-        }
-        values |= {
-            SEARCH_TIME: search_time_s,
-            DISTANCE: self._numbers(DISTANCE, least=0.0),
-            FOUND: found,
-        }
+        search_time_s = self._search_times_s(limit_s)
+        values: dict[str, Any] = dict.fromkeys(COLUMNS, math.nan) | {"scenario": "", "seed": ""}
+        further = [name for name in map(str, self.text) if name not in ("", FOUND)]
+        values |= {name: self._converted(name) for name in further}
+        values[SEARCH_TIME] = search_time_s
+        values[DISTANCE] = self._numbers(DISTANCE, least=0.0)
+        values[FOUND] = self._found(search_time_s, limit_s)
         if limit_s is not None:
             values[_LIMIT] = limit_s
-        if _RUN_INDEX in self.text and not is_own:
+        if _RUN_INDEX in self.text and not self._is_own:
             numbers = self._numbers(_RUN_INDEX, is_whole=True)
             if not pandas.DataFrame({"name": names, "run": numbers}).duplicated().any():
                 # The missions of one name and number have the same draws, whoever manages them.
                 values |= {"run": numbers, "seed": names.str.rpartition(" ")[0]}
         frame = pandas.DataFrame(values, index=self.text.index)
-        if not is_campaigns:  # the exemplar writes 0.0 for none, a campaign nothing
+        if "scenario" not in self.text:  # the exemplar writes 0.0 for none, a campaign nothing
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)
         return frame
+
+    def _search_times_s(self, limit_s: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        times_s = self._numbers(SEARCH_TIME)
+        if limit_s is not None and not self._is_own:
+            times_s = np.where(times_s == -1.0, limit_s, times_s)
+        self._check(SEARCH_TIME, times_s >= 0.0, "a finite number, at least 0")
+        return times_s
+
+    def _found(
+        self, search_time_s: NDArray[np.float64], limit_s: NDArray[np.float64] | None
+    ) -> NDArray[np.float64] | float:
+        """Return whether the pipeline was found: as the file says, or its time limits."""
+        if FOUND in self.text:
+            words = self.text[FOUND].str.lower()
+            self._check(FOUND, words.isin(("true", "false")), "True or False")
+            return np.asarray(words == "true", dtype=float)
+        if limit_s is not None:
+            return np.asarray(search_time_s < limit_s, dtype=float)
+        return math.nan
 
     def _split_names(self, names: Sequence[str]) -> None:
         """Take the exemplar's names of missions apart: manager, mission, and where it began."""
@@ -352,10 +360,9 @@ class _Cells:
             is_right &= numbers == np.round(numbers)
         if may_be_empty:
             is_right |= (self.text[name] == "").to_numpy()
+        kind = "a whole number" if is_whole else "a finite number"
         ends = f"at least {least:g} and at most" if least > -math.inf else "at most"
-        self._check(
-            name, is_right, f"{'a whole' if is_whole else 'a finite'} number, {ends} {_GREATEST:g}"
-        )
+        self._check(name, is_right, f"{kind}, {ends} {_GREATEST:g}")
         return numbers
 
     def _check(self, name: str, is_right: Iterable[bool], wanted: str) -> None:

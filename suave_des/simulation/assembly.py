@@ -41,11 +41,11 @@ from suave_des.monitor.monitors import (
     start_monitors,
 )
 from suave_des.monitor.thrusters import Thrusters, draw_schedule, thruster_monitor
-from suave_des.registry import cause_of
 from suave_des.scenario.models import Scenario
 from suave_des.simulation.calls import RAISED
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.prepared import PreparedScenario, draw_start
+from suave_des.tracebacks import cause_of
 from suave_des.vehicle.model import Pose
 from suave_des.vehicle.vehicle import Point, Vehicle
 

@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 
 from suave_des.domain import Task
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
+from suave_des.hooks import dependencies_of, measured_somewhere, names_in, times_of
 from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.registry import dependencies_of, measured_somewhere, names_in, times_of
 from suave_des.simulation.calls import RAISED, Adaptation, CallTimes
 
 _T = TypeVar("_T")

@@ -2,6 +2,7 @@
 while it runs.
 """
 
+import errno
 import io
 import json
 import math
@@ -23,6 +24,7 @@ from suave_des.campaign.progress import Progress
 from suave_des.campaign.workers import LocalWorkers
 from suave_des.draws import Streams
 from suave_des.errors import InputError
+from suave_des.files import write_files
 from suave_des.knowledge import pellet
 from suave_des.records.store import MissionKey
 from suave_des.simulation.simulator import Simulator
@@ -435,3 +437,13 @@ def test_workers_are_given_the_time_in_which_the_campaign_was_stopped(monkeypatc
     worker = workers._Worker(process=None, connection=None, due_s=180.0)  # type: ignore[arg-type]
     assert workers._ready([worker]) == []
     assert (worker.is_overdue, worker.due_s) == (False, 180.0 + 600.0 - workers._LOOK_S)
+
+
+def test_a_full_disk_is_no_question_of_whose_folder_it_is(tmp_path, monkeypatch):
+    def is_full(path: Path, target: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", is_full)
+    with pytest.raises(InputError, match="No space left on device") as caught:
+        write_files(tmp_path, {"runs.csv": "a"})
+    assert caught.value.remedy == "make room there, or give a folder on another disk"

@@ -10,7 +10,7 @@ import pytest
 
 from suave_des import InputError, NoManager, Simulator, load_scenario, run_campaign, run_mission
 from suave_des.campaign.campaign import train
-from suave_des.learned import Learned
+from suave_des.learned import Learned, read_file
 from tests.helpers import AWKWARD, OUTSIDE
 from tests.helpers.command import command_here, suave_des_command
 
@@ -263,3 +263,12 @@ def test_the_example_learns_a_policy_that_beats_bt_on_missions_that_it_has_not_s
     ).confidence_interval
     print(f"{gain_s.mean():.1f} s sooner, 95% interval {interval.low:.1f} to {interval.high:.1f}")
     assert interval.low > 10.0
+
+
+@pytest.mark.parametrize("change", [{"missions": "x"}, {"missions": 0}, {"seed": 1.5}])
+def test_a_training_result_with_a_value_of_another_type_is_refused(change, tmp_path):
+    result = Learned("mine:M", "seams2023", 0, 3, {}, {"q": 1.0})
+    path = tmp_path / "policy.json"
+    path.write_text(json.dumps({**json.loads(result.text()), **change}))
+    with pytest.raises(InputError, match="is not a file that suave-des train has written"):
+        read_file(path)

@@ -16,7 +16,7 @@ STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALS
 
 @pytest.fixture(autouse=True)
 def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.campaign.inputs._told", set())
+    monkeypatch.setattr("suave_des.simulation.inputs._told", set())
 
 
 @pytest.fixture

@@ -422,3 +422,10 @@ def test_what_the_process_was_started_to_ignore_does_not_end_a_query():
     )
     ended = python("-c", code)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done\n", "")
+
+
+def test_settings_of_matplotlib_that_are_no_utf_8_are_named(tmp_path):
+    (tmp_path / "matplotlibrc").write_bytes(b"axes.grid: \xff\n")
+    done = command_here("figure", "out", "--out", "a.png", cwd=tmp_path)
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert "suave-des: matplotlibrc: cannot be read: 'utf-8' codec" in done.stderr

@@ -12,6 +12,7 @@ import pytest
 
 from suave_des import InputError, Mission, Simulator, load_scenario, run_campaign, run_mission
 from suave_des.campaign import campaign
+from suave_des.errors import MissionError
 from suave_des.interfaces import exec as programs
 from tests.helpers.command import EXAMPLES, example_program, stopped_for, wait_until
 
@@ -293,3 +294,9 @@ program.end()
 """,
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_period_that_would_stop_the_clock_is_refused():
+    answer = "answer = {'period_s': 1e-12} if message['type'] == 'mission_started' else {}"
+    with pytest.raises(MissionError, match=r"period_s is 1e-12, .* at least 0\.001 and 0"):
+        run_mission("seams2023", program(f"{answer}\nprint(json.dumps(answer), flush=True)"))

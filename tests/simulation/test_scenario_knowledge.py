@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.inputs import check_inputs
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base, open_knowledge, read_base
+from suave_des.simulation.inputs import check_inputs
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
