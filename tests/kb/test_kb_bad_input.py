@@ -8,7 +8,8 @@ from typing import get_type_hints
 
 import pytest
 
-from suave_des.kb.states import ManagingSettings, StateBuilder
+from suave_des.errors import InputError
+from suave_des.kb.states import ManagingSettings, StateBuilder, recorded_state
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord, MissionMetrics
@@ -225,3 +226,9 @@ def test_a_rule_that_reads_any_status_makes_every_status_one_to_give(tmp_path):
     builder = StateBuilder(Ontology.load(rules=[rules]), ManagingSettings())
     builder.add_words(["c_thruster_1=HOT"])
     assert builder.state().components == (("c_thruster_1", "HOT"),)
+
+
+def test_a_state_is_there_from_the_very_time_of_its_record(folder):
+    assert recorded_state(folder / "flown", "1").grounded(SEARCH) == "fd_spiral_low"
+    with pytest.raises(InputError, match=r"has no state until 0\.999 s"):
+        recorded_state(folder / "flown", "0.999")
