@@ -8,6 +8,9 @@ from typing import get_type_hints
 
 import pytest
 
+from suave_des.errors import InputError
+from suave_des.kb.states import ManagingSettings, StateBuilder, recorded_state
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord, MissionMetrics
 from suave_des.records.mission_folder import KNOWLEDGE_FILE, knowledge_text
@@ -214,3 +217,18 @@ def test_rules_that_contradict_each_other_are_named(folder, command):
     assert status == 1
     # what follows from them may clash, too
     assert "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text
+
+
+def test_a_rule_that_reads_any_status_makes_every_status_one_to_give(tmp_path):
+    """Though other rules ask for those that they name."""
+    rules = tmp_path / "own.swrl"
+    rules.write_text("R: c_status(?c, ?s) -> Role(?c)\n")
+    builder = StateBuilder(Ontology.load(rules=[rules]), ManagingSettings())
+    builder.add_words(["c_thruster_1=HOT"])
+    assert builder.state().components == (("c_thruster_1", "HOT"),)
+
+
+def test_a_state_is_there_from_the_very_time_of_its_record(folder):
+    assert recorded_state(folder / "flown", "1").grounded(SEARCH) == "fd_spiral_low"
+    with pytest.raises(InputError, match=r"has no state until 0\.999 s"):
+        recorded_state(folder / "flown", "0.999")

@@ -185,3 +185,12 @@ def test_missions_are_counted_once_however_often_something_happens_in_them():
     ]
     (last,) = (line for line in summary(missions) if "missions:" in line)
     assert "different decisions in 1 (3 decisions)" in last
+
+
+def test_of_several_missions_those_in_which_something_happens_are_told():
+    missions = [
+        MissionReplay(Path("flown"), "one", 9, ((1.0, FIRES, "Role(x)"),)),
+        MissionReplay(Path("flown"), "two", 9, ()),
+    ]
+    found = [line for line in summary(missions) if line.startswith("flown: ")]
+    assert found == ["flown: one: fires in 1 of 9 recorded states"]

@@ -252,3 +252,20 @@ def test_links_and_permissions_stay(owl):
     assert link.is_symlink()
     assert stat.S_IMODE(owl.stat().st_mode) == 0o640
     assert {name for name, _, enabled in said(owl) if not enabled} == {"QAWaterVisibility"}
+
+
+def test_a_rule_that_shares_its_line_leaves_the_rest_of_the_line(owl):
+    head, end, tail = owl.read_bytes().partition(b"</rdf:RDF>")
+    add_rules(owl, BATTERY)
+    rule = owl.read_bytes().removeprefix(head).removesuffix(end + tail).strip()
+    owl.write_bytes(head.rstrip() + rule + b"\n" + end + tail)
+    remove_rule(owl, "Battery")
+    assert owl.read_bytes() == head.rstrip() + b"\n" + end + tail
+
+
+def test_of_rules_that_share_a_name_all_are_switched_if_one_is_otherwise(owl, tmp_path):
+    rules = tmp_path / "mine.swrl"
+    rules.write_text("disabled Same: Objective(?o) -> Role(?o)\nSame: Role(?o) -> Objective(?o)\n")
+    add_rules(owl, str(rules))
+    assert set_enabled(owl, "Same", enabled=True)
+    assert [enabled for name, _, enabled in said(owl) if name == "Same"] == [True, True]

@@ -6,6 +6,7 @@ import pytest
 
 from suave_des.errors import KnowledgeError, Level
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Names, value_of
 from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.checks import found_by_pellet
 from tests.helpers.knowledge_states import SEARCH, searching
@@ -44,6 +45,30 @@ def test_a_grounding_counts_under_any_name(suave_copy):
     base = Ontology.load([path])
     inference = Reasoner(base, "pellet").analyze(searching("fd_spiral_high", 1.3))
     assert inference.grounding_status(SEARCH) == "IN_ERROR_NFR"
+
+
+def test_of_several_objectives_of_a_function_that_of_the_usual_name_counts(suave_copy):
+    objectives = (
+        individual(name, "Objective", ("typeF", f":{SEARCH}"))
+        for name in ("find_it", "o_generate_search_path")
+    )
+    assert (
+        Ontology.load([suave_copy("".join(objectives))]).objectives[SEARCH]
+        == "o_generate_search_path"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("true", True), ("1", True), (" 1\n", True), ("false", False), ("0", False)]
+)
+def test_a_truth_value_is_read_in_each_form_that_xml_schema_has(text, value):
+    assert value_of(Lit(text, XSD + "boolean"), Names(())) is value
+
+
+def test_a_name_that_two_things_share_is_written_in_full():
+    one, other, alone = "http://a.org/#thing", "http://b.org/#thing", "http://a.org/#alone"
+    names = Names((each, RDF_TYPE, "http://a.org/#Thing") for each in (one, other, alone))
+    assert [names.short(each) for each in (one, other, alone)] == [one, other, "alone"]
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,14 @@ import tempfile
 from decimal import Decimal
 
 import pytest
+from rdflib import Graph, URIRef
+from rdflib.namespace import OWL, RDFS
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import in_process as java
 from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.pellet.stock import _below
 from suave_des.knowledge.reasoner import BACKENDS, Reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState, exact
 from tests.helpers.command import python
@@ -163,3 +166,13 @@ def test_importing_the_room_starts_and_loads_nothing():
         "print(jpype.isJVMStarted())"
     )
     assert python("-c", code).stdout.strip() == "False"
+
+
+def test_members_of_a_class_are_those_of_what_is_below_it_or_the_same_whichever_names_the_other():
+    whole, one, other, part = map(URIRef, ("x:whole", "x:one", "x:other", "x:part"))
+    graph = Graph()
+    graph.add((one, OWL.equivalentClass, whole))
+    graph.add((whole, OWL.equivalentClass, other))
+    graph.add((part, RDFS.subClassOf, other))
+    assert _below(graph, "x:whole") == {whole, one, other, part}
+    assert _below(graph, "x:part") == {part}

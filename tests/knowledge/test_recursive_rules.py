@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology import Content, Ontology
 from suave_des.knowledge.pellet import TimeLimit
+from suave_des.knowledge.rdf import OWL, RDF_TYPE, Triple
 from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.rules import Atom, Rule, Variable
 from suave_des.knowledge.state import KnowledgeState
 
 NS = "http://example.org/recursive#"
@@ -196,3 +198,17 @@ def test_rules_that_need_one_pass_get_one(kb, tmp_path):
     assert written(tmp_path, EIGHT, [], rules).content.given_back == ()
     axioms: list[Fact] = [("TransitiveProperty", "r", ""), ("rdfs:subPropertyOf", "r", "p")]
     assert written(tmp_path, EIGHT, axioms, rules).content.given_back == (NS + "p",)
+
+
+@pytest.mark.parametrize("axiom", ["inverseOf", "equivalentProperty"])
+@pytest.mark.parametrize(("one", "other"), [("joined", "asked"), ("asked", "joined")])
+def test_what_a_transitive_property_joins_is_given_back_whichever_side_names_the_other(
+    axiom, one, other
+):
+    triples: tuple[Triple, ...] = (
+        (f"{NS}joined", RDF_TYPE, f"{OWL}TransitiveProperty"),
+        (NS + one, OWL + axiom, NS + other),
+    )
+    x, y = Variable("x"), Variable("y")
+    rule = Rule("R", (Atom("object", f"{NS}asked", (x, y)),), (Atom("class", f"{NS}A", (x,)),))
+    assert Content(triples, (), (rule,)).given_back == (f"{NS}asked",)

@@ -19,6 +19,7 @@ from suave_des.knowledge.rules import (
     Place,
     Rule,
     Variable,
+    computed,
     full_name,
     naming,
     write_rule,
@@ -409,3 +410,18 @@ def test_a_rule_that_asks_for_what_is_the_same_binds_both(suave_copy, tmp_path):
     base = Ontology.load([suave_copy(same)], rules=[tmp_path / "mine.swrl"])
     found = set(map(str, Reasoner(base, "pellet").analyze(KnowledgeState()).facts))
     assert "hasNFR(c_thruster_1, c_thruster_2)" in found
+
+
+def test_a_whole_number_may_be_concluded_where_decimals_are_wanted():
+    """As it is one (XML Schema, part 2)."""
+    vocabulary = Ontology.load().vocabulary
+    rule = looked_up(parse_rule("A: QAvalue(?q) -> hasValue(?q, 2)"), vocabulary)
+    assert fatal_problems(rule, vocabulary) == []
+
+
+@pytest.mark.parametrize(
+    ("year", "found"), [(Variable("y"), {"d"}), (Lit("2020", XSD + "integer"), set())]
+)
+def test_pellet_computes_a_date_from_variables_only(year, found):
+    date = Atom("builtin", SWRLB + "date", (Variable("d"), year, Variable("m"), Variable("n")))
+    assert computed(date, {"y", "m", "n"}) == found
