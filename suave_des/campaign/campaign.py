@@ -21,7 +21,6 @@ from suave_des.campaign.missions import (
     MissionRunner,
     Remark,
     WorkerError,
-    alarms_heard,
 )
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
@@ -388,19 +387,18 @@ def _work(
                 done += 1
                 failed += isinstance(each, MissionFailure)
         if left := campaign.planned - done:
-            with alarms_heard():
-                for among in executor(campaign, campaign.missions(store.settled), left):
-                    finished = []
-                    for key, each in among:
-                        if isinstance(each, Remark):
-                            remarks.add(each)
-                        else:
-                            finished.append((key, each))
-                            failed += isinstance(each, MissionFailure)
-                    store.append(finished)
-                    done += len(finished)
-                    if on_progress is not None:
-                        on_progress(Progress(done, failed, campaign.planned))
+            for among in executor(campaign, campaign.missions(store.settled), left):
+                finished = []
+                for key, each in among:
+                    if isinstance(each, Remark):
+                        remarks.add(each)
+                    else:
+                        finished.append((key, each))
+                        failed += isinstance(each, MissionFailure)
+                store.append(finished)
+                done += len(finished)
+                if on_progress is not None:
+                    on_progress(Progress(done, failed, campaign.planned))
         store.commit()
     except (KeyboardInterrupt, SuaveDesError) as error:
         stopped = error

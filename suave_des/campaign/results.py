@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
-from suave_des.files import Content, csv_text
+from suave_des.files import Content, csv_pieces, csv_text
 from suave_des.records import store
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
@@ -150,7 +150,7 @@ class CampaignResult:
         about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
         columns = (*SUMMARY_COLUMNS, *sweep.parameters)
         files: dict[str, Content] = {
-            store.RUNS_FILE: store.runs_pieces(self.columns, self.stream()),
+            store.RUNS_FILE: csv_pieces(self.columns, self.stream()),
             store.SUMMARY_FILE: csv_text(columns, [(*row.values(),) for row in self.summary]),
         }
         if self.campaign.variation.ensemble is not None:

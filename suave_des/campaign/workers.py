@@ -28,7 +28,6 @@ from suave_des.campaign.missions import (
     MissionRunner,
     Remark,
     WorkerError,
-    alarms_heard,
     reasoner_is_stuck,
 )
 from suave_des.errors import SuaveDesError
@@ -377,7 +376,7 @@ def work(connection: Connection[Any, Any]) -> None:
     import suave_des.simulation.simulator  # noqa: F401 - all that missions need, before the campaign arrives
 
     ends = suppress(EOFError, BrokenPipeError, ConnectionResetError)
-    with alarms_heard(), ends:  # the campaign is over, or its process has ended
+    with ends:  # the campaign is over, or its process has ended
         runner = None
         while True:
             message = connection.recv()

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
-from suave_des.files import csv_pieces, read_csv
+from suave_des.files import csv_pieces, read_csv, rounded
 from suave_des.records.metrics import (
     COLUMN_TYPES,
     DISTANCE,
@@ -465,6 +465,6 @@ def suave_pieces(
         mission["position"] = str(
             (round(mission["initial_x_m"], 2), round(mission["initial_y_m"], 2))
         )
-        return [make(mission) for _, make in layout.values()]
+        return [rounded(make(mission)) for _, make in layout.values()]
 
     return csv_pieces(tuple(layout), (cells(number, row) for number, row in rows))

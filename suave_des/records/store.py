@@ -13,7 +13,7 @@ import os
 import sqlite3
 import time
 import zlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +26,6 @@ from suave_des.files import (
     Content,
     Listing,
     check_own,
-    csv_pieces,
     json_text,
     make_output_folder,
     own_files,
@@ -35,7 +34,7 @@ from suave_des.files import (
 )
 from suave_des.interrupts import Stopped, is_stopping
 from suave_des.records import contents
-from suave_des.records.metrics import COLUMNS, Row
+from suave_des.records.metrics import Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 
 STORE_FILE = "campaign.sqlite"
@@ -542,22 +541,6 @@ def is_left_over(name: str) -> bool:
     start.
     """
     return name.startswith(STORE_FILE)
-
-
-def runs_pieces(columns: Sequence[str], rows: Iterable[Row]) -> Iterator[str]:
-    """Yield the content of runs.csv, piece by piece.
-
-    Metrics are rounded; what varies has all its digits, so that it can be given again.
-    """
-    metrics = len(COLUMNS)
-
-    def exact(row: Row) -> Row:
-        return (
-            *row[:metrics],
-            *(repr(cell) if isinstance(cell, float) else cell for cell in row[metrics:]),
-        )
-
-    return csv_pieces(columns, map(exact, rows))
 
 
 def read_manifest(folder: Path) -> contents.Manifest:
