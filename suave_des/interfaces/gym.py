@@ -106,16 +106,9 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         loaded = self._simulator.loaded
         self._limit_s = loaded.scenario.mission.time_limit_s
         self._attributes = sorted(loaded.scenario.signals)
-        functions = [*MISSION_FUNCTIONS]
         if loaded.scenario.battery is not None:
             self._attributes.append(BATTERY_LEVEL)
-            functions.append(GENERATE_RECHARGE_PATH)
-        self.mode_names = {
-            function: modes
-            for function in loaded.modes.functions
-            if function in functions
-            and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
-        }
+        self.mode_names = _choices(loaded)
         entries = (
             *((name, *_bounds(loaded, name)) for name in self._attributes),
             *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
@@ -253,6 +246,16 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             "task": self._task.name if self._task else "",
         }
         return now | ({"metrics": mission.metrics()} if mission.is_over else {})
+
+
+def _choices(loaded: LoadedScenario) -> dict[str, tuple[str, ...]]:
+    """Return the modes of each function that has a choice."""
+    functions = [*MISSION_FUNCTIONS]
+    if loaded.scenario.battery is not None:
+        functions.append(GENERATE_RECHARGE_PATH)
+    own = [function for function in loaded.modes.functions if function in functions]
+    modes = {function: grounding_modes(loaded.modes.modes(function)) for function in own}
+    return {function: known for function, known in modes.items() if len(known) > 1}
 
 
 def _bounds(loaded: LoadedScenario, attribute: str) -> tuple[float, float]:

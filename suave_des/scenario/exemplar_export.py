@@ -299,21 +299,18 @@ def _differences(
 ) -> Iterator[str]:
     """Yield a line for each key of which the exemplar has another value."""
     for key in dict.fromkeys((*here, *there)):
-        one, other = _rounded(here.get(key)), _rounded(there.get(key))
+        one = _rounded(here.get(key))
+        other = _rounded(there.get(key))
         if one == other or (not above and key in _NOT_COMPARED):
             continue
         if key == "revision" and one["name"] != other["name"]:
             yield f"revision: {one['name']} here; the code that reads the files is {other['name']}'s"
-        elif (
-            isinstance(one, dict)
-            and isinstance(other, dict)
-            and one.get("kind") == other.get("kind")
-        ):
-            yield from _differences(one, other, f"{above}{key}.")
-        elif isinstance(one, dict) and isinstance(other, dict):
-            yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
-        else:
+        elif not isinstance(one, dict) or not isinstance(other, dict):
             yield f"{above}{key}: {shown(one)} here, {shown(other)} in the exemplar"
+        elif one.get("kind") == other.get("kind"):
+            yield from _differences(one, other, f"{above}{key}.")
+        else:
+            yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
 
 
 def _rounded(value: Any) -> Any:
