@@ -320,7 +320,8 @@ def _with_what_is_kept(stopped: StoreError, checked: _Checked) -> StoreError:
 
 def _result(checked: _Checked, store: Store, remarks: Sequence[Remark]) -> CampaignResult:
     """Gather the result of a campaign, and write its files."""
-    campaign, folder = checked.campaign, checked.folder
+    campaign = checked.campaign
+    folder = checked.folder
     how = f"nothing is lost: {checked.resuming_command} writes the files"
     try:
         with store.reading():
@@ -446,9 +447,7 @@ def train(
         MissionError: the manager raised; nothing is written then.
     """
     # with the compiler, which campaigns load in their workers
-    from suave_des.simulation.simulator import (
-        Simulator,
-    )
+    from suave_des.simulation.simulator import Simulator
 
     files.check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)

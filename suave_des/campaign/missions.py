@@ -201,7 +201,8 @@ class MissionRunner:
     """Runs missions of one campaign in this process."""
 
     def __init__(self, campaign: Campaign) -> None:
-        self.campaign, self._variation = campaign, campaign.variation
+        self.campaign = campaign
+        self._variation = campaign.variation
         # Load or compile what missions run, before the first one's time counts: a mission of a
         # second does.
         short_mission(campaign.loaded)
@@ -210,7 +211,8 @@ class MissionRunner:
         self._values = lru_cache(1)(self._variation.sweep.values)
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
         self._number = Counter[int]()
-        self._too_long, self._in_time = Counter[int](), set[int]()
+        self._too_long = Counter[int]()
+        self._in_time = set[int]()
 
     def run(self, manager: str, run: int, point: int = 0) -> tuple[MissionResult, LoadedScenario]:
         """Run a mission of the campaign again, with its record; return its result and scenario.
@@ -274,7 +276,8 @@ class MissionRunner:
 
     def _outcome(self, key: MissionKey) -> tuple[Row | MissionFailure, list[Remark]]:
         """Run a mission; return its outcome, and what its manager's author should know."""
-        spec, manager = self.campaign.spec, self.campaign.spec.managers[key.manager]
+        spec = self.campaign.spec
+        manager = self.campaign.spec.managers[key.manager]
         member = self._variation.member(key.run)
         simulator = self._simulator(key.point, member)
         began_s = time.process_time()
@@ -300,7 +303,8 @@ class MissionRunner:
 
     def _row(self, key: MissionKey, member: int | None, result: MissionResult) -> Row:
         """Make the row of a mission: of runs.csv, and its knowledge states if they are recorded."""
-        spec, variation = self.campaign.spec, self._variation
+        spec = self.campaign.spec
+        variation = self._variation
         values = self._values(key.point)
         row = (
             *row_of(result.metrics),

@@ -109,7 +109,8 @@ def print_timeline(console: Console, result: MissionResult) -> None:
         console.print(f"{event.t_s:8.2f}  {source:<{sources}}  {name:<{names}}  {detail}")
     console.print()
     rows = list(_metrics_rows(metrics, result.further))
-    names, values = (max(len(row[column]) for row in rows) for column in (0, 1))
+    names = max(len(name) for name, _, _ in rows)
+    values = max(len(value) for _, value, _ in rows)
     for name, value, remark in rows:
         console.print(f"{name:<{names}}  {value:>{values}}  {remark}".rstrip())
 

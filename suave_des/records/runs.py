@@ -215,7 +215,9 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     """Take the missions from the content of a file; see read_runs."""
     header, numbered, digest = content
     layout = _layout_of(path, header, needed)
-    rows, lines, averages = [], [], []
+    rows = []
+    lines = []
+    averages = []
     for line, row in numbered:
         if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
             averages.append(str(line))

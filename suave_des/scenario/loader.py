@@ -122,7 +122,8 @@ def load_scenario(
             )
             raise InputError(problem, remedy=f"give {given[0]} to load_scenario")
         return name
-    reasoner, modes_file = replacements.get("reasoner"), replacements.get("modes_file")
+    reasoner = replacements.get("reasoner")
+    modes_file = replacements.get("modes_file")
     if reasoner is not None and reasoner not in REASONERS:
         raise unknown(
             f"there is no reasoner {shown(reasoner)}", reasoner, REASONERS, place="--reasoner"
@@ -187,7 +188,8 @@ def _tables(scenario: Scenario, layer: Layer, inputs: dict[str, str]) -> dict[st
 def _with_replaced_files(scenario: Scenario, replacements: Replacements) -> Scenario:
     """Name in a scenario the files and settings that are used in place of its own, and besides."""
     knowledge = scenario.knowledge
-    rules, disabled = replacements.get("rules", ()), replacements.get("disabled_rules", ())
+    rules = replacements.get("rules", ())
+    disabled = replacements.get("disabled_rules", ())
     changed = {
         "ontologies": tuple(map(str, replacements.get("ontologies", ()))) or knowledge.ontologies,
         "rules": (*knowledge.rules, *map(str, rules)),

@@ -126,7 +126,8 @@ class Within:
         return -self.le if key != "" and may_be_below else self.ge
 
     def _check(self, value: AnyDistribution) -> AnyDistribution:
-        low, high = self.ge, self.le
+        low = self.ge
+        high = self.le
         for key, part in _stated(value):
             least = self._least(key)
             if not least <= part <= high:
@@ -190,7 +191,8 @@ class Normal(Drawn):
     @property
     def interval(self) -> tuple[float, float]:
         """Smallest and greatest value, infinite where there is none."""
-        low, high = self.minimum, self.maximum
+        low = self.minimum
+        high = self.maximum
         return -math.inf if low is None else low, math.inf if high is None else high
 
     @model_validator(mode="after")
@@ -1221,7 +1223,8 @@ class Scenario(Strict):
 
     def needed_functions(self) -> tuple[str, ...]:
         """The functions that the mission needs."""
-        own, surface = self.mission.functions, (SURFACE,) if self.leak is not None else ()
+        own = self.mission.functions
+        surface = (SURFACE,) if self.leak is not None else ()
         tasks = *own.search_pipeline, *own.inspect_pipeline
         return tuple(
             dict.fromkeys((*domain.MISSION_FUNCTIONS, *own.mission_wide, *tasks, *surface))

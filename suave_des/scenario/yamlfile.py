@@ -76,7 +76,8 @@ class Layer:
             if key is None:
                 break
             path.append(key)
-            here, place = here[key], place[len(key) + 1 :]
+            here = here[key]
+            place = place[len(key) + 1 :]
         return tuple(path)
 
     def error(self, problem: str, key_path: KeyPath, remedy: str | None) -> InputError:
@@ -190,7 +191,8 @@ class _Reading:
     """Turns nodes into plain data and notes the place of each key path."""
 
     def __init__(self, path: Path, depth: int) -> None:
-        self._path, self._depth = path, depth
+        self._path = path
+        self._depth = depth
         self.places: dict[KeyPath, Location] = {(): Location(depth, 1, path)}
 
     def plain(self, node: yaml.Node, key_path: KeyPath) -> Any:
@@ -345,7 +347,8 @@ def scenario_layer(inputs: dict[str, str], name: str | Path, over: Layer | None 
 
 def _with_named_parts(layer: Layer) -> Layer:
     """The layer, with the name of a part as the base of one that does not differ from it."""
-    data, places = dict(layer.data), dict(layer.places)
+    data = dict(layer.data)
+    places = dict(layer.places)
     for part in _PARTS:
         if isinstance(data.get(part), str | int | float):
             data[part] = {"base": data[part]}
@@ -499,7 +502,8 @@ def _is_key_of_nothing(detail: ErrorDetails, here: Any, key: str | int) -> bool:
 
 def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:
     """Return the problem and the remedy."""
-    value, context = detail["input"], detail.get("ctx", {})
+    value = detail["input"]
+    context = detail.get("ctx", {})
     match detail["type"]:
         case "wrong":
             return context["problem"], context["remedy"]
