@@ -91,9 +91,7 @@ def run_mission(
         MissionError: the manager raised; nothing is written then.
     """
     # with the compiler, which campaigns load in their workers
-    from suave_des.simulation.simulator import (
-        Simulator,
-    )
+    from suave_des.simulation.simulator import Simulator
 
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -233,7 +231,8 @@ def _frame_of(
     except campaigns.CampaignInterrupted as stopped:
         if not hasattr(sys, "ps1"):  # neither a prompt nor a notebook
             raise
-        result, interrupted = stopped.result, True
+        result = stopped.result
+        interrupted = True
         warnings.warn(str(stopped), stacklevel=_CALLER)
     for remark in result.remarks:
         warnings.warn(remark, stacklevel=_CALLER)

@@ -27,10 +27,8 @@ _KINDS: Final[Mapping[str, tuple[Any, str]]] = {
     "Mapping": (Mapping, "a mapping"),
     "Sequence": (Iterable, "a list"),
     "Iterable": (Iterable, "a list"),
-    "LoadedScenario": (
-        "LoadedScenario",
-        "a loaded scenario",
-    ),  # by its name: its module imports this one
+    # by its name: its module imports this one
+    "LoadedScenario": ("LoadedScenario", "a loaded scenario"),
 }
 """What annotations stand for, and how it is called. Anything that has values will do for a list,
 but a single name.
@@ -89,9 +87,8 @@ def _is_a(part: str, value: object) -> bool:
     kind = _KINDS[part][0]
     if isinstance(kind, str):
         return any(base.__name__ == kind for base in type(value).__mro__)
-    is_other = (
-        isinstance(value, bool)
-        if part in ("int", "float")
-        else isinstance(value, str | bytes) and part != "str"
-    )
-    return isinstance(value, kind) and not is_other
+    if part in ("int", "float") and isinstance(value, bool):
+        return False
+    if part in ("Sequence", "Iterable") and isinstance(value, str | bytes):
+        return False
+    return isinstance(value, kind)

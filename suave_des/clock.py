@@ -98,7 +98,8 @@ def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
     if t_s != t_s:
         raise ValueError(f"the time of an event is {t_s}")
     event = simpy.Event(env)
-    event._ok, event._value = True, None
+    event._ok = True
+    event._value = None
     heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
     return event
 
@@ -121,7 +122,8 @@ def call_next(env: simpy.Environment, callback: Callable[[], None]) -> None:
     """
     event = simpy.Event(env)
     event.callbacks.append(lambda _: callback())
-    event._ok, event._value = True, None
+    event._ok = True
+    event._value = None
     env.schedule(event, simpy.events.URGENT)
 
 

@@ -58,12 +58,10 @@ class Draws(Streams):
     ) -> None:
         super().__init__(seed, run)
         self._numbers = numbers
-        self._scenario, self._seed, self._run, self._runs_per_draw = (
-            scenario,
-            seed,
-            run,
-            runs_per_draw,
-        )
+        self._scenario = scenario
+        self._seed = seed
+        self._run = run
+        self._runs_per_draw = runs_per_draw
         self.drawn: dict[str, float] = {}
 
     def value(

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -269,15 +270,13 @@ def has_level(findings: Iterable[Finding], least: Level) -> bool:
 
 def summary(findings: Sequence[Finding]) -> str:
     """Count the findings of each level: "1 error, 0 warnings, 14 notes"."""
-    counts = {noun: sum(one.level is level for one in findings) for level, noun in _NOUNS.items()}
-    return ", ".join(number_of(count, noun) for noun, count in counts.items())
+    counts = Counter(one.level for one in findings)
+    return ", ".join(number_of(counts[level], noun) for level, noun in _NOUNS.items())
 
 
 def relative_path(path: Path | str) -> str:
     """A path, relative to the current folder if it is in it."""
     whole = Path(path)
-    return (
-        str(whole.relative_to(Path.cwd()))
-        if whole.is_absolute() and whole.is_relative_to(Path.cwd())
-        else str(path)
-    )
+    if whole.is_absolute() and whole.is_relative_to(Path.cwd()):
+        return str(whole.relative_to(Path.cwd()))
+    return str(path)

@@ -148,7 +148,8 @@ def std_of(values: Sequence[float]) -> Estimate:
     n = len(values)
     if n < 2:
         return Estimate(method=CHI_SQUARE)
-    std, tail = _std(values, math.fsum(values) / n), (1.0 - CONFIDENCE) / 2.0
+    std = _std(values, math.fsum(values) / n)
+    tail = (1.0 - CONFIDENCE) / 2.0
     low, high = (
         std * math.sqrt((n - 1) / float(chdtri(n - 1, share))) for share in (tail, 1.0 - tail)
     )

@@ -61,7 +61,7 @@ LISTED = "files_sha256"
 """Key of a listing of files that the project has written, with their SHA-256, in hex."""
 Content = str | bytes | Iterable[str]
 Listing = Callable[[Mapping[str, str]], str]
-_Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None")
+_Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None", object)
 
 
 @contextmanager
@@ -214,29 +214,22 @@ def rounded(value: _Cell) -> _Cell:
     return round(value, DECIMALS) + 0.0 if isinstance(value, float) else value
 
 
-def cell(value: object) -> object:
-    """Return a value as in a CSV file: numbers rounded and in their shortest form, True or False,
-    empty for None.
+def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    r"""Return a CSV file with a header: RFC 4180, except that lines end with \n. Numbers are
+    rounded.
     """
-    return repr(rounded(value)) if isinstance(value, float) else value
+    return "".join(csv_pieces(columns, (map(rounded, row) for row in rows)))
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    r"""Return a CSV file with a header: RFC 4180, except that lines end with \n."""
-    return "".join(csv_pieces(columns, rows))
-
-
-def csv_pieces(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+def csv_pieces(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> Iterator[str]:
     """Yield a CSV file as csv_text returns it, piece by piece, so that few of its rows are in
-    memory.
+    memory: numbers with all their digits in their shortest form, True or False, empty for None.
     """
     rest = iter(rows)
-    part: list[Sequence[object]] = [columns]
+    part: list[Iterable[object]] = [columns]
     while part:
         buffer = io.StringIO()
-        csv.writer(buffer, lineterminator="\n").writerows(
-            [cell(value) for value in row] for row in part
-        )
+        csv.writer(buffer, lineterminator="\n").writerows(part)
         yield buffer.getvalue()
         part = list(islice(rest, _PIECE_ROWS))
 

@@ -58,7 +58,8 @@ class _Beside:
     """
 
     def __init__(self, folder: str) -> None:
-        self.folder, self.names = folder, set[str]()
+        self.folder = folder
+        self.names = set[str]()
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None

@@ -66,10 +66,8 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
             return candidate
     if os.path.exists(candidates[0]):  # noqa: PTH110 - as above
         return candidates[0]  # whoever reads it says what it is
-    names = sorted(
-        each.name if path.suffix else each.stem
-        for each in shipped_folder(kind).glob(f"*{_KINDS[kind]}")
-    )
+    shipped = shipped_folder(kind).glob(f"*{_KINDS[kind]}")
+    names = sorted(each.name if path.suffix else each.stem for each in shipped)
     # no scenarios
     known = [each for each in names if "modes" not in each or each == similar(path.name, names)]
     remedy = did_you_mean(path.name, known, "give a path, or one of the shipped files")

@@ -62,7 +62,8 @@ def read_base(
     """Read ontologies and files of rules as open_base does, by default those that a scenario
     names.
     """
-    knowledge, values = scenario.knowledge, _values(scenario)
+    knowledge = scenario.knowledge
+    values = _values(scenario)
     named = (
         [find(each, "ontology") for each in knowledge.ontologies]
         if ontologies is None

@@ -21,7 +21,6 @@ from suave_des.campaign.missions import (
     MissionRunner,
     Remark,
     WorkerError,
-    alarms_heard,
 )
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult, gather
@@ -321,7 +320,8 @@ def _with_what_is_kept(stopped: StoreError, checked: _Checked) -> StoreError:
 
 def _result(checked: _Checked, store: Store, remarks: Sequence[Remark]) -> CampaignResult:
     """Gather the result of a campaign, and write its files."""
-    campaign, folder = checked.campaign, checked.folder
+    campaign = checked.campaign
+    folder = checked.folder
     how = f"nothing is lost: {checked.resuming_command} writes the files"
     try:
         with store.reading():
@@ -388,19 +388,18 @@ def _work(
                 done += 1
                 failed += isinstance(each, MissionFailure)
         if left := campaign.planned - done:
-            with alarms_heard():
-                for among in executor(campaign, campaign.missions(store.settled), left):
-                    finished = []
-                    for key, each in among:
-                        if isinstance(each, Remark):
-                            remarks.add(each)
-                        else:
-                            finished.append((key, each))
-                            failed += isinstance(each, MissionFailure)
-                    store.append(finished)
-                    done += len(finished)
-                    if on_progress is not None:
-                        on_progress(Progress(done, failed, campaign.planned))
+            for among in executor(campaign, campaign.missions(store.settled), left):
+                finished = []
+                for key, each in among:
+                    if isinstance(each, Remark):
+                        remarks.add(each)
+                    else:
+                        finished.append((key, each))
+                        failed += isinstance(each, MissionFailure)
+                store.append(finished)
+                done += len(finished)
+                if on_progress is not None:
+                    on_progress(Progress(done, failed, campaign.planned))
         store.commit()
     except (KeyboardInterrupt, SuaveDesError) as error:
         stopped = error
@@ -448,9 +447,7 @@ def train(
         MissionError: the manager raised; nothing is written then.
     """
     # with the compiler, which campaigns load in their workers
-    from suave_des.simulation.simulator import (
-        Simulator,
-    )
+    from suave_des.simulation.simulator import Simulator
 
     files.check_output_file(Path(out), overwrite=overwrite)
     check_range("missions", missions, 1, RUNS_LIMIT)

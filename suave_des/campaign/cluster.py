@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -66,14 +66,10 @@ def connected(scheduler: str) -> Iterator[Executor]:
     """
     with ExitStack() as stack:
         for name in list(logging.root.manager.loggerDict):
-            if (
-                name.startswith(("distributed", "tornado", "asyncio"))
-                and not logging.getLogger(name).disabled
-            ):
-                logging.getLogger(
-                    name
-                ).disabled = True  # relevant problems are reported as errors of suave-des
-                stack.callback(setattr, logging.getLogger(name), "disabled", False)
+            logger = logging.getLogger(name)
+            if name.startswith(("distributed", "tornado", "asyncio")) and not logger.disabled:
+                logger.disabled = True  # relevant problems are reported as errors of suave-des
+                stack.callback(setattr, logger, "disabled", False)
         try:
             client = stack.enter_context(
                 Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False)
@@ -96,8 +92,11 @@ def _outcomes(
     which workers die again and again are run alone, one after the other, and one with which they
     die even so has failed.
     """
-    token, remaining = uuid.uuid4().hex, iter(missions)
-    under_way, suspects, ended = dict[Any, Chunk](), list[MissionKey](), SimpleQueue[Any]()
+    token = uuid.uuid4().hex
+    remaining = iter(missions)
+    under_way = dict[Any, Chunk]()
+    suspects = list[MissionKey]()
+    ended = SimpleQueue[Any]()
     # As the result of a task, it can be made again wherever a worker died that had it, and is sent
     # to each once.
     parcel = client.submit(bytes, pack(campaign), key=f"suave_des_parcel-{token}")
@@ -122,16 +121,11 @@ def _outcomes(
         else:
             raise ConnectionError
         for key in suspects:
-            try:
-                yield submit((key,)).result()
-            except KilledWorker as error:
-                times = f"{error.allowed_failures + 1} times (killed, out of memory, or stuck?)"
-                yield [campaign.failed(key, f"the cluster's worker died while running it, {times}")]
+            yield _alone(submit, campaign, key)
     except SuaveDesError:
         raise
     except Exception as error:
-        is_lost = any(future.cancelled() for future in (parcel, *under_way))
-        if is_lost or client.status != "running":
+        if _is_lost(client, (parcel, *under_way)):
             raise WorkerError(f"the connection to the scheduler {scheduler} is lost") from None
         problem = f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
         raise WorkerError(problem) from error
@@ -141,6 +135,20 @@ def _outcomes(
             with suppress(Exception):
                 client.cancel([*under_way, parcel], force=True)
                 client.run(forget, token, on_error="ignore")
+
+
+def _is_lost(client: Any, futures: Iterable[Any]) -> bool:
+    return client.status != "running" or any(future.cancelled() for future in futures)
+
+
+def _alone(submit: Callable[[Chunk], Any], campaign: Campaign, key: MissionKey) -> list[Finished]:
+    """Run a mission in a chunk of its own."""
+    try:
+        found: list[Finished] = submit((key,)).result()
+        return found
+    except KilledWorker as error:
+        times = f"{error.allowed_failures + 1} times (killed, out of memory, or stuck?)"
+        return [campaign.failed(key, f"the cluster's worker died while running it, {times}")]
 
 
 def pack(campaign: Campaign) -> bytes:

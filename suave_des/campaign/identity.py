@@ -34,7 +34,8 @@ def code_versions() -> dict[str, str]:
     """Return what must be equal on all machines of a campaign: versions, the code of suave-des
     itself, and the kind.
     """
-    total, folder = hashlib.sha256(), Path(suave_des.__file__).parent
+    total = hashlib.sha256()
+    folder = Path(suave_des.__file__).parent
     for path in sorted(folder.rglob("*.py")):
         total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
     return {**versions(), "suave-des code": total.hexdigest()[:12], "machine": platform.machine()}
@@ -44,7 +45,8 @@ def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
     """Return everything that determines a campaign's results, as plain data; `inputs` are those of
     check_campaign.
     """
-    spec, loaded = campaign.spec, campaign.loaded
+    spec = campaign.spec
+    loaded = campaign.loaded
     # The scenario's own files are compared by their content: another comment in them decides
     # nothing.
     modes = shown_name(loaded.modes_path)

@@ -201,7 +201,8 @@ class MissionRunner:
     """Runs missions of one campaign in this process."""
 
     def __init__(self, campaign: Campaign) -> None:
-        self.campaign, self._variation = campaign, campaign.variation
+        self.campaign = campaign
+        self._variation = campaign.variation
         # Load or compile what missions run, before the first one's time counts: a mission of a
         # second does.
         short_mission(campaign.loaded)
@@ -210,7 +211,8 @@ class MissionRunner:
         self._values = lru_cache(1)(self._variation.sweep.values)
         self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
         self._number = Counter[int]()
-        self._too_long, self._in_time = Counter[int](), set[int]()
+        self._too_long = Counter[int]()
+        self._in_time = set[int]()
 
     def run(self, manager: str, run: int, point: int = 0) -> tuple[MissionResult, LoadedScenario]:
         """Run a mission of the campaign again, with its record; return its result and scenario.
@@ -236,15 +238,16 @@ class MissionRunner:
         Raises:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
         """
-        for key in missions:
-            if key.manager not in self._in_time and self._too_long[key.manager] >= _IN_VAIN:
-                continue
-            outcome, remarks = self._outcome(key)
-            yield key, outcome
-            for remark in chain(self._remarks(key, outcome), remarks):
-                yield key, remark
-            if until_stuck and reasoner_is_stuck():
-                return
+        with alarms_heard():
+            for key in missions:
+                if key.manager not in self._in_time and self._too_long[key.manager] >= _IN_VAIN:
+                    continue
+                outcome, remarks = self._outcome(key)
+                yield key, outcome
+                for remark in chain(self._remarks(key, outcome), remarks):
+                    yield key, remark
+                if until_stuck and reasoner_is_stuck():
+                    return
 
     def _remarks(self, key: MissionKey, outcome: Row | MissionFailure) -> Iterator[Remark]:
         """Yield what the outcome of a mission says about its manager, among those before it."""
@@ -273,7 +276,8 @@ class MissionRunner:
 
     def _outcome(self, key: MissionKey) -> tuple[Row | MissionFailure, list[Remark]]:
         """Run a mission; return its outcome, and what its manager's author should know."""
-        spec, manager = self.campaign.spec, self.campaign.spec.managers[key.manager]
+        spec = self.campaign.spec
+        manager = self.campaign.spec.managers[key.manager]
         member = self._variation.member(key.run)
         simulator = self._simulator(key.point, member)
         began_s = time.process_time()
@@ -299,7 +303,8 @@ class MissionRunner:
 
     def _row(self, key: MissionKey, member: int | None, result: MissionResult) -> Row:
         """Make the row of a mission: of runs.csv, and its knowledge states if they are recorded."""
-        spec, variation = self.campaign.spec, self._variation
+        spec = self.campaign.spec
+        variation = self._variation
         values = self._values(key.point)
         row = (
             *row_of(result.metrics),
@@ -333,8 +338,6 @@ class MissionRunner:
 
 _left: list[int] = []
 """How many more ticks the mission under way has in the main thread; empty outside of missions."""
-_hears: list[int] = []
-"""Of the blocks in which alarms are heard: at most one."""
 
 
 @contextmanager
@@ -342,15 +345,11 @@ def alarms_heard() -> Iterator[None]:
     """Have the alarms of missions heard in the block: to do so for each mission anew takes a tenth
     of the time of the shortest ones.
     """
-    if _hears or threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
     with handled([signal.SIGALRM], _tick):
-        _hears.append(1)
-        try:
-            yield
-        finally:
-            _hears.clear()
+        yield
 
 
 def _tick(number: int, frame: FrameType | None) -> None:
@@ -364,7 +363,8 @@ def _tick(number: int, frame: FrameType | None) -> None:
 
 @contextmanager
 def _time_limit(seconds: float) -> Iterator[None]:
-    """Raise MissionTimeOut in the block when it takes longer, and again while it swallows that.
+    """Raise MissionTimeOut in the block, in which alarms are heard, when it takes longer, and again
+    while it swallows that.
 
     The alarm signal reaches the main thread in whatever it waits for; other threads when they
     return to Python. Alarms that come while the process is stopped are one when it continues.
@@ -373,12 +373,13 @@ def _time_limit(seconds: float) -> Iterator[None]:
     if threading.current_thread() is threading.main_thread():
         _left.append(_TICKS)
         try:
-            with alarms_heard(), alarm(tick_s, tick_s):
+            with alarm(tick_s, tick_s):
                 yield
         finally:
             _left.clear()
         return
-    thread, over = ctypes.c_ulong(threading.get_ident()), threading.Event()
+    thread = ctypes.c_ulong(threading.get_ident())
+    over = threading.Event()
 
     def watch() -> None:
         if any(over.wait(tick_s) for _ in range(_TICKS)):

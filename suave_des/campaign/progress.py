@@ -50,12 +50,10 @@ def shown(label: str, *, quiet: bool = False) -> Iterator[OnProgress | None]:
         yield None
         return
     label = "".join(char if char.isprintable() else "?" for char in label)
-    over, live, began_s, told = (
-        threading.Event(),
-        is_live(),
-        time.monotonic(),
-        list[tuple[float, Progress]](),
-    )
+    over = threading.Event()
+    live = is_live()
+    began_s = time.monotonic()
+    told = list[tuple[float, Progress]]()
     why = "" if _is_compiled() else f" ({_FIRST_RUN})"
     waits_s: Iterable[float] = (
         repeat(_UPDATE_PERIOD_S) if live else chain([_FIRST_LINE_S], repeat(_LINE_PERIOD_S))
@@ -105,15 +103,14 @@ def _text(told: Sequence[tuple[float, Progress]]) -> str:
     Missions that were done at first are not counted in the rate: those of a campaign that is
     resumed.
     """
-    (first_s, first), (last_s, progress) = told[0], told[-1]
+    (first_s, first) = told[0]
+    (last_s, progress) = told[-1]
     parts = [f"{progress.done} of {progress.total} missions"]
     if progress.failed:
         parts.append(f"{progress.failed} failed")
-    done, took_s, left = (
-        progress.done - first.done,
-        last_s - first_s,
-        progress.total - progress.done,
-    )
+    done = progress.done - first.done
+    took_s = last_s - first_s
+    left = progress.total - progress.done
     if done and took_s > 0.0:
         rate = done / took_s
         parts.append(f"{rate:,.0f}/s" if rate >= 10.0 else f"{rate:.2g}/s")

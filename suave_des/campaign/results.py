@@ -8,6 +8,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
-from suave_des.files import Content, csv_text
+from suave_des.files import Content, csv_pieces, csv_text
 from suave_des.records import store
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
@@ -119,12 +120,11 @@ class CampaignResult:
             **({"remarks": list(self.remarks)} if self.remarks else {}),
             "failures": [
                 {
-                    **{
-                        "manager": each.manager,
-                        "run": each.run,
-                        **self.campaign.variation.sweep.values(each.point),
-                    },
-                    **{"time_s": each.time_s, "cause": each.cause},
+                    "manager": each.manager,
+                    "run": each.run,
+                    **self.campaign.variation.sweep.values(each.point),
+                    "time_s": each.time_s,
+                    "cause": each.cause,
                 }
                 for each in self.failures
             ],
@@ -144,18 +144,19 @@ class CampaignResult:
         Raises:
             InputError: they cannot be written; nothing half-written stays.
         """
-        spec, sweep = self.campaign.spec, self.campaign.variation.sweep
+        spec = self.campaign.spec
+        sweep = self.campaign.variation.sweep
         assert self.folder is not None
         about = {"scenario": self.campaign.loaded.scenario.name}
         about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
         columns = (*SUMMARY_COLUMNS, *sweep.parameters)
         files: dict[str, Content] = {
-            store.RUNS_FILE: store.runs_pieces(self.columns, self.stream()),
+            store.RUNS_FILE: csv_pieces(self.columns, self.stream()),
             store.SUMMARY_FILE: csv_text(columns, [(*row.values(),) for row in self.summary]),
         }
         if self.campaign.variation.ensemble is not None:
             columns = (*ENSEMBLE_COLUMNS, *sweep.parameters)
-            rows = ([each[name] for name in columns] for each in self.differences())
+            rows = map(itemgetter(*columns), self.differences())
             files[store.ENSEMBLE_FILE] = csv_text(columns, rows)
         if spec.record_knowledge:
             files[CAMPAIGN_KNOWLEDGE_FILE] = self._knowledge_lines()
@@ -166,7 +167,8 @@ class CampaignResult:
 
     def _varied(self) -> dict[str, Any]:
         """Return what varies, for the manifest."""
-        variation, ensemble = self.campaign.variation, self.campaign.variation.ensemble
+        variation = self.campaign.variation
+        ensemble = self.campaign.variation.ensemble
         if not variation.columns:
             return {}
         return {
@@ -198,12 +200,11 @@ class CampaignResult:
             suave_pieces,
         )
 
-        scenario, runs, managers = (
-            self.campaign.loaded.scenario,
-            self.campaign.spec.runs,
-            self.campaign.spec.managers,
-        )
-        revision, limit_s = scenario.revision.name, scenario.mission.time_limit_s
+        scenario = self.campaign.loaded.scenario
+        runs = self.campaign.spec.runs
+        managers = self.campaign.spec.managers
+        revision = scenario.revision.name
+        limit_s = scenario.mission.time_limit_s
         files = exemplar_names(managers, revision, has_battery=scenario.battery is not None)
         for number, (file, name) in enumerate(files):
             # Each mission has its number in the campaign, from 1, whether or not all have a row.
@@ -217,7 +218,8 @@ def gather(
     campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]
 ) -> CampaignResult:
     """Summarise the outcomes of a campaign's missions, with remarks about managers for users."""
-    spec, variation = campaign.spec, campaign.variation
+    spec = campaign.spec
+    variation = campaign.variation
     failures: list[MissionFailure] = []
     found: dict[tuple[int, ...], Row] = {}
 
@@ -231,10 +233,11 @@ def gather(
     for place, group in groupby(outcomes(), key=lambda outcome: outcome[0][:2]):
         found[place] = _figures(kept(group), variation.runs_sharing_draw)
     none = _figures((), 1)
+    points = max((point for point, _ in found), default=0) + 1
     summary = tuple(
         dict(zip(SUMMARY_COLUMNS, (name, *found.get((point, number), none)), strict=True))
         | _swept(variation, point)
-        for point in range(max((point for point, _ in found), default=0) + 1)
+        for point in range(points)
         for number, name in enumerate(spec.managers)
     )
     done = sum(int(figures[0] or 0) for figures in found.values())
@@ -252,7 +255,8 @@ def _figures(rows: Iterable[tuple[int, Sequence[Any]]], runs_sharing_draw: int) 
     Only the metrics are kept. Where runs share draws, the draws are what is independent.
     """
     number = found = 0
-    values, draws = [array("d") for _ in PAPER_METRICS], array("q")
+    values = [array("d") for _ in PAPER_METRICS]
+    draws = array("q")
     for run, row in rows:
         number += 1
         found += bool(row[_FOUND])

@@ -334,15 +334,12 @@ def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
         )
     members = []
     for line, row in rows:
-        member = {
-            name: as_number(cell)
-            for name, cell in zip(header, row, strict=False)
-            if name not in _NO_PARAMETERS
-        }
-        if len(row) != len(header) or not all(map(math.isfinite, member.values())):
+        cells = dict(zip(header, row, strict=False))
+        member = tuple(as_number(cells.get(name, "")) for name in paths)
+        if len(row) != len(header) or not all(map(math.isfinite, member)):
             problem = f"expected {len(header)} numbers, got {', '.join(row)}"
             raise line_error(path, line, problem, "give each column one")
-        members.append(tuple(member.values()))
+        members.append(member)
     if len(members) < 2:
         raise line_error(
             path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more"

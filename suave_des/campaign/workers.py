@@ -28,7 +28,6 @@ from suave_des.campaign.missions import (
     MissionRunner,
     Remark,
     WorkerError,
-    alarms_heard,
     reasoner_is_stuck,
 )
 from suave_des.errors import SuaveDesError
@@ -128,7 +127,8 @@ class LocalWorkers:
     ) -> Iterator[list[Finished]]:
         """Yield outcomes chunk by chunk; see Executor."""
         size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
-        remaining, content = iter(missions), packed(campaign)
+        remaining = iter(missions)
+        content = packed(campaign)
         chunks = iter(lambda: tuple(islice(remaining, size)), ())
         for worker in self._workers:
             worker.send(content)
@@ -299,7 +299,8 @@ def _quietly() -> Iterator[None]:
     It inherits that the signals are blocked. A file such as signal.py in the current folder would
     be taken for Python's own module of that name while Python starts.
     """
-    was_safe, main = os.environ.get(_SAFE_PATH), sys.modules["__main__"]
+    was_safe = os.environ.get(_SAFE_PATH)
+    main = sys.modules["__main__"]
     os.environ[_SAFE_PATH] = "1"
     resource_tracker.ensure_running()  # or the first start does it, which lets the signals through again
     with signals_deferred():
@@ -377,7 +378,7 @@ def work(connection: Connection[Any, Any]) -> None:
     import suave_des.simulation.simulator  # noqa: F401 - all that missions need, before the campaign arrives
 
     ends = suppress(EOFError, BrokenPipeError, ConnectionResetError)
-    with alarms_heard(), ends:  # the campaign is over, or its process has ended
+    with ends:  # the campaign is over, or its process has ended
         runner = None
         while True:
             message = connection.recv()

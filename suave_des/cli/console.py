@@ -103,12 +103,14 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     console.print(Text(title, "bold"))
     console.print(Text(heading, "italic"))
     for event in result.events:
-        source, name = event.source.replace("_", " "), event.event.replace("_", " ")
+        source = event.source.replace("_", " ")
+        name = event.event.replace("_", " ")
         detail = " ".join(event.detail.splitlines())  # one of a manager's own may have several
         console.print(f"{event.t_s:8.2f}  {source:<{sources}}  {name:<{names}}  {detail}")
     console.print()
     rows = list(_metrics_rows(metrics, result.further))
-    names, values = (max(len(row[column]) for row in rows) for column in (0, 1))
+    names = max(len(name) for name, _, _ in rows)
+    values = max(len(value) for _, value, _ in rows)
     for name, value, remark in rows:
         console.print(f"{name:<{names}}  {value:>{values}}  {remark}".rstrip())
 
@@ -132,13 +134,9 @@ def _metrics_rows(
     yield "adaptations", str(metrics.adaptations), ""
     yield "mission duration", f"{metrics.mission_duration_s:.1f} s", ""
     for column, value in further.items():
-        name, unit = next(
-            (
-                (column.removesuffix(end), unit)
-                for end, unit in _UNITS.items()
-                if column.endswith(end)
-            ),
-            (column, ""),
-        )
-        text = f"{value:.2f}" if isinstance(value, float) else str(value)
-        yield name.replace("_", " "), "none" if value is None else text + unit, ""
+        end = next((each for each in _UNITS if column.endswith(each)), "")
+        text = "none"
+        if value is not None:
+            number = f"{value:.2f}" if isinstance(value, float) else str(value)
+            text = f"{number}{_UNITS.get(end, '')}"
+        yield column.removesuffix(end).replace("_", " "), text, ""

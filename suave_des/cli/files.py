@@ -23,20 +23,18 @@ def scenarios() -> None:
 
     folder = shipped_folder("scenarios")
     files = sorted(folder.glob("*.yaml"))
-    kinds = {
-        kind: [path for path in files if path.stem.endswith(f"_{kind}")]
-        for kind in ("campaign", "modes")
-    }
+    campaigns = [path for path in files if path.stem.endswith("_campaign")]
+    modes = [path for path in files if path.stem.endswith("_modes")]
     rows = []
     for path in files:
-        if not any(path in others for others in kinds.values()):
+        if path not in campaigns and path not in modes:
             scenario = load_scenario(path).scenario
             rows.append((path.stem, scenario.revision.name, scenario.description))
     console = output()
     print_table(console, Table(("name", "revision", "what it is"), rows, "Scenarios", align="lll"))
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
-    console.print(f"\nCampaign files: {', '.join(path.name for path in kinds['campaign'])}")
-    console.print(f"Modes files: {', '.join(path.name for path in kinds['modes'])}")
+    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}")
+    console.print(f"Modes files: {', '.join(path.name for path in modes)}")
     console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}")
     console.print(f"They are in {folder.parent}: copy what you want to change.")
 

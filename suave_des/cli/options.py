@@ -143,9 +143,8 @@ class Fields:
         texts = field_docs(CampaignSpec)
         for name in self.names:
             declared = CampaignSpec.model_fields[name]
-            shown_as = next(
-                (each for each in declared.metadata if isinstance(each, Option)), Option()
-            )
+            options = [each for each in declared.metadata if isinstance(each, Option)]
+            shown_as = (*options, Option())[0]
             kind: Any = next(each for each in _KINDS if each in _types_in(declared.annotation))
             given = typer.Option(
                 _flag(name),

@@ -82,7 +82,8 @@ class _Program:
                 f"cannot be run: {error.strerror}", file=command[0], remedy=remedy
             ) from None
         assert self._process.stdin is not None and self._process.stdout is not None
-        self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
+        self._in = self._process.stdin.fileno()
+        self._out = self._process.stdout.fileno()
         # If this process is killed, its end of the pipe closes, and the shell kills the program
         # with its children.
         group = str(self._process.pid)
@@ -327,7 +328,8 @@ class ExecManager(ManagingSubsystem):
         return answer
 
     def _carry_out(self, answer: Mapping[str, Any]) -> None:
-        modes, lines = answer.get("modes", {}), answer.get("log", ())
+        modes = answer.get("modes", {})
+        lines = answer.get("log", ())
         if not isinstance(modes, dict) or not isinstance(lines, list | tuple):
             raise self._error(
                 f"answered {shown(dict(answer))}; modes is an object, log a list of texts"

@@ -106,16 +106,9 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         loaded = self._simulator.loaded
         self._limit_s = loaded.scenario.mission.time_limit_s
         self._attributes = sorted(loaded.scenario.signals)
-        functions = [*MISSION_FUNCTIONS]
         if loaded.scenario.battery is not None:
             self._attributes.append(BATTERY_LEVEL)
-            functions.append(GENERATE_RECHARGE_PATH)
-        self.mode_names = {
-            function: modes
-            for function in loaded.modes.functions
-            if function in functions
-            and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
-        }
+        self.mode_names = _choices(loaded)
         entries = (
             *((name, *_bounds(loaded, name)) for name in self._attributes),
             *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
@@ -141,7 +134,8 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         drawn = int(self.np_random.integers(SEED_LIMIT)) if seed is None else seed
         self._mission = mission = Mission(self._simulator, seed=drawn)
         self._time_s = self._searched_s = self._distance_m = 0.0
-        self._adaptations, self._found = 0, False
+        self._adaptations = 0
+        self._found = False
         mission.advance(1e-9)  # the first task is requested at t = 0
         self._task_changed(mission)
         return self._observation(mission), {"seed": drawn, **self._info(mission)}
@@ -189,7 +183,9 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
         figure = Figure(figsize=(6.0, 4.0), dpi=100, layout="constrained")
         axes = figure.add_subplot(aspect="equal", xlabel="x (east), m", ylabel="y (north), m")
-        way_m, pipeline_m, pose = self._mission.way_m(), self._simulator.points, self._mission.pose
+        way_m = self._mission.way_m()
+        pipeline_m = self._simulator.points
+        pose = self._mission.pose
         axes.plot(pipeline_m[:, 0], pipeline_m[:, 1], color="0.6", linewidth=4.0, label="pipeline")
         axes.plot(way_m[:, 0], way_m[:, 1], color="C0", label="vehicle")
         axes.plot(pose.x_m, pose.y_m, "o", color="C0")
@@ -223,7 +219,8 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._read_modes(mission)
 
     def _reward(self, mission: Mission) -> float:
-        weights, found_s = self._weights, mission.found_s
+        weights = self._weights
+        found_s = mission.found_s
         searched_s = mission.now_s if found_s is None else found_s
         reward = weights["searched_per_s"] * (searched_s - self._searched_s)
         self._searched_s = searched_s
@@ -232,7 +229,8 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             reward += weights["inspected_per_m"] * (distance_m - self._distance_m)
             self._distance_m = distance_m
             if not self._found:
-                reward, self._found = reward + weights["found"], True
+                reward += weights["found"]
+                self._found = True
         adaptations = mission.mode_manager.adaptations
         reward += weights["adaptation"] * (adaptations - self._adaptations)
         self._adaptations = adaptations
@@ -253,6 +251,16 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             "task": self._task.name if self._task else "",
         }
         return now | ({"metrics": mission.metrics()} if mission.is_over else {})
+
+
+def _choices(loaded: LoadedScenario) -> dict[str, tuple[str, ...]]:
+    """Return the modes of each function that has a choice."""
+    functions = [*MISSION_FUNCTIONS]
+    if loaded.scenario.battery is not None:
+        functions.append(GENERATE_RECHARGE_PATH)
+    own = [function for function in loaded.modes.functions if function in functions]
+    modes = {function: grounding_modes(loaded.modes.modes(function)) for function in own}
+    return {function: known for function, known in modes.items() if len(known) > 1}
 
 
 def _bounds(loaded: LoadedScenario, attribute: str) -> tuple[float, float]:

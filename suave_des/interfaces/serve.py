@@ -79,8 +79,10 @@ class Session:
                 f"real-time factor: {real_time_factor:g} is out of range",
                 remedy="0, or a number above",
             )
-        self._simulator, self._factor = simulator, real_time_factor
-        self._run, self._seed = run, seed
+        self._simulator = simulator
+        self._factor = real_time_factor
+        self._run = run
+        self._seed = seed
         self._lock = threading.Lock()
         self._paths: dict[tuple[str, str], Callable[[Any], Json]] = {
             ("GET", "/"): lambda _: dict(REQUESTS),
@@ -115,7 +117,8 @@ class Session:
         self._seen_s = time.monotonic()  # up to when time has passed by itself
 
     def _catch_up(self) -> None:
-        before_s, self._seen_s = self._seen_s, time.monotonic()
+        before_s = self._seen_s
+        self._seen_s = time.monotonic()
         if self._factor > 0.0 and not self._mission.is_over:
             self._mission.advance(self._mission.now_s + (self._seen_s - before_s) * self._factor)
 
@@ -164,9 +167,11 @@ class Session:
         return self._monitor()
 
     def _monitor_schema(self) -> Json:
-        number, text = {"type": "number"}, {"type": "string"}
+        number = {"type": "number"}
+        text = {"type": "string"}
         kinds: Json = {name: number | {"description": said} for name, said in _MEANINGS.items()}
-        kinds["is_over"]["type"], kinds["task"]["type"] = "boolean", "string"
+        kinds["is_over"]["type"] = "boolean"
+        kinds["task"]["type"] = "string"
         measured = {"type": ["number", "null"], "description": "measured; null: not yet"}
         status = text | {"description": "status of the thruster; empty: none was published"}
         mode = text | {"description": "mode of the function, requested last; empty: none"}
@@ -238,18 +243,23 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer a request by any of the methods."""
-        method, path = self.command, self.path.partition("?")[0].rstrip("/") or "/"
+        method = self.command
+        path = self.path.partition("?")[0].rstrip("/") or "/"
         try:
             self._check_sender()
             content = self._content() if method != "GET" else None
-            status, answer = HTTPStatus.OK, self.server.session.answer(method, path, content)
+            status = HTTPStatus.OK
+            answer = self.server.session.answer(method, path, content)
         except _RefusedError as error:
             self.close_connection = True  # a body would not be read
-            status, answer = error.args[0], {"error": error.args[1]}
+            status = error.args[0]
+            answer = {"error": error.args[1]}
         except LookupError:
-            status, answer = HTTPStatus.NOT_FOUND, {"error": f"there is no {method} {path}"}
+            status = HTTPStatus.NOT_FOUND
+            answer = {"error": f"there is no {method} {path}"}
         except SuaveDesError as error:
-            status, answer = HTTPStatus.BAD_REQUEST, {"error": str(error)}
+            status = HTTPStatus.BAD_REQUEST
+            answer = {"error": str(error)}
         body = json.dumps(answer).encode()
         self.send_response(status)
         self.send_header("Content-Type", _JSON)
@@ -260,7 +270,8 @@ class _Handler(BaseHTTPRequestHandler):
     do_PUT = do_POST = do_GET  # noqa: N815 - names that http.server looks for
 
     def _check_sender(self) -> None:
-        host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+        host = self.headers.get("Host", "")
+        origin = self.headers.get("Origin")
         known = {*_LOCAL, self.server.host, self.connection.getsockname()[0]}
         is_known = False
         with suppress(ValueError):
@@ -275,7 +286,8 @@ class _Handler(BaseHTTPRequestHandler):
             )
 
     def _content(self) -> Any:
-        length, kind = self.headers.get("Content-Length", "0"), self.headers.get_content_type()
+        length = self.headers.get("Content-Length", "0")
+        kind = self.headers.get_content_type()
         if not (length.isascii() and length.isdigit()) or self.headers.get("Transfer-Encoding"):
             raise _RefusedError(
                 HTTPStatus.BAD_REQUEST, "the body's length is not given (send a Content-Length)"
@@ -308,7 +320,8 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 3000) -> None:
-        self.session, self.host = session, host
+        self.session = session
+        self.host = host
         try:
             super().__init__((host, port), _Handler)
         except (OSError, OverflowError) as error:

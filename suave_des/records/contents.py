@@ -171,23 +171,16 @@ class Missions(Recorded):
     left_out: Count
 
 
-class Sample(Recorded):
-    """What a sweep samples."""
-
-    ranges: dict[str, Any] = {}
-
-
 class Sweep(Recorded):
     """What a sweep varies, by name."""
 
     grid: dict[str, Any] = {}
     zip: dict[str, Any] = {}
-    sample: Sample | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """All that it varies."""
-        return (*self.grid, *self.zip, *(self.sample.ranges if self.sample else ()))
+        return (*self.grid, *self.zip)
 
 
 class Manifest(Recorded):

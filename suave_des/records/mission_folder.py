@@ -142,9 +142,10 @@ def mission_files(
     """Return the content of each file of a mission's folder by its name, mission.json as a listing
     of the others; `inputs` and `command` as of provenance.
     """
-    cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(result.trajectory[0].further)
+    cells = attrgetter(*TRAJECTORY_COLUMNS)
+    further = tuple(result.trajectory[0].further)
     points = (
-        (*cells(point), *(point.further[name] for name in further)) for point in result.trajectory
+        (*cells(point), *map(point.further.__getitem__, further)) for point in result.trajectory
     )
     mission = {
         "metrics": _metrics(result),
@@ -162,11 +163,8 @@ def mission_files(
 
 
 def _metrics(result: MissionResult) -> dict[str, Any]:
-    return dict(
-        zip(
-            (*COLUMNS, *result.further), (*row_of(result.metrics), *further_of(result)), strict=True
-        )
-    )
+    further = dict(zip(result.further, further_of(result), strict=True))
+    return dict(zip(COLUMNS, row_of(result.metrics), strict=True)) | further
 
 
 def record_of(result: MissionResult, loaded: LoadedScenario) -> MissionRecord:

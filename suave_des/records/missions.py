@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -86,7 +86,7 @@ def read_missions(paths: Sequence[Path]) -> Missions:
     return Missions(
         pandas.concat(frames, ignore_index=True),
         tuple(dict.fromkeys(chain.from_iterable(each.swept for each in sources.values()))),
-        tuple(chain.from_iterable(each.notes for each in sources.values())),
+        _notes(sources.values()),
         {name: path for name, path in named.items() if (path / STORE_FILE).is_file()},
     )
 
@@ -127,23 +127,22 @@ def _read_exemplars(folder: Path) -> Missions:
             "the campaign ended before its result files were written", file=folder, remedy=remedy
         )
     files = sorted(folder.glob("*.csv"))
-    contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
-    own = [file for file in files if not is_foreign(contents[file])] or files[:1]
-    if not own:
+    if not files:
         remedy = (
             "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
         )
         raise InputError("has no result files", file=folder, remedy=remedy)
+    contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
+    own = [file for file in files if not is_foreign(contents[file])] or files[:1]
     read = [_checked(file, contents[file], Manifest()) for file in own]
     frame = pandas.concat([each.frame for each in read], ignore_index=True)
     check_one_mission(frame, str(folder))
     frame = in_papers_order(frame)
     if _is_simulated(read[-1].frame):
         frame = frame.assign(**{SHARING: _sharing_seen(frame, ())})
-    notes = [
-        f"{file} is left out: it has no columns of missions" for file in files if file not in own
-    ]
-    return Missions(frame, (), (*notes, *chain.from_iterable(each.notes for each in read)))
+    others = sorted({*files} - {*own})
+    notes = [f"{file} is left out: it has no columns of missions" for file in others]
+    return Missions(frame, (), (*notes, *_notes(read)))
 
 
 def _checked(file: Path, content: Content, manifest: Manifest) -> Missions:
@@ -154,6 +153,10 @@ def _checked(file: Path, content: Content, manifest: Manifest) -> Missions:
     swept = _swept(manifest, frame) if _is_simulated(frame) else ()
     _check_once(frame, swept, file)
     return Missions(frame, swept, runs.notes)
+
+
+def _notes(sources: Iterable[Missions]) -> tuple[str, ...]:
+    return tuple(chain.from_iterable(each.notes for each in sources))
 
 
 def _is_simulated(frame: pandas.DataFrame) -> bool:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
-from suave_des.files import csv_pieces, read_csv
+from suave_des.files import csv_pieces, read_csv, rounded
 from suave_des.records.metrics import (
     COLUMN_TYPES,
     DISTANCE,
@@ -215,7 +215,9 @@ def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
     """Take the missions from the content of a file; see read_runs."""
     header, numbered, digest = content
     layout = _layout_of(path, header, needed)
-    rows, lines, averages = [], [], []
+    rows = []
+    lines = []
+    averages = []
     for line, row in numbered:
         if layout is not _OWN and " ".join(row).split()[0].rstrip(":").lower() in _AVERAGES:
             averages.append(str(line))
@@ -465,6 +467,6 @@ def suave_pieces(
         mission["position"] = str(
             (round(mission["initial_x_m"], 2), round(mission["initial_y_m"], 2))
         )
-        return [make(mission) for _, make in layout.values()]
+        return [rounded(make(mission)) for _, make in layout.values()]
 
     return csv_pieces(tuple(layout), (cells(number, row) for number, row in rows))

@@ -13,7 +13,7 @@ import os
 import sqlite3
 import time
 import zlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +26,6 @@ from suave_des.files import (
     Content,
     Listing,
     check_own,
-    csv_pieces,
     json_text,
     make_output_folder,
     own_files,
@@ -35,7 +34,7 @@ from suave_des.files import (
 )
 from suave_des.interrupts import Stopped, is_stopping
 from suave_des.records import contents
-from suave_des.records.metrics import COLUMNS, Row
+from suave_des.records.metrics import Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 
 STORE_FILE = "campaign.sqlite"
@@ -123,7 +122,9 @@ class Store:
     """
 
     def __init__(self, path: Path | None, *, replace: bool = False) -> None:
-        self.path, self._committed_s, self._is_open = path, time.monotonic(), False
+        self.path = path
+        self._committed_s = time.monotonic()
+        self._is_open = False
         self._cursors: WeakSet[sqlite3.Cursor] = WeakSet()
         own = [] if path is None else _own(path)
         check_own(own)
@@ -341,10 +342,8 @@ def store_read(path: Path | None) -> Iterator[None]:
         # none: what is read is no text
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
         if code == sqlite3.SQLITE_BUSY and path is not None:
-            problem, remedy = (
-                "another campaign is running in the output folder",
-                "wait for it, or give another",
-            )
+            problem = "another campaign is running in the output folder"
+            remedy = "wait for it, or give another"
             raise InputError(problem, file=path.parent, remedy=remedy) from None
         if code not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
             raise StoreError(
@@ -454,9 +453,9 @@ def _note(name: str, value: Any) -> tuple[str, str, int]:
 
 def _record(outcome: Outcome) -> tuple[int, int, int, int, str, int]:
     key, found = outcome
-    kind = (
-        _ROW if not isinstance(found, MissionFailure) else _LASTING if found.lasting else _PASSING
-    )
+    kind = _ROW
+    if isinstance(found, MissionFailure):
+        kind = _LASTING if found.lasting else _PASSING
     content = json.dumps(found)
     return (*key, kind, content, _crc(*key, kind, content))
 
@@ -544,22 +543,6 @@ def is_left_over(name: str) -> bool:
     return name.startswith(STORE_FILE)
 
 
-def runs_pieces(columns: Sequence[str], rows: Iterable[Row]) -> Iterator[str]:
-    """Yield the content of runs.csv, piece by piece.
-
-    Metrics are rounded; what varies has all its digits, so that it can be given again.
-    """
-    metrics = len(COLUMNS)
-
-    def exact(row: Row) -> Row:
-        return (
-            *row[:metrics],
-            *(repr(cell) if isinstance(cell, float) else cell for cell in row[metrics:]),
-        )
-
-    return csv_pieces(columns, map(exact, rows))
-
-
 def read_manifest(folder: Path) -> contents.Manifest:
     """Read a campaign's manifest.json; empty without one.
 
@@ -567,7 +550,8 @@ def read_manifest(folder: Path) -> contents.Manifest:
         InputError: it cannot be read, or is of another campaign than the missions that are kept
             beside it.
     """
-    path, store = folder / MANIFEST_FILE, folder / STORE_FILE
+    path = folder / MANIFEST_FILE
+    store = folder / STORE_FILE
     if not path.exists():
         return contents.Manifest()
     remedy = f"restore it, or suave-des campaign --resume {folder} writes it anew"

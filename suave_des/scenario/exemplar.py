@@ -278,7 +278,8 @@ def _parameters(document: Layer, notes: list[str]) -> list[Parameter]:
         node_of(entry, ()) == RUNNER or (is_every_node(entry) and "experiments" in content)
         for entry, content in contents.items()
     )
-    found, is_ours = list[Parameter](), False
+    found = list[Parameter]()
+    is_ours = False
     for entry, content in contents.items():
         of_entry = list(_of_entry(document, entry, content, is_runners=is_runners))
         found += of_entry
@@ -586,7 +587,8 @@ def _defaults(
     """Return the defaults of the exemplar's nodes that differ from the base's values; a note about
     all that are not given.
     """
-    omitted, values = dict[str, list[str]](), dict[str, Value]()
+    omitted = dict[str, list[str]]()
+    values = dict[str, Value]()
     for key in reading.defaults():
         if key.path in given:
             continue
@@ -753,7 +755,8 @@ def _manager(
     """Return the manager of an experiment, by its name here; notes if its launch or mission is
     another one.
     """
-    named, launch = experiment.adaptation_manager, experiment.experiment_launch
+    named = experiment.adaptation_manager
+    launch = experiment.experiment_launch
     manager = arguments.get("adaptation_manager", named)
     if manager != named:
         notes.append(f"{place}: its launch starts {manager}, and not {named}")
@@ -823,7 +826,8 @@ def _requested(
         runs[manager] = max(runs.get(manager, 0), number)
     if runs:
         return runs
-    problem, remedy = "none of its managers can be run", f"known: {', '.join(known)}"
+    problem = "none of its managers can be run"
+    remedy = f"known: {', '.join(known)}"
     raise InputError(problem, place="experiments", remedy=remedy)
 
 
@@ -979,9 +983,11 @@ def _text(documents: Sequence[Layer], entries: Entries, notes: Sequence[str]) ->
         lines.append(f"{line:<{_COMMENT_COLUMN}} # {comment}" if comment else line)
     lines += ["", "# About the files:", *(f"#   {note}" for note in notes)] if notes else []
     # No line ends, and no characters that YAML does not allow, from names in the user's files.
-    return "".join(
-        "".join(char if char.isprintable() else "?" for char in line) + "\n" for line in lines
-    )
+    return "".join(f"{_printable(line)}\n" for line in lines)
+
+
+def _printable(line: str) -> str:
+    return "".join(char if char.isprintable() else "?" for char in line)
 
 
 def _relative(path: Path, file: Path) -> str:

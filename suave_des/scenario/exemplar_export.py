@@ -63,7 +63,8 @@ def export_config(
     counted = with_values(loaded, {**times_s, **_publishing_period(loaded)})
     has_runner = is_since(revision, FIRST_WITH_RUNNER)
     nodes = _nodes(counted, revision)
-    runner, files = nodes.pop(RUNNER, {}), {MISSION_FILE: nodes}
+    runner = nodes.pop(RUNNER, {})
+    files = {MISSION_FILE: nodes}
     if has_runner:
         files[RUNNER_FILE] = {RUNNER: {**runner, **_runner_of(counted, campaign, revision)}}
     texts = {
@@ -121,7 +122,8 @@ def _event_times_s(loaded: LoadedScenario, revision: str) -> dict[str, float]:
     there = of_revision.monitors.thruster_event_times
     if there == loaded.scenario.revision.monitors.thruster_event_times:
         return {}
-    times_s, before_s = dict[str, float](), 0.0
+    times_s = dict[str, float]()
+    before_s = 0.0
     for number, event in enumerate(loaded.scenario.thruster_events):
         time_s = max(0.0, mean(event.time_s))
         path = f"{_EVENTS}.{number}.time_s"
@@ -265,7 +267,8 @@ def _intervals(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> dict[str, An
     for key in DRAWN:
         path = key.path.removeprefix(PERTURBED)
         if path != _EVENTS:
-            value, bounds = at(loaded, path), _bounds(drawn.get(path))
+            value = at(loaded, path)
+            bounds = _bounds(drawn.get(path))
             if isinstance(value, float) and bounds is not None:
                 found[key.name] = [round(bound - value, _DIGITS) for bound in bounds]
         elif (shift := _shift_of(loaded, drawn)) is not None:
@@ -299,21 +302,18 @@ def _differences(
 ) -> Iterator[str]:
     """Yield a line for each key of which the exemplar has another value."""
     for key in dict.fromkeys((*here, *there)):
-        one, other = _rounded(here.get(key)), _rounded(there.get(key))
+        one = _rounded(here.get(key))
+        other = _rounded(there.get(key))
         if one == other or (not above and key in _NOT_COMPARED):
             continue
         if key == "revision" and one["name"] != other["name"]:
             yield f"revision: {one['name']} here; the code that reads the files is {other['name']}'s"
-        elif (
-            isinstance(one, dict)
-            and isinstance(other, dict)
-            and one.get("kind") == other.get("kind")
-        ):
-            yield from _differences(one, other, f"{above}{key}.")
-        elif isinstance(one, dict) and isinstance(other, dict):
-            yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
-        else:
+        elif not isinstance(one, dict) or not isinstance(other, dict):
             yield f"{above}{key}: {shown(one)} here, {shown(other)} in the exemplar"
+        elif one.get("kind") == other.get("kind"):
+            yield from _differences(one, other, f"{above}{key}.")
+        else:
+            yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
 
 
 def _rounded(value: Any) -> Any:

@@ -108,16 +108,18 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
     Raises:
         InputError: there is none of that name, or the files fit several, or none.
     """
-    if name is not None and name in REVISIONS:
-        return name, "as requested"
     if name is not None:
-        problem = f"there is no revision {shown(name)} of the exemplar"
-        raise unknown(problem, name, REVISIONS, place="--revision")
-    fitting, telling = list(REVISIONS), ""
+        if name not in REVISIONS:
+            problem = f"there is no revision {shown(name)} of the exemplar"
+            raise unknown(problem, name, REVISIONS, place="--revision")
+        return name, "as requested"
+    fitting = list(REVISIONS)
+    telling = ""
     given = [each for each in _TELLING if each in found]
     for each in given:
         left = [revision for revision in fitting if _has(revision, each)]
-        telling = each if len(left) < len(fitting) else telling
+        if len(left) < len(fitting):
+            telling = each
         fitting = left
     if len(fitting) == 1:
         return fitting[0], f"only revision {fitting[0]} has {telling}"

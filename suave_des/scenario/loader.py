@@ -122,7 +122,8 @@ def load_scenario(
             )
             raise InputError(problem, remedy=f"give {given[0]} to load_scenario")
         return name
-    reasoner, modes_file = replacements.get("reasoner"), replacements.get("modes_file")
+    reasoner = replacements.get("reasoner")
+    modes_file = replacements.get("modes_file")
     if reasoner is not None and reasoner not in REASONERS:
         raise unknown(
             f"there is no reasoner {shown(reasoner)}", reasoner, REASONERS, place="--reasoner"
@@ -187,7 +188,8 @@ def _tables(scenario: Scenario, layer: Layer, inputs: dict[str, str]) -> dict[st
 def _with_replaced_files(scenario: Scenario, replacements: Replacements) -> Scenario:
     """Name in a scenario the files and settings that are used in place of its own, and besides."""
     knowledge = scenario.knowledge
-    rules, disabled = replacements.get("rules", ()), replacements.get("disabled_rules", ())
+    rules = replacements.get("rules", ())
+    disabled = replacements.get("disabled_rules", ())
     changed = {
         "ontologies": tuple(map(str, replacements.get("ontologies", ()))) or knowledge.ontologies,
         "rules": (*knowledge.rules, *map(str, rules)),
@@ -301,27 +303,31 @@ def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
     """The mapping or list with the value at a key path of plain data, and its key; an InputError if
     there is none.
     """
-    here, parts = data, _keys(data, path)
+    parts = _keys(data, path)
+    here: Any = data
     for depth, part in enumerate(parts):
-        if isinstance(here, list):
-            if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):
-                raise InputError(
-                    f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}"
-                )
-        elif not isinstance(here, dict):
+        holder = here
+        key: int | str = part
+        if isinstance(holder, list):
+            key = _index(path, part, len(holder))
+        elif not isinstance(holder, dict):
+            above = ".".join(parts[:depth])
             raise InputError(
-                f"{path}: {'.'.join(parts[:depth])} is a plain value",
-                remedy="leave out what follows it",
+                f"{path}: {above} is a plain value", remedy="leave out what follows it"
             )
-        elif part not in here:
-            named = (
-                (*here, "visibility", *here["signals"])
-                if here is data and "signals" in here
-                else here
-            )
-            raise InputError(
-                f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, named)))
-            )
-        holder, key = here, int(part) if isinstance(here, list) else part
-        here = here[key]
+        elif part not in holder:
+            named = list(map(str, holder))
+            if holder is data and "signals" in data:
+                named += ["visibility", *data["signals"]]
+            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(named)))
+        here = holder[key]
     return holder, key
+
+
+def _index(path: str, part: str, length: int) -> int:
+    is_number = part.isascii() and part.isdigit() and len(part) < 10
+    if not is_number or int(part) >= length:
+        raise InputError(
+            f"{path}: there is no entry {part}", remedy=f"entries are 0 to {length - 1}"
+        )
+    return int(part)

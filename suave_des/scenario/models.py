@@ -126,7 +126,8 @@ class Within:
         return -self.le if key != "" and may_be_below else self.ge
 
     def _check(self, value: AnyDistribution) -> AnyDistribution:
-        low, high = self.ge, self.le
+        low = self.ge
+        high = self.le
         for key, part in _stated(value):
             least = self._least(key)
             if not least <= part <= high:
@@ -190,7 +191,8 @@ class Normal(Drawn):
     @property
     def interval(self) -> tuple[float, float]:
         """Smallest and greatest value, infinite where there is none."""
-        low, high = self.minimum, self.maximum
+        low = self.minimum
+        high = self.maximum
         return -math.inf if low is None else low, math.inf if high is None else high
 
     @model_validator(mode="after")
@@ -1226,7 +1228,8 @@ class Scenario(Strict):
 
     def needed_functions(self) -> tuple[str, ...]:
         """The functions that the mission needs."""
-        own, surface = self.mission.functions, (SURFACE,) if self.leak is not None else ()
+        own = self.mission.functions
+        surface = (SURFACE,) if self.leak is not None else ()
         tasks = *own.search_pipeline, *own.inspect_pipeline
         return tuple(
             dict.fromkeys((*domain.MISSION_FUNCTIONS, *own.mission_wide, *tasks, *surface))
@@ -1236,30 +1239,36 @@ class Scenario(Strict):
         """Yield what changes no mission, and why, in words: a failure that comes too early, or what
         comes too late.
         """
-        monitors, earliest_s, latest_s = self.revision.monitors, 0.0, 0.0
         effective_s = self.revision.thruster_failures.effective_from_s
         times_s: dict[str, float] = {}
-        for number, event in enumerate(self.thruster_events):
-            low_s, high_s = (max(0.0, bound) for bound in support(event.time_s))
-            if monitors.thruster_event_times == "after_previous":
-                low_s, high_s = low_s + earliest_s, high_s + latest_s
-            earliest_s = max(earliest_s, low_s)
-            latest_s = max(latest_s, high_s) + monitors.thruster_check_period_s
+        spans_s = zip(self.thruster_events, self._event_spans_s(), strict=True)
+        for number, (event, (earliest_s, latest_s)) in enumerate(spans_s):
             times_s[f"thruster_events.{number}"] = earliest_s
             if event.event == "failure" and latest_s <= effective_s:
                 key = "revision.thruster_failures.effective_from_s"
                 yield f"thruster_events.{number}: failures have no effect before {effective_s:g} s ({key})"
-        later = {
-            f"signals.{name}": each.time_s
-            for name, each in self.signals.items()
-            if each.kind == "step"
-        }
-        later |= {} if self.leak is None else {"leak": self.leak.time_s}
-        times_s |= {key: support(time_s)[0] for key, time_s in later.items()}
+        for name, each in self.signals.items():
+            if each.kind == "step":
+                times_s[f"signals.{name}"] = support(each.time_s)[0]
+        if self.leak is not None:
+            times_s["leak"] = support(self.leak.time_s)[0]
         for key, time_s in times_s.items():
             if time_s >= self.mission.time_limit_s:
                 limit = f"mission.time_limit_s is {self.mission.time_limit_s:g} s"
                 yield f"{key}: {time_s:g} s is after the end of each mission ({limit})"
+
+    def _event_spans_s(self) -> Iterator[tuple[float, float]]:
+        """Yield the earliest and the latest time of each thruster event."""
+        monitors = self.revision.monitors
+        earliest_s = latest_s = 0.0
+        for event in self.thruster_events:
+            low_s, high_s = (max(0.0, bound) for bound in support(event.time_s))
+            if monitors.thruster_event_times == "after_previous":
+                low_s += earliest_s
+                high_s += latest_s
+            earliest_s = max(earliest_s, low_s)
+            latest_s = max(latest_s, high_s) + monitors.thruster_check_period_s
+            yield earliest_s, latest_s
 
     def reasoning_share(self) -> float:
         """Share of the time in which metacontrol's reasoner runs: one inference in each of its

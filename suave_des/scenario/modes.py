@@ -68,7 +68,8 @@ class ModeTable:
     @property
     def search_altitudes_m(self) -> dict[str, float]:
         """Altitude above the sea bed of each search mode that has one."""
-        modes, key = self.table.get(GENERATE_SEARCH_PATH, {}).values(), "spiral_altitude"
+        modes = self.table.get(GENERATE_SEARCH_PATH, {}).values()
+        key = "spiral_altitude"
         return {each.name: float(each.parameters[key]) for each in modes if key in each.parameters}
 
     def get(self, function: str, mode: str) -> Mode | None:
@@ -275,11 +276,13 @@ def _mode(
             raise document.error(
                 f"{shown(part)} is not a part", (*path, key), did_you_mean(part, nodes, "its parts")
             )
-    active, parameters = False, dict[str, ParameterValue]()
+    active = False
+    parameters = dict[str, ParameterValue]()
     for node, modes in nodes.items():
         if node not in keys:
             raise document.error(f"does not set {node}", path, f"add {node}: {_STATES}")
-        below, state = (*path, keys[node]), states[keys[node]]
+        below = (*path, keys[node])
+        state = states[keys[node]]
         if state == "inactive":
             continue
         kind, _, node_mode = str(state).partition(".")

@@ -76,7 +76,8 @@ class Layer:
             if key is None:
                 break
             path.append(key)
-            here, place = here[key], place[len(key) + 1 :]
+            here = here[key]
+            place = place[len(key) + 1 :]
         return tuple(path)
 
     def error(self, problem: str, key_path: KeyPath, remedy: str | None) -> InputError:
@@ -117,12 +118,10 @@ def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
     try:
         root = _composed(text)
         if not isinstance(root, yaml.MappingNode):
-            problem, line = (
-                ("is empty", 1)
-                if root is None
-                else ("is not a mapping at its top level", _line(root))
-            )
-            raise line_error(path, line, problem, "write `key: value` lines")
+            remedy = "write `key: value` lines"
+            if root is None:
+                raise line_error(path, 1, "is empty", remedy)
+            raise line_error(path, _line(root), "is not a mapping at its top level", remedy)
         reading = _Reading(path, depth)
         return Layer(reading.plain(root, ()), reading.places)
     except ReaderError as error:
@@ -192,7 +191,8 @@ class _Reading:
     """Turns nodes into plain data and notes the place of each key path."""
 
     def __init__(self, path: Path, depth: int) -> None:
-        self._path, self._depth = path, depth
+        self._path = path
+        self._depth = depth
         self.places: dict[KeyPath, Location] = {(): Location(depth, 1, path)}
 
     def plain(self, node: yaml.Node, key_path: KeyPath) -> Any:
@@ -347,7 +347,8 @@ def scenario_layer(inputs: dict[str, str], name: str | Path, over: Layer | None 
 
 def _with_named_parts(layer: Layer) -> Layer:
     """The layer, with the name of a part as the base of one that does not differ from it."""
-    data, places = dict(layer.data), dict(layer.places)
+    data = dict(layer.data)
+    places = dict(layer.places)
     for part in _PARTS:
         if isinstance(data.get(part), str | int | float):
             data[part] = {"base": data[part]}
@@ -381,12 +382,12 @@ def merge(base: Layer, over: Layer) -> Layer:
     """Merge one layer over another: mappings are merged, all other values replaced."""
     replaced: set[KeyPath] = set()
     data = _merge(base.data, over.data, (), replaced)
-    kept = {
-        path: place
-        for path, place in base.places.items()
-        if not any(path[:length] in replaced for length in range(1, len(path) + 1))
-    }
+    kept = {path: place for path, place in base.places.items() if not _is_below(path, replaced)}
     return Layer(data, {**kept, **over.places})
+
+
+def _is_below(path: KeyPath, others: set[KeyPath]) -> bool:
+    return any(path[:length] in others for length in range(1, len(path) + 1))
 
 
 def _merge(
@@ -394,15 +395,9 @@ def _merge(
 ) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
-        below, known = (*path, key), base.get(key)
-        is_whole = not path and key in _PARTS and "base" in (value or ())
-        if (
-            isinstance(known, dict)
-            and isinstance(value, dict)
-            and _same_kind(known, value)
-            and not is_whole
-        ):
-            merged[key] = _merge(known, value, below, replaced)
+        below = (*path, key)
+        if _is_merged(base.get(key), value, below):
+            merged[key] = _merge(base[key], value, below, replaced)
             continue
         replaced.add(below)
         merged[key] = value
@@ -411,7 +406,12 @@ def _merge(
     return merged
 
 
-def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
+def _is_merged(base: object, over: object, path: KeyPath) -> bool:
+    """Whether a value is merged with the base's, and does not take its place."""
+    if not isinstance(base, dict) or not isinstance(over, dict):
+        return False
+    if len(path) == 1 and path[0] in _PARTS and "base" in over:
+        return False
     return all(over[key] == base.get(key, over[key]) for key in _KIND_KEYS if key in over)
 
 
@@ -452,10 +452,7 @@ def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, Error
     """Return the first problem in the user's own file, or else in its base, with its key path."""
     found = ((_key_path(each, layer), each) for each in error.errors(include_url=False))
     # a misspelt key is also a missing one, a list with a wrong entry too short
-    late = {
-        "missing": 1,
-        "too_short": 2,
-    }
+    late = {"missing": 1, "too_short": 2}
     return min(found, key=lambda each: (late.get(each[1]["type"], 0), *layer.place(each[0])[:2]))
 
 
@@ -505,7 +502,8 @@ def _is_key_of_nothing(detail: ErrorDetails, here: Any, key: str | int) -> bool:
 
 def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:
     """Return the problem and the remedy."""
-    value, context = detail["input"], detail.get("ctx", {})
+    value = detail["input"]
+    context = detail.get("ctx", {})
     match detail["type"]:
         case "wrong":
             return context["problem"], context["remedy"]

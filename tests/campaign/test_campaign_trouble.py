@@ -377,9 +377,9 @@ def test_a_mission_that_is_stopped_for_longer_than_its_limit_goes_on():
         2.5,
         """
 import time
-from suave_des.campaign.missions import _time_limit
+from suave_des.campaign.missions import _time_limit, alarms_heard
 
-with _time_limit(2.0):
+with alarms_heard(), _time_limit(2.0):
     print("begun", flush=True)
     time.sleep(0.1)
 """,
@@ -392,10 +392,10 @@ def test_in_a_thread_that_is_not_the_main_one_too():
         2.5,
         """
 import threading, time
-from suave_des.campaign.missions import _time_limit
+from suave_des.campaign.missions import _time_limit, alarms_heard
 
 def work():
-    with _time_limit(2.0):
+    with alarms_heard(), _time_limit(2.0):
         print("begun", flush=True)
         for _ in range(20):
             time.sleep(0.01)

@@ -45,7 +45,8 @@ def infer(options: ReasonerOptions, at: At = None) -> None:
 def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterator[str]:
     from suave_des.knowledge.state import value_text
 
-    state, decisions = reasoning.inference.state, reasoning.plan.decisions
+    state = reasoning.inference.state
+    decisions = reasoning.plan.decisions
     yield "state"
     for objective in state.objectives:
         status = f"  {objective.status}" if objective.status else ""
@@ -64,10 +65,10 @@ def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterat
     if not decisions:
         yield "  nothing to adapt"
     for decision in decisions:
-        stays = " stays" * (
-            decision.design is not None and decision.design == state.grounded(decision.function)
-        )
-        yield f"  {decision.function}: {decision.design or 'no design left'}{stays}  ({decision.reason})"
+        design = decision.design or "no design left"
+        if decision.design is not None and decision.design == state.grounded(decision.function):
+            design = f"{design} stays"
+        yield f"  {decision.function}: {design}  ({decision.reason})"
         for rejection in decision.rejected:
             yield f"    not {rejection.design}: {rejection.reason}"
 
@@ -153,11 +154,9 @@ def query(
         print(csv_text(found.columns, found.rows), end="")
     else:
         rows = [[cell or "" for cell in row] for row in found.rows]
-        print(
-            shown(Table(found.columns, rows, align="l" * len(found.columns))),
-            *["no rows"] * (not rows),
-            sep="\n",
-        )
+        print(shown(Table(found.columns, rows, align="l" * len(found.columns))))
+        if not rows:
+            print("no rows")
 
 
 def why_not(
@@ -189,7 +188,8 @@ def why_not(
     questions = RuleQuestions(base.with_facts(map(reader.triple, facts or ())))
     builder = StateBuilder(questions.base, ManagingSettings.of(loaded.scenario))
     builder.add_words(at or ())
-    state, limit = builder.state(), TimeLimit(time_limit, "--time-limit")
+    state = builder.state()
+    limit = TimeLimit(time_limit, "--time-limit")
     answers = [
         limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire")
         for name in names or sorted({rule.name for rule in questions.base.rules})

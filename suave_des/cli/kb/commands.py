@@ -82,9 +82,8 @@ def rules_text(base: Ontology) -> str:
 
     named = naming(lambda iri: not base.vocabulary.means_itself(iri))
     blocks = []
-    for file in dict.fromkeys(
-        rule.file for rule in sorted(base.rules, key=lambda rule: base.files.index(rule.file))
-    ):
+    ordered = sorted(base.rules, key=lambda rule: base.files.index(rule.file))
+    for file in dict.fromkeys(rule.file for rule in ordered):
         blocks.append(f"# {file}\n")
         for rule in base.rules:
             if rule.file == file:
@@ -212,12 +211,12 @@ def diff(
     removed, added = compare_axioms(before.base, after.base)
     with counted("states", errors()) as on_count:
         difference = before.diff(after, max_failed, on_count)
-    missions, last = None, list[str]()
+    missions = None
+    last = list[str]()
     if mission_options.missions is not None:
         replaced = [each.replacements | {"modes_file": mission_options.modes} for each in both]
-        with progress.shown(
-            "missions with A, then with B", quiet=mission_options.quiet
-        ) as on_progress:
+        label = "missions with A, then with B"
+        with progress.shown(label, quiet=mission_options.quiet) as on_progress:
             missions = compare_missions(
                 both[0].scenario,
                 mission_options.missions,
@@ -228,9 +227,12 @@ def diff(
             )
         last = [*missions.lines()]
         if not missions.changed:
-            limit, seed = TimeLimit(both[0].time_limit, "--time-limit"), mission_options.seed
             firing, states = firing_states(
-                both[0].scenario, mission_options.missions, *replaced, seed=seed, limit=limit
+                both[0].scenario,
+                mission_options.missions,
+                *replaced,
+                seed=mission_options.seed,
+                limit=TimeLimit(both[0].time_limit, "--time-limit"),
             )
             last = [
                 f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"

@@ -56,6 +56,13 @@ class TestOptions(KnowledgeFiles):
             "disabled_rules": [*about["disabled_rules"], *(self.disable_rule or ())],
         }
 
+    def check_named(self) -> None:
+        """Check that tests that are written can name their knowledge base."""
+        if self.set:
+            problem = "tests that are written name a scenario, not values of it"
+            remedy = "write a scenario with `base` and these values, and name it with --scenario"
+            raise InputError(problem, place="--set", remedy=remedy)
+
     def load(self, about: Tested) -> KnowledgeBase:
         """Load a knowledge base."""
         from suave_des.kb.knowledge_base import KnowledgeBase
@@ -82,6 +89,11 @@ class MutationOptions:
         typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable."),
     ] = None
     max_failed: MaxFailed = 1
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether rules are to be mutated."""
+        return self.mutate or self.mutants is not None
 
 
 def test(
@@ -122,38 +134,32 @@ def test(
     """
     for file in filter(None, (junit_xml, write)):
         check_output_file(file, overwrite=file == junit_xml)
-    if options.set and (from_mission is not None or write is not None):
-        remedy = "write a scenario with `base` and these values, and name it with --scenario"
-        raise InputError(
-            "tests that are written name a scenario, not values of it", place="--set", remedy=remedy
-        )
     if from_mission is not None:
+        options.check_named()
         _write_mission(from_mission, write, options)
         return
-    if write is not None and not coverage:
-        raise InputError(
-            "nothing to write", place="--write", remedy="with --from-mission DIR, or --coverage"
-        )
+    if write is not None:
+        options.check_named()
+        if not coverage:
+            remedy = "with --from-mission DIR, or --coverage"
+            raise InputError("nothing to write", place="--write", remedy=remedy)
     began = time.perf_counter()
-    suites = _suites(options, files or ())
+    suites = _suites(options, files)
     console = output()
     results = _run(console, suites, select)
     _print_failures(console, results)
     if junit_xml is not None:
-        from suave_des.kb.rule_tests import junit_xml as written
+        from suave_des.kb.rule_tests import junit_xml as as_junit_xml
 
-        write_files(junit_xml.parent, {junit_xml.name: written(results)})
+        write_files(junit_xml.parent, {junit_xml.name: as_junit_xml(results)})
     _print_summary(console, results, time.perf_counter() - began)
     if coverage:
         _cover(suites, mutation.max_failed, write)
     all_passed = all(result.passed for result in results)
-    if mutation.mutate or mutation.mutants is not None:
-        if all_passed:
-            _mutate(console, suites, mutation)
-        else:
-            console.print(
-                "no mutation testing while a test fails: every mutant would count as killed"
-            )
+    if mutation.is_wanted and all_passed:
+        _mutate(console, suites, mutation)
+    elif mutation.is_wanted:
+        console.print("no mutation testing while a test fails: every mutant would count as killed")
     if not all_passed:
         raise typer.Exit(FAILED)
 
@@ -179,7 +185,7 @@ def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> Non
     print(f"{len(states)} tests are in {file}: suave-des kb test {file}")
 
 
-def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
+def _suites(options: TestOptions, files: Sequence[Path] | None) -> list[Suite]:
     """Each knowledge base with all tests about it; a mistake in the last file is told before
     anything runs.
     """
@@ -292,16 +298,13 @@ def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions)
 
     for _, knowledge, tests in suites:
         found = mutants_of(knowledge.base)
-        names, only = list(dict.fromkeys(mutant.name for mutant in found)), options.only or ()
-        for name in only:
+        names = list(dict.fromkeys(mutant.name for mutant in found))
+        for name in options.only or ():
             if name not in names:
-                remedy = did_you_mean(name, names)
-                raise InputError(
-                    f"there is no mutant of {quoted(name)}", place="--only", remedy=remedy
-                )
-        chosen = sample(
-            [mutant for mutant in found if not only or mutant.name in only], options.mutants
-        )
+                problem = f"there is no mutant of {quoted(name)}"
+                raise InputError(problem, place="--only", remedy=did_you_mean(name, names))
+        only = options.only or names
+        chosen = sample([mutant for mutant in found if mutant.name in only], options.mutants)
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task("mutants", total=len(chosen))
             advance = partial(progress.advance, task)
