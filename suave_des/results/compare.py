@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypedDict, Unpack
 
 import numpy as np
 import pandas
@@ -29,6 +29,7 @@ from suave_des.results.assisted import AssistedComparison, compare_assisted
 from suave_des.results.comparison import Comparison, concluded
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
 from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
+from suave_des.results.real import CONDITION
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
 
@@ -172,11 +173,15 @@ def compare_groups(
 ) -> Comparison:
     """Compare groups of missions; see compare_folders."""
     statistics.library()
-    widths, pairs = _half_widths(half_widths, groups.metrics), _pairs(groups.groups, against)
-    asked = (
-        (*pair, metric, widths.get(metric.name)) for metric in groups.metrics for pair in pairs
-    )
-    found = [_difference(*each, unpaired=unpaired) for each in asked]
+    widths = _half_widths(half_widths, groups.metrics)
+    pairs = _pairs(groups.groups, against)
+    found = []
+    for metric in groups.metrics:
+        by_run = None if unpaired else _by_run(groups.groups, metric.name)
+        for first, second in pairs:
+            samples = _samples(first, second, metric.name, by_run)
+            row = _difference(first, second, metric, samples, widths.get(metric.name))
+            found.append(row)
     for column, name in (("p", "p_holm"), ("mean_p", "mean_p_holm")):
         tested = [row for row in found if row.get(column) is not None]
         ps = statistics.holm([row[column] for row in tested])
@@ -205,17 +210,22 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
     """Pair the managers at each point of a sweep; the points of a manager, if it is the only
     one.
     """
-    pairs = [(one, other) for one, other in combinations(groups, 2) if one.point == other.point]
-    if against is None:
-        return pairs or list(combinations(groups, 2))
+    each_with_each = list(combinations(groups, 2))
+    pairs = each_with_each if against is None else _pairs_against(groups, against)
+    return [(one, other) for one, other in pairs if one.point == other.point] or pairs
+
+
+def _pairs_against(groups: Sequence[Group], against: str) -> list[tuple[Group, Group]]:
+    """Pair each with the group of that name, or with the one of that manager at its point."""
     by_name = {group.name: group for group in groups}
     if against in by_name:
-        pairs = [(group, by_name[against]) for group in groups if group.name != against]
-        return [pair for pair in pairs if pair[0].point == pair[1].point] or pairs
+        return [(group, by_name[against]) for group in groups if group.name != against]
+    managers = dict.fromkeys(group.name.removesuffix(group.point) for group in groups)
+    if against not in managers:
+        raise unknown(
+            f"nothing is called {shown(against)}", against, managers, "there are", "against"
+        )
     at_points = [(group, by_name.get(f"{against}{group.point}")) for group in groups]
-    if not any(chosen for _, chosen in at_points):
-        known = {group.name.removesuffix(group.point): group for group in groups}
-        raise unknown(f"nothing is called {shown(against)}", against, known, "there are", "against")
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
@@ -229,11 +239,14 @@ def _summary(group: Group, metric: Metric) -> dict[str, Any]:
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample) or np.isinf(sample).any():
         return row
-    is_share = metric.name == FOUND and group.is_of_missions
-    mean = (
-        share_of(int(sample.sum()), len(sample)) if is_share else statistics.mean_interval(sample)
-    )
-    row["mean"] = mean.cut(0.0, 1.0) if metric.name == FOUND else mean
+    if metric.name != FOUND:
+        row["mean"] = statistics.mean_interval(sample)
+    elif group.is_of_missions:
+        row["mean"] = share_of(int(sample.sum()), len(sample))
+    elif group.counted == CONDITION:
+        row["mean"] = statistics.wilson(float(sample.sum()), len(sample))
+    else:
+        row["mean"] = statistics.mean_interval(sample).cut(0.0, 1.0)
     row |= zip(
         ("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True
     )
@@ -251,28 +264,33 @@ def _summary(group: Group, metric: Metric) -> dict[str, Any]:
 
 
 def _difference(
-    first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool
+    first: Group,
+    second: Group,
+    metric: Metric,
+    samples: _Samples,
+    half_width: float | None,
 ) -> dict[str, Any]:
     """Estimate the difference of two groups in one metric, and test it; half_width None: as usual
     for the metric.
     """
-    is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
+    is_paired, why, x, y = samples
     row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row
-    if metric.name == FOUND and first.is_of_missions and second.is_of_missions:
+    kinds = {first.counted, second.counted}
+    if metric.name == FOUND and kinds == {"mission"}:
         row |= _shares_compared(x > 0.0, y > 0.0, is_paired=is_paired)
     else:
         row |= _values_compared(x, y, is_paired=is_paired)
-    if metric.name == FOUND:
+    if metric.name == FOUND and kinds == {CONDITION} and is_paired:
+        row["difference"] = statistics.paired_share_difference(x, y)
+    elif metric.name == FOUND:
         row["difference"] = row["difference"].cut(-1.0, 1.0)
     if math.isnan(row["difference"].value):
         return row
-    half_width = (
-        half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
-    )
-    return row | _runs_needed(x, y, half_width, is_paired=is_paired)
+    usual = metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
+    return row | _runs_needed(x, y, half_width or usual, is_paired=is_paired)
 
 
 def _shares_compared(
@@ -326,41 +344,67 @@ def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) ->
     return row
 
 
-def _samples(
-    first: Group, second: Group, metric: str, *, unpaired: bool
-) -> tuple[bool, str, Sample, Sample]:
-    """Return whether two groups are paired, why, and their values, those of the same runs in the
-    same order if so.
+class _Samples(NamedTuple):
+    """The values of two groups, those of the same runs in the same order if they are paired."""
+
+    is_paired: bool
+    why: str
+    first: Sample
+    second: Sample
+
+
+def _by_run(groups: Sequence[Group], metric: str) -> dict[str, Sample]:
+    """Return the values of groups whose runs are known, by name: of all of them in the order of the
+    same runs, nan where one has none.
     """
-    x, y = first.frame[metric], second.frame[metric]
-    if metric in TIMES and first.horizon_s != second.horizon_s:
-        horizon_s = min(first.horizon_s, second.horizon_s)
-        x, y = x.clip(upper=horizon_s), y.clip(upper=horizon_s)
-    apart = x.dropna().to_numpy(float), y.dropna().to_numpy(float)
-    if unpaired:
-        return False, "not paired: as asked", *apart
-    if not (first.has_runs and second.has_runs):
-        return (
-            False,
-            "not paired: real missions, or missions without seed, share no random numbers",
-            *apart,
-        )
-    common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
-    both = common.dropna()
-    if len(both) < min(2, *map(len, apart)):
-        why = "not paired: fewer than two runs of the same seed and number have a value under both"
-        return False, why, *apart
-    left = max(map(len, apart)) - len(both)
-    rest = (
-        f"; runs with a value under only one of them ({left}) are left out"
-        if left and len(both)
-        else ""
+    own = {group.name: group.frame[metric] for group in groups if group.has_runs}
+    if not own:
+        return {}
+    runs = pandas.concat(own, axis=1)
+    return {name: runs[name].to_numpy(float) for name in own}
+
+
+def _samples(
+    first: Group, second: Group, metric: str, by_run: Mapping[str, Sample] | None
+) -> _Samples:
+    """Return the values of two groups, paired if their runs share what they do; by_run as of
+    _by_run, None: they are not to be paired.
+    """
+    horizon_s = min(first.horizon_s, second.horizon_s) if metric in TIMES else math.inf
+    x, y = (
+        np.minimum(each.frame[metric].dropna().to_numpy(float), horizon_s)
+        for each in (first, second)
     )
-    if "run_idx" in first.frame:
-        why = f"paired by run_idx, as the exemplar's own test does{rest}"
-        return True, why, both["x"].to_numpy(), both["y"].to_numpy()
-    why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
-    return True, why, both["x"].to_numpy(), both["y"].to_numpy()
+    if by_run is None:
+        return _Samples(False, "not paired: as asked", x, y)
+    if not (first.has_runs and second.has_runs):
+        why = "not paired: real missions, or missions without seed, share no random numbers"
+        return _Samples(False, why, x, y)
+    both = np.array([by_run[first.name], by_run[second.name]])
+    both = np.minimum(both[:, ~np.isnan(both).any(axis=0)], horizon_s)
+    common = both.shape[1]
+    if common < min(2, len(x), len(y)):
+        return _Samples(False, _why_apart(first, second), x, y)
+    left = max(len(x), len(y)) - common
+    why = _why_paired(first)
+    if left and common:
+        what = "conditions" if first.counted == CONDITION else "runs"
+        why = f"{why}; {what} with a value under only one of them ({left}) are left out"
+    return _Samples(True, why, both[0], both[1])
+
+
+def _why_paired(group: Group) -> str:
+    if group.counted == CONDITION:
+        return "paired by condition, under which both have missions"
+    if "run_idx" in group.frame:
+        return "paired by run_idx, as the exemplar's own test does"
+    return "paired by run number, as runs with the same seed and number share their random numbers"
+
+
+def _why_apart(first: Group, second: Group) -> str:
+    if CONDITION in (first.counted, second.counted):
+        return "not paired: fewer than two conditions of one source have a value under both"
+    return "not paired: fewer than two runs of the same seed and number have a value under both"
 
 
 def _largest(
@@ -369,30 +413,35 @@ def _largest(
     """Return the least and the greatest difference of each pair, and the command that replays the
     largest of all.
     """
-    rows, found = [], []
+    rows = []
+    replays = [(0.0, "")]
     for first, second in pairs:
         if not all(each.has_runs and each.is_of_missions for each in (first, second)):
             continue
         apart = first.frame[metric.name] - second.frame[metric.name]
         apart = apart[np.isfinite(apart)]
-        if apart.any():
-            ends = least_and_greatest(apart)
-            cells = (text for value, run in ends for text in (metric.difference(value), str(run)))
-            rows.append((f"{first.name} - {second.name}", *cells))
-            firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
-            managers, sources = (
-                firsts[name].astype(str).unique() for name in ("manager", "source")
-            )
-            if (
-                not first.point
-                and 1 in (len(managers), len(sources))
-                and folders.keys() >= set(sources)
-            ):
-                size, run = max((abs(value), run) for value, run in ends)
-                places = (str(folders[source]) for source in sources)
-                chosen = "--run", str(run), "--managers", ",".join(managers)
-                found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
+        if not apart.any():
+            continue
+        ends = least_and_greatest(apart)
+        cells = [text for value, run in ends for text in (metric.difference(value), str(run))]
+        rows.append((f"{first.name} - {second.name}", *cells))
+        size, run = max((abs(value), run) for value, run in ends)
+        command = _replay_command(first, second, run, folders)
+        if command:
+            replays.append((size, command))
+    headings = ("difference", "least", "run", "greatest", "run")
     title = f"runs that differ most: {metric.heading}"
-    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(
-        found, default=(0.0, "")
-    )[1]
+    return Table(headings, rows, title), max(replays)[1]
+
+
+def _replay_command(first: Group, second: Group, run: int, folders: Mapping[str, Path]) -> str:
+    """Return the command that replays a run of two groups; empty if none does."""
+    both = [each.frame.iloc[0] for each in (first, second)]
+    managers = list(dict.fromkeys(str(each["manager"]) for each in both))
+    sources = list(dict.fromkeys(str(each["source"]) for each in both))
+    is_one_pair = len(managers) == 1 or len(sources) == 1
+    if first.point or not is_one_pair or not folders.keys() >= set(sources):
+        return ""
+    places = [str(folders[source]) for source in sources]
+    chosen = ["--run", str(run), "--managers", ",".join(managers)]
+    return shlex.join(["suave-des", "replay", *places, *chosen])

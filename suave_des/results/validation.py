@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
@@ -201,30 +201,44 @@ def validate(
     common_limit_s(dict(zip(("real missions", "simulated missions"), sides, strict=True)))
     not_found_s, sides = _with_common_limit(sides)
     real, ours = sides
-    samples = {
-        (metric, manager): both
-        for metric in COMPARED
-        for manager in managers
-        if all(map(len, both := [sample(side, manager, metric) for side in sides]))
-    }
+    samples = _samples(sides, managers)
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
     # so narrow that none needs it
     cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")
-    of_one_metric = [both for both in combinations(samples, 2) if both[0][0] == both[1][0]]
     pairs = pandas.DataFrame(
-        [_pair(*both, [samples[each] for each in both], generators) for both in of_one_metric]
+        _pair(one, other, (samples[one], samples[other]), generators)
+        for one, other in combinations(samples, 2)
+        if one[0] == other[0]
     )
     counted = compare_shares(shares, real, ours, managers)
     conditions = compare_conditions(real, ours, managers, COMPARED)
     required = _targets(cells, pairs, counted, over_conditions(conditions), limits)
-    targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
-    value, low, high = (
-        targets["value"],
-        targets["low"].fillna(-math.inf),
-        targets["high"].fillna(math.inf),
+    return Validation(
+        tuple(managers), cells, pairs, counted, conditions, _judged(required), not_found_s
     )
-    targets["met"] = value.between(low, high).astype(object).where(value.notna(), None)
-    return Validation(tuple(managers), cells, pairs, counted, conditions, targets, not_found_s)
+
+
+def _samples(
+    sides: Sequence[pandas.DataFrame], managers: Sequence[str]
+) -> dict[tuple[str, str], list[Sample]]:
+    """Return the values of each metric and manager on each side, where all sides have some."""
+    found = {}
+    for metric in COMPARED:
+        for manager in managers:
+            samples = [sample(side, manager, metric) for side in sides]
+            if all(map(len, samples)):
+                found[metric, manager] = samples
+    return found
+
+
+def _judged(required: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
+    """Return requirements, with whether each is met: None of one that cannot be judged."""
+    targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
+    value = targets["value"]
+    low = targets["low"].fillna(-math.inf)
+    high = targets["high"].fillna(math.inf)
+    met = value.between(low, high).astype(object).where(value.notna(), None)
+    return targets.assign(met=met)
 
 
 def _with_common_limit(
