@@ -12,7 +12,7 @@ import typer
 
 from suave_des.campaign import progress
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.console import TEXT_WIDTH, output, print_table
+from suave_des.cli.console import TEXT_WIDTH, counted, errors, output, print_table
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -143,9 +143,14 @@ def compare(
     if simulated:
         comparison = compare_assisted(groups)
     else:
-        comparison = compare_groups(
-            groups, against=against, half_widths=half_width or (), unpaired=unpaired
-        )
+        with counted("comparing", errors()) as show:
+            comparison = compare_groups(
+                groups,
+                against=against,
+                half_widths=half_width or (),
+                unpaired=unpaired,
+                on_progress=show,
+            )
     if out is None:
         print(comparison.written(as_format, min(output().width, TEXT_WIDTH)), end="")
     else:

@@ -23,7 +23,7 @@ from suave_des.records.runs import (
     is_foreign,
     runs_in,
 )
-from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
+from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest, read_note
 
 Source = pandas.DataFrame | str | Path | Sequence[str | Path]
 """Missions: a data frame with the columns of runs.csv, or folders and files."""
@@ -93,6 +93,8 @@ def _read_source(path: Path) -> Missions:
 
     Of the exemplar's folder, files that are no results, such as its statistics, are left out.
     """
+    if (path / STORE_FILE).is_file():
+        read_note(path / STORE_FILE, "request")  # which refuses a store that is not ours
     is_campaign, is_file = (path / RUNS_FILE).exists(), not path.is_dir()
     is_exemplars = not (is_campaign or is_file)
     folder = path.parent if is_file else path

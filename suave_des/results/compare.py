@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypedDict, Unpack
@@ -170,24 +171,29 @@ def compare_groups(
     against: str | None = None,
     half_widths: Sequence[str] = (),
     unpaired: bool = False,
+    on_progress: Callable[[int, int], None] = lambda done, all_of_them: None,
 ) -> Comparison:
-    """Compare groups of missions; see compare_folders."""
+    """Compare groups of missions; see compare_folders. `on_progress` is told how many of how many
+    differences are done.
+    """
     statistics.library()
     widths = _half_widths(half_widths, groups.metrics)
     pairs = _pairs(groups.groups, against)
+    values = {metric.name: _values(groups.groups, metric.name) for metric in groups.metrics}
+    asked = [(metric, *pair) for metric in groups.metrics for pair in pairs]
     found = []
-    for metric in groups.metrics:
-        by_run = None if unpaired else _by_run(groups.groups, metric.name)
-        for first, second in pairs:
-            samples = _samples(first, second, metric.name, by_run)
-            row = _difference(first, second, metric, samples, widths.get(metric.name))
-            found.append(row)
+    for done, (metric, first, second) in enumerate(asked):
+        on_progress(done, len(asked))
+        samples = _samples(first, second, values[metric.name], unpaired=unpaired)
+        found.append(_difference(first, second, metric, samples, widths.get(metric.name)))
     for column, name in (("p", "p_holm"), ("mean_p", "mean_p_holm")):
         tested = [row for row in found if row.get(column) is not None]
         ps = statistics.holm([row[column] for row in tested])
         for row, p in zip(tested, ps, strict=True):
             row[name] = p
-    largest = _largest(() if unpaired else pairs, groups.metrics[0], groups.missions.folders)
+    first_metric = groups.metrics[0]
+    together = () if unpaired else pairs
+    largest = _largest(together, first_metric, values[first_metric.name], groups.missions.folders)
     summaries = [_summary(group, metric) for metric in groups.metrics for group in groups.groups]
     return concluded(groups, summaries, found, *largest)
 
@@ -353,62 +359,84 @@ class _Samples(NamedTuple):
     second: Sample
 
 
-def _by_run(groups: Sequence[Group], metric: str) -> dict[str, Sample]:
-    """Return the values of groups whose runs are known, by name: of all of them in the order of the
-    same runs, nan where one has none.
+@dataclass(frozen=True)
+class _Values:
+    """The values of one metric, by group.
+
+    Attributes:
+        alone: those that a group has.
+        by_run: of groups whose runs are known, in the order of `runs`, nan where there is none.
+        runs: numbers of all runs of any group.
     """
-    own = {group.name: group.frame[metric] for group in groups if group.has_runs}
-    if not own:
-        return {}
-    runs = pandas.concat(own, axis=1)
-    return {name: runs[name].to_numpy(float) for name in own}
+
+    metric: str
+    alone: Mapping[str, Sample]
+    by_run: Mapping[str, Sample]
+    runs: NDArray[np.float64]
 
 
-def _samples(
-    first: Group, second: Group, metric: str, by_run: Mapping[str, Sample] | None
-) -> _Samples:
-    """Return the values of two groups, paired if their runs share what they do; by_run as of
-    _by_run, None: they are not to be paired.
-    """
-    horizon_s = min(first.horizon_s, second.horizon_s) if metric in TIMES else math.inf
-    x, y = (
-        np.minimum(each.frame[metric].dropna().to_numpy(float), horizon_s)
-        for each in (first, second)
-    )
-    if by_run is None:
-        return _Samples(False, "not paired: as asked", x, y)
-    if not (first.has_runs and second.has_runs):
-        why = "not paired: real missions, or missions without seed, share no random numbers"
-        return _Samples(False, why, x, y)
-    both = np.array([by_run[first.name], by_run[second.name]])
-    both = np.minimum(both[:, ~np.isnan(both).any(axis=0)], horizon_s)
-    common = both.shape[1]
-    if common < min(2, len(x), len(y)):
-        return _Samples(False, _why_apart(first, second), x, y)
-    left = max(len(x), len(y)) - common
-    why = _why_paired(first)
-    if left and common:
-        what = "conditions" if first.counted == CONDITION else "runs"
-        why = f"{why}; {what} with a value under only one of them ({left}) are left out"
-    return _Samples(True, why, both[0], both[1])
+def _values(groups: Sequence[Group], metric: str) -> _Values:
+    """Return the values of a metric."""
+    alone = {group.name: group.frame[metric].dropna().to_numpy(float) for group in groups}
+    with_runs = {group.name: group.frame[metric] for group in groups if group.has_runs}
+    if not with_runs:
+        return _Values(metric, alone, {}, np.array([]))
+    together = pandas.concat(with_runs, axis=1)
+    by_run = {name: together[name].to_numpy(float) for name in with_runs}
+    return _Values(metric, alone, by_run, together.index.get_level_values("run").to_numpy(float))
 
 
-def _why_paired(group: Group) -> str:
+def _samples(first: Group, second: Group, values: _Values, *, unpaired: bool) -> _Samples:
+    """Return the values of two groups, paired if their runs share random numbers or conditions."""
+    x = values.alone[first.name]
+    y = values.alone[second.name]
+    if not unpaired and first.has_runs and second.has_runs:
+        both = np.array([values.by_run[first.name], values.by_run[second.name]])
+        both = both[:, ~np.isnan(both).any(axis=0)]
+        is_paired = both.shape[1] >= min(2, len(x), len(y))
+    else:
+        is_paired = False
+    if is_paired:
+        why = _why_paired(first, max(len(x), len(y)) - both.shape[1], len(both[0]))
+        x, y = both
+    else:
+        why = "not paired: as asked" if unpaired else _why_apart(first, second)
+    if values.metric in TIMES and first.horizon_s != second.horizon_s:
+        horizon_s = min(first.horizon_s, second.horizon_s)
+        return _Samples(is_paired, why, np.minimum(x, horizon_s), np.minimum(y, horizon_s))
+    return _Samples(is_paired, why, x, y)
+
+
+def _why_paired(group: Group, left: int, common: int) -> str:
+    """Say by what two groups are paired, and how many have a value under only one of them."""
+    what = "runs"
     if group.counted == CONDITION:
-        return "paired by condition, under which both have missions"
-    if "run_idx" in group.frame:
-        return "paired by run_idx, as the exemplar's own test does"
-    return "paired by run number, as runs with the same seed and number share their random numbers"
+        what = "conditions"
+        why = "paired by condition, under which both have missions"
+    elif "run_idx" in group.frame:
+        why = "paired by run_idx, as the exemplar's own test does"
+    else:
+        why = (
+            "paired by run number, as runs with the same seed and number share their random numbers"
+        )
+    if left and common:
+        return f"{why}; {what} with a value under only one of them ({left}) are left out"
+    return why
 
 
 def _why_apart(first: Group, second: Group) -> str:
+    if not (first.has_runs and second.has_runs):
+        return "not paired: real missions, or missions without seed, share no random numbers"
     if CONDITION in (first.counted, second.counted):
         return "not paired: fewer than two conditions of one source have a value under both"
     return "not paired: fewer than two runs of the same seed and number have a value under both"
 
 
 def _largest(
-    pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]
+    pairs: Sequence[tuple[Group, Group]],
+    metric: Metric,
+    values: _Values,
+    folders: Mapping[str, Path],
 ) -> tuple[Table, str]:
     """Return the least and the greatest difference of each pair, and the command that replays the
     largest of all.
@@ -418,11 +446,11 @@ def _largest(
     for first, second in pairs:
         if not all(each.has_runs and each.is_of_missions for each in (first, second)):
             continue
-        apart = first.frame[metric.name] - second.frame[metric.name]
-        apart = apart[np.isfinite(apart)]
-        if not apart.any():
+        apart = values.by_run[first.name] - values.by_run[second.name]
+        is_known = np.isfinite(apart)
+        if not apart[is_known].any():
             continue
-        ends = least_and_greatest(apart)
+        ends = least_and_greatest(apart[is_known], values.runs[is_known])
         cells = [text for value, run in ends for text in (metric.difference(value), str(run))]
         rows.append((f"{first.name} - {second.name}", *cells))
         size, run = max((abs(value), run) for value, run in ends)

@@ -197,7 +197,9 @@ def _draw_row_of_differences(
         "capsize": 2.5,
     }
     axes.errorbar(found.value, row - 0.1, xerr=errors, color="k", **look)
-    ends = zip(least_and_greatest(apart), (("right", -4), ("left", 4)), strict=True)
+    runs = apart.index.get_level_values("run").to_numpy(float)
+    extremes = least_and_greatest(apart.to_numpy(float), runs)
+    ends = zip(extremes, (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
         place: dict[str, Any] = {
             "textcoords": "offset points",

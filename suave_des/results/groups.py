@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas
+from numpy.typing import NDArray
 
 from suave_des.errors import InputError, shown, unknown
 from suave_des.records.metrics import (
@@ -275,13 +276,12 @@ def _assisted(
     return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost, matching)
 
 
-def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
-    """Return the least and the greatest of values by (seed, run), each with its run."""
-    runs = values.index.get_level_values("run")
-    return [
-        (float(values.iloc[at]), int(runs[at]))
-        for at in (int(values.argmin()), int(values.argmax()))
-    ]
+def least_and_greatest(
+    values: NDArray[np.float64], runs: NDArray[np.float64]
+) -> list[tuple[float, int]]:
+    """Return the least and the greatest of values, each with its run."""
+    places = int(values.argmin()), int(values.argmax())
+    return [(float(values[place]), int(runs[place])) for place in places]
 
 
 def check_swept(missions: Missions, names: Sequence[str], place: str) -> None:

@@ -55,6 +55,8 @@ from suave_des.tables import Table, markdown_text, rows_of
 COMPARED = (*PAPER_METRICS, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
 _LEAST_AGREEMENT = 0.5
+_LEAST_CONDITIONS = 2
+"""With one, missions are independent."""
 _TARGET = ("kind", "subject", "what", "value", "low", "high")
 _SIGNIFICANT_DIGITS = 8
 
@@ -139,6 +141,11 @@ class Validation:
             f"Means must lie in the {real} mean's 95% t interval, standard deviations in the {real} one's"
             " 95% chi-square interval."
         )
+        if len(self.conditions):
+            yield (
+                "Missions of one condition are alike: 95% intervals of means and of differences of"
+                " means are over the conditions (Student's t)."
+            )
         met = self.targets["met"].tolist()
         is_met, is_not = ("is" if met.count(each) == 1 else "are" for each in (True, False))
         yield f"{met.count(True)} of {number_of(len(met), 'target')} {is_met} met, {met.count(False)} {is_not} not met."
@@ -203,6 +210,9 @@ def validate(
     real, ours = sides
     samples = _samples(sides, managers)
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
+    conditions = compare_conditions(real, ours, managers, COMPARED)
+    if len(conditions):
+        _put_over_conditions(cells, real, conditions)
     # so narrow that none needs it
     cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")
     pairs = pandas.DataFrame(
@@ -211,7 +221,6 @@ def validate(
         if one[0] == other[0]
     )
     counted = compare_shares(shares, real, ours, managers)
-    conditions = compare_conditions(real, ours, managers, COMPARED)
     required = _targets(cells, pairs, counted, over_conditions(conditions), limits)
     return Validation(
         tuple(managers), cells, pairs, counted, conditions, _judged(required), not_found_s
@@ -229,6 +238,26 @@ def _samples(
             if all(map(len, samples)):
                 found[metric, manager] = samples
     return found
+
+
+def _put_over_conditions(
+    cells: pandas.DataFrame, real: pandas.DataFrame, conditions: pandas.DataFrame
+) -> None:
+    """Put intervals over conditions in place of those that take missions as independent: of real
+    means, and of differences, which are then means over the conditions.
+    """
+    for row, cell in cells.iterrows():
+        manager, metric = cell["manager"], cell["metric"]
+        own = real.loc[real["manager"] == manager, [metric, CONDITION]].dropna()
+        if own[CONDITION].nunique() < _LEAST_CONDITIONS:
+            continue
+        mean = mean_of(own[metric].astype(float).tolist(), own[CONDITION].tolist())
+        of_both = conditions[(conditions["manager"] == manager) & (conditions["metric"] == metric)]
+        apart = statistics.mean_interval(
+            (of_both["simulated_mean"] - of_both["real_mean"]).to_numpy(float)
+        )
+        columns = mean.columns("published_mean") | apart.columns("difference_of_means")
+        cells.loc[row, list(columns)] = pandas.Series(columns, dtype=float)
 
 
 def _judged(required: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
