@@ -240,9 +240,7 @@ def validate(
     if runs_file is not None:
         recorded = _recorded(runs_file, list(conditions.columns), chosen, options)
         simulated = recorded.frame
-        made: dict[str, object] = {
-            "runs_file": {"file": _shown(runs_file), "sha256": recorded.files[runs_file]}
-        }
+        made: dict[str, object] = {"runs_file": _provenance(runs_file, recorded.files[runs_file])}
     else:
         runs = options.get("runs", -(-_RUNS // max(1, len(conditions))))
         result = _simulated(name, chosen, {**options, "runs": runs}, files, quiet=quiet)
@@ -255,9 +253,9 @@ def validate(
     )
     word = "published" if all(map(_is_shipped, real.files)) else "real"
     _print_validation(validation, word, real.notes)
-    sources: dict[str, object] = {
-        "data": [{"file": _shown(path), "sha256": digest} for path, digest in real.files.items()],
-        "targets": [_shown(path) for path in targets_paths],
+    sources = {
+        "data": [_provenance(path, digest) for path, digest in real.files.items()],
+        "targets": list(map(_shown, targets_paths)),
         "seed": seed,
     }
     _keep_validation(validation, options.get("out"), sources | made)
@@ -318,6 +316,10 @@ def _keep_validation(
     output().print(f"\nTables and validation.json are in {out}")
 
 
+def _provenance(path: Path, digest: str) -> dict[str, str]:
+    return {"file": _shown(path), "sha256": digest}
+
+
 def _shown(path: Path) -> str:
     """Name a file as it goes into a result: a shipped one without where it is installed."""
     return f"shipped/{path.name}" if _is_shipped(path) else path.as_posix()
@@ -364,7 +366,6 @@ def figure(
     print(f"drawn in {out}")
 
 
-_WHAT_TO_PLAY = "give DIR, the --out folder of run or campaign, or --scenario NAME"
 Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser.")]
 
 
@@ -418,18 +419,14 @@ def replay(
     from suave_des.pages.replay import missions_in, missions_run, replay_page
     from suave_des.scenario.loader import load_scenario
 
+    _check_one_source(folders or [], scenario)
     names = comma_separated(managers)
     run = 1 if run_number is None else run_number
-    if folders and scenario is not None:
-        raise InputError("both DIR and --scenario are given", remedy=_WHAT_TO_PLAY)
+    page_file = out or (folders[0] if folders else Path()) / "replay.html"
     if folders:
         check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
-        page_file = out or folders[0] / "replay.html"
-    elif scenario is not None:
-        check_no_use({"--point": point}, "without a campaign's folder")
-        page_file = out or Path("replay.html")
     else:
-        raise InputError("there is nothing to play", remedy=_WHAT_TO_PLAY)
+        check_no_use({"--point": point}, "without a campaign's folder")
     if out is not None or not folders:
         check_output_file(page_file, overwrite=True)
     if scenario is not None:
@@ -439,6 +436,14 @@ def replay(
         missions = missions_in(folders or [], names, run, point or 0, confirmed=yes)
     write_page(page_file, replay_page(missions), show=show)
     print(f"{' and '.join(each.name for each in missions)}: {page_file}")
+
+
+def _check_one_source(folders: Sequence[Path], scenario: str | None) -> None:
+    """Check that there are missions to play, and that it is clear which."""
+    if bool(folders) == (scenario is not None):
+        problem = "both DIR and --scenario are given" if folders else "there is nothing to play"
+        remedy = "give DIR, the --out folder of run or campaign, or --scenario NAME"
+        raise InputError(problem, remedy=remedy)
 
 
 def report(

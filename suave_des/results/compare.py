@@ -186,16 +186,21 @@ def compare_groups(
         on_progress(done, len(asked))
         samples = _samples(first, second, values[metric.name], unpaired=unpaired)
         found.append(_difference(first, second, metric, samples, widths.get(metric.name)))
-    for column, name in (("p", "p_holm"), ("mean_p", "mean_p_holm")):
-        tested = [row for row in found if row.get(column) is not None]
-        ps = statistics.holm([row[column] for row in tested])
-        for row, p in zip(tested, ps, strict=True):
-            row[name] = p
+    _correct(found, "p")
+    _correct(found, "mean_p")
     first_metric = groups.metrics[0]
     together = () if unpaired else pairs
     largest = _largest(together, first_metric, values[first_metric.name], groups.missions.folders)
     summaries = [_summary(group, metric) for metric in groups.metrics for group in groups.groups]
     return concluded(groups, summaries, found, *largest)
+
+
+def _correct(rows: Sequence[dict[str, Any]], column: str) -> None:
+    """Add Holm's correction of the p in a column for all tests together."""
+    tested = [row for row in rows if row.get(column) is not None]
+    ps = statistics.holm([row[column] for row in tested])
+    for row, p in zip(tested, ps, strict=True):
+        row[f"{column}_holm"] = p
 
 
 def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, float]:
@@ -245,28 +250,33 @@ def _summary(group: Group, metric: Metric) -> dict[str, Any]:
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample) or np.isinf(sample).any():
         return row
-    if metric.name != FOUND:
-        row["mean"] = statistics.mean_interval(sample)
-    elif group.is_of_missions:
-        row["mean"] = share_of(int(sample.sum()), len(sample))
-    elif group.counted == CONDITION:
-        row["mean"] = statistics.wilson(float(sample.sum()), len(sample))
-    else:
-        row["mean"] = statistics.mean_interval(sample).cut(0.0, 1.0)
-    row |= zip(
-        ("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True
-    )
+    row["mean"] = _mean(group, metric, sample)
+    row["q1"], row["median"], row["q3"] = np.percentile(sample, (25.0, 50.0, 75.0)).tolist()
     row["std"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
-    if metric.name == SEARCH_TIME and group.is_of_missions:
-        was_found = rows[FOUND_BY_HORIZON].to_numpy(float)
-        if math.isfinite(group.horizon_s) and not np.isnan(was_found).any():
-            restricted, half = statistics.search_times(sample, was_found > 0.0, group.horizon_s)
-            row |= {
-                "horizon_s": group.horizon_s,
-                "restricted_mean_s": restricted,
-                "censored_median_s": half,
-            }
+    if metric.name == SEARCH_TIME and group.is_of_missions and math.isfinite(group.horizon_s):
+        row |= _until_found(sample, rows[FOUND_BY_HORIZON].to_numpy(float), group.horizon_s)
     return row
+
+
+def _mean(group: Group, metric: Metric, sample: Sample) -> Estimate:
+    """Estimate a mean; of missions that found the pipeline, the share."""
+    if metric.name != FOUND:
+        return statistics.mean_interval(sample)
+    if group.is_of_missions:
+        return share_of(int(sample.sum()), len(sample))
+    if group.counted == CONDITION:
+        return statistics.wilson(float(sample.sum()), len(sample))
+    return statistics.mean_interval(sample).cut(0.0, 1.0)
+
+
+def _until_found(
+    times_s: Sample, was_found: NDArray[np.float64], horizon_s: float
+) -> dict[str, Any]:
+    """Estimate times until the pipeline is found, where it is known which missions found it."""
+    if np.isnan(was_found).any():
+        return {}
+    restricted, half = statistics.search_times(times_s, was_found > 0.0, horizon_s)
+    return {"horizon_s": horizon_s, "restricted_mean_s": restricted, "censored_median_s": half}
 
 
 def _difference(

@@ -168,38 +168,39 @@ class Comparison(Written):
         """Write two tables for LaTeX with booktabs: means and standard deviations as in the paper,
         and differences.
         """
-        metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or list(
-            self.metrics
-        )
+        notes = [f"% Note: {note}." for note in self.notes]
+        lines = [r"% needs \usepackage{booktabs}", *notes, self._latex_of_means()]
+        if len(self.differences):
+            lines.append(self._latex_of_differences())
+        return "\n".join(lines) + "\n"
+
+    def _latex_of_means(self) -> str:
+        metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or self.metrics
         by_group: dict[str, list[str]] = {}
         for metric in metrics:
             for each in rows_of(self.summaries[self.summaries["metric"] == metric.name]):
                 cells = metric.number(each["mean"]), metric.number(each["std"])
                 by_group.setdefault(each["group"], [each["group"]]).extend(cells)
         shown = [row for row in by_group.values() if any(row[1:])]
-        means = Table(
-            ("Manager", *("Mean", "Std") * len(metrics)), shown, "Means and standard deviations."
-        )
-        lines = [r"% needs \usepackage{booktabs}", *(f"% Note: {note}." for note in self.notes)]
+        headings = ("Manager", *("Mean", "Std") * len(metrics))
+        table = Table(headings, shown, "Means and standard deviations.")
         over = [capital(metric.heading) for metric in metrics]
-        lines.append(means.latex(over, label="tab:means", note=self._sizes()))
-        if len(self.differences):
-            rows: list[tuple[str, ...]] = []
-            for metric in self.metrics:
-                own = self.differences[
-                    (self.differences["metric"] == metric.name) & self.differences["test"].notna()
-                ]
-                rows += [(capital(metric.heading),)] if len(own) else []
-                cells_of = (_difference_row(each, metric) for each in rows_of(own))
-                rows += [
-                    (name, mean, interval, effect, p)
-                    for name, _, mean, interval, _, p, effect in cells_of
-                ]
-            headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
-            table = Table(headings, rows, "Differences between managers.")
-            text = table.latex(label="tab:differences", note=" ".join(self._methods()))
-            lines.append(text.replace("p (Holm)", "$p$ (Holm)"))
-        return "\n".join(lines) + "\n"
+        return table.latex(over, label="tab:means", note=self._sizes())
+
+    def _latex_of_differences(self) -> str:
+        rows: list[tuple[str, ...]] = []
+        tested = self.differences[self.differences["test"].notna()]
+        for metric in self.metrics:
+            own = rows_of(tested[tested["metric"] == metric.name])
+            if own:
+                rows.append((capital(metric.heading),))
+            for each in own:
+                name, _, mean, interval, _, p, effect = _difference_row(each, metric)
+                rows.append((name, mean, interval, effect, p))
+        headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
+        table = Table(headings, rows, "Differences between managers.")
+        text = table.latex(label="tab:differences", note=" ".join(self._methods()))
+        return text.replace("p (Holm)", "$p$ (Holm)")
 
     def _sizes(self) -> str:
         sizes = self.summaries.drop_duplicates("group").set_index("group")["n"]
@@ -280,7 +281,8 @@ def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
     names = f"{each['group']} - {each['other']}", ", ".join(f"{n:,}" for n in sizes)
     if not each["test"]:
         return *names, "", "", "", "", ""
-    mean, size = estimate_in(each, "difference"), estimate_in(each, "effect")
+    mean = estimate_in(each, "difference")
+    size = estimate_in(each, "effect")
     effect = "" if each["effect"] is None else f"{size.value:.2f}"
     effect += f" ({size.text('.2f')})" if size.has_interval else ""
     return (

@@ -390,9 +390,11 @@ def _pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
     for each in against:
         first_wins, second_wins = _wins(each, metric)
         if each["group"] == best:
-            wins, losses = first_wins, second_wins
+            wins = first_wins
+            losses = second_wins
         else:
-            wins, losses = second_wins, first_wins
+            wins = second_wins
+            losses = first_wins
         other = _other(each, best)
         if each["paired"]:
             n = each["n"]

@@ -198,7 +198,7 @@ def _draw_row_of_differences(
     }
     axes.errorbar(found.value, row - 0.1, xerr=errors, color="k", **look)
     runs = apart.index.get_level_values("run").to_numpy(float)
-    extremes = least_and_greatest(apart.to_numpy(float), runs)
+    extremes = least_and_greatest(np.array(apart, dtype=np.float64), runs)
     ends = zip(extremes, (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
         place: dict[str, Any] = {
@@ -307,7 +307,8 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
         raise InputError(
             problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them"
         )
-    frame, columns = missions.frame.assign(curve=_names), len(parameters)
+    frame = missions.frame.assign(curve=_names)
+    columns = len(parameters)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     height_in = 4.0 + 0.2 * math.ceil((frame["curve"].nunique() + 1) / 3)
     figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
@@ -427,7 +428,8 @@ def _chosen(missions: Missions, parameters: Sequence[str]) -> list[str]:
 
 def _averaged(frame: pandas.DataFrame, counts: Sequence[int], others: Sequence[str]) -> str:
     """Say of how many runs, or draws that runs share, means are, and over what each is averaged."""
-    low, high = min(counts), max(counts)
+    low = min(counts)
+    high = max(counts)
     alike = max(alike_by_source(frame).values(), default=1)
     what = "run" if alike == 1 else "draw"
     of = f"means of n = {low if low == high else f'{low} to {high}'} {what}{'s' * (high > 1)}"
@@ -456,7 +458,8 @@ def _independent_at(
     Raises:
         InputError: none is.
     """
-    alike, is_empty = alike_by_source(frame), True
+    alike = alike_by_source(frame)
+    is_empty = True
     for _, source in frame.groupby("source", sort=False, observed=True):
         for values, whole in source.groupby(list(keys), dropna=False, observed=True):
             for curve, part in whole.groupby("curve", sort=False, observed=True):
@@ -619,7 +622,8 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
     Raises:
         InputError: it cannot be written.
     """
-    picture, metadata = io.BytesIO(), _UNDATED.get(out.suffix.lower())
+    picture = io.BytesIO()
+    metadata = _UNDATED.get(out.suffix.lower())
     figure.savefig(
         picture, format=out.suffix[1:].lower(), bbox_inches=bbox_inches, metadata=metadata
     )

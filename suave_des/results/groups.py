@@ -145,7 +145,8 @@ def grouped(
     alike = alike_by_source(frame) if averages else {}
     if averages:
         frame = frame.assign(**{_CLUSTER: _conditions(frame, missions.swept)})
-    groups, lacking = [], []
+    groups = []
+    lacking = []
     for part, name, point in _parts(frame, managers, by):
         found = independent(part, _same_points(frame, part, by), averaged, alike)
         if found.left_out:
@@ -258,7 +259,8 @@ def _assisted(
     sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
     _check_numbers(sides, chosen)
     limit_s = common_limit_s(sides)
-    in_same, in_population = same.frame, population.frame
+    in_same = same.frame
+    in_population = population.frame
     if math.isfinite(limit_s):
         frame = to_horizon(frame, limit_s)
         in_same = to_horizon(in_same, limit_s)
@@ -492,17 +494,7 @@ def _notes(
     frame: pandas.DataFrame,
     alike_by_source: Mapping[str, int],
 ) -> Iterator[str]:
-    yield from _note_on_draws(frame, alike_by_source)
-    if any(group.counted == CONDITION for group in groups):
-        yield (
-            "missions of one condition are alike: the values of those that have one are averaged,"
-            " each condition counts the same, and n and the runs needed are numbers of conditions"
-        )
-    if averaged and not all(group.is_of_missions for group in groups):
-        yield (
-            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep"
-            " share its random numbers, so that runs are independent and missions are not"
-        )
+    yield from _notes_on_averages(groups, averaged, frame, alike_by_source)
     members = frame[_MEMBER].nunique() if _MEMBER in frame else 0
     if members > 1:
         yield (
@@ -520,6 +512,25 @@ def _notes(
         )
     if any(group.frame[FOUND].isna().all() for group in groups):
         yield "some files do not say which missions found the pipeline"
+
+
+def _notes_on_averages(
+    groups: Sequence[Group],
+    averaged: Sequence[str],
+    frame: pandas.DataFrame,
+    alike_by_source: Mapping[str, int],
+) -> Iterator[str]:
+    yield from _note_on_draws(frame, alike_by_source)
+    if any(group.counted == CONDITION for group in groups):
+        yield (
+            "missions of one condition are alike: the values of those that have one are averaged,"
+            " each condition counts the same, and n and the runs needed are numbers of conditions"
+        )
+    if averaged and not all(group.is_of_missions for group in groups):
+        yield (
+            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep"
+            " share its random numbers, so that runs are independent and missions are not"
+        )
 
 
 def _note_on_draws(frame: pandas.DataFrame, alike_by_source: Mapping[str, int]) -> Iterator[str]:
@@ -624,7 +635,8 @@ def _ended_early(groups: Sequence[Group]) -> Iterator[str]:
         ended_s = group.frame[ENDED] if group.is_of_missions else pandas.Series(dtype=float)
         ended_s = ended_s[ended_s < group.horizon_s - SAME_LIMIT_S]
         if len(ended_s):
-            low, high = ended_s.min(), ended_s.max()
+            low = ended_s.min()
+            high = ended_s.max()
             until = f" to {high:.0f}" if high > low else ""
             times.append(f"{group.name} after {low:.0f}{until} s")
     if times:

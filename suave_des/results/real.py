@@ -366,12 +366,12 @@ def read_real(
     check_one_mission(frame, ", ".join(map(str, files)))
     if conditions is None or conditions.empty:
         return Runs(files, frame, tuple(notes))
-    named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
+    named = frame.columns.intersection([*conditions, *NUMBER_COLUMNS])
     with _at_their_lines(read):
         frame = numbered(frame, conditions, runs_each)
         _check_starts(frame, _starts_of(conditions))
-    frame = frame.drop(columns=[name for name in named if name != CONDITION])
-    if not named:
+    frame = frame.drop(columns=named.difference([CONDITION]))
+    if named.empty:
         notes.append(
             "The data do not name the conditions of their missions: they are taken in order,"
             f" {_missions_each(frame)}."
@@ -441,7 +441,8 @@ def common_limit_s(sides: Mapping[str, pandas.DataFrame]) -> float:
     }
     for (other, theirs), (place, ours) in combinations(limits_s.items(), 2):
         for manager in ours.index.intersection(theirs.index):
-            ends_s, others_s = float(ours[manager]), float(theirs[manager])
+            ends_s = float(ours[manager])
+            others_s = float(theirs[manager])
             if math.isnan(ends_s):  # none of these found the pipeline later than the others' limit
                 ends_s = max(others_s, float(longest_s[place][manager]))
             elif math.isnan(others_s):
@@ -543,7 +544,8 @@ def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]
         for value in flown[~flown.astype(str).isin(known)][:1]:
             raise InputError(f"it never draws {name}={value}, a real condition", remedy=_DRAW)
         return
-    low, high = float(numbers.min()), float(numbers.max())
+    low = float(numbers.min())
+    high = float(numbers.max())
     beyond = (high - low) * (_BEYOND + _BEYOND_OF_FEW / len(numbers)) + _ABSOLUTE
     for value in values[(values < low - beyond) | (values > high + beyond)][:1]:
         problem = f"it draws {name} from {low:g} to {high:g}, and a real condition has {value:g}"
@@ -564,7 +566,8 @@ def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) 
     file = read_campaign_file(campaign)
     if file is None or not file.settings.sweep:
         return pandas.DataFrame()
-    loaded, settings = load_scenario(file.scenario, **replacements), file.settings
+    loaded = load_scenario(file.scenario, **replacements)
+    settings = file.settings
     try:
         varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw)
         check_drawn(*varied)

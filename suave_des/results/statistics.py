@@ -237,10 +237,8 @@ def paired_share_difference(
     n = len(first)
     change = first.astype(float) - second.astype(float)
     extended = np.append(change, (1.0, -1.0))
-    middle, half = (
-        float(extended.mean()),
-        float(ndtri((1.0 + CONFIDENCE) / 2.0) * extended.std()) / math.sqrt(n + 2),
-    )
+    middle = float(extended.mean())
+    half = float(ndtri((1.0 + CONFIDENCE) / 2.0) * extended.std()) / math.sqrt(n + 2)
     return Estimate(math.fsum(change) / n, middle - half, middle + half, BONETT_PRICE).cut(
         -1.0, 1.0
     )
@@ -346,7 +344,8 @@ def _exact_ps(ranks: Sample, is_positive: NDArray[np.bool_]) -> list[float]:
         ways[rank:] = ways[rank:] + ways[: len(ways) - rank]
     share = ways / ways.sum()
     seen = int(doubled[is_positive].sum())
-    less, greater = float(share[: seen + 1].sum()), float(share[seen:].sum())
+    less = float(share[: seen + 1].sum())
+    greater = float(share[seen:].sum())
     return [min(1.0, 2.0 * min(less, greater)), min(1.0, less), min(1.0, greater)]
 
 

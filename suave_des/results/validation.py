@@ -247,7 +247,8 @@ def _put_over_conditions(
     means, and of differences, which are then means over the conditions.
     """
     for row, cell in cells.iterrows():
-        manager, metric = cell["manager"], cell["metric"]
+        manager = cell["manager"]
+        metric = cell["metric"]
         own = real.loc[real["manager"] == manager, [metric, CONDITION]].dropna()
         if own[CONDITION].nunique() < _LEAST_CONDITIONS:
             continue
@@ -321,7 +322,8 @@ def _cell(
     real, ours = samples
     from scipy.stats import ks_2samp  # with ties its p is too high
 
-    rng, ks = generators(f"bootstrap/{manager}/{metric}"), ks_2samp(real, ours)
+    rng = generators(f"bootstrap/{manager}/{metric}")
+    ks = ks_2samp(real, ours)
     ad = statistics.anderson_darling(real, ours, generators(f"permutations/{manager}/{metric}"))
     return {
         "manager": manager,
@@ -344,7 +346,9 @@ def _pair(
     """Compare two managers in a metric (metric, manager), each with its real and its simulated
     sample.
     """
-    metric, first, second = one[0], one[1], other[1]
+    metric = one[0]
+    first = one[1]
+    second = other[1]
     (real, ours), (other_real, other_ours) = samples
     # By the normal approximation, as the subsamples below are tested.
     published = statistics.mann_whitney(real, other_real, "asymptotic")
@@ -383,10 +387,8 @@ def compare_shares(
     validation_shares.csv.
     """
     sides = published, simulated
-    known, where = (
-        Region({"pipeline_found": ((0.0, 1.0),)}),
-        Region({"pipeline_found": ((1.0, 1.0),)}),
-    )
+    known = Region({"pipeline_found": ((0.0, 1.0),)})
+    where = Region({"pipeline_found": ((1.0, 1.0),)})
     found = [
         Share(manager=manager, name="pipeline found", among=known, where=where)
         for manager in managers
@@ -517,7 +519,8 @@ def _targets(
 
 
 def _targets_of_cell(cell: Mapping[Any, Any]) -> Iterator[tuple[Any, ...]]:
-    manager, metric = cell["manager"], cell["metric"]
+    manager = cell["manager"]
+    metric = cell["metric"]
     for kind in ("mean", "std"):
         low, high = (cell[name] for name in interval_names(f"published_{kind}"))
         is_known = low is not None and not math.isnan(low)
