@@ -39,7 +39,6 @@ from matplotlib.figure import Figure
 from scipy.special import stdtrit
 
 from suave_des import InputError, mean_of, read_ensemble, read_runs, run_campaign
-from suave_des.campaign.variation import ENSEMBLE_COLUMN
 
 FOLDER = Path(__file__).with_name("predictions")
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -85,7 +84,7 @@ def predict(missions: pandas.DataFrame) -> Iterator[dict[str, Any]]:
     managers = list(dict.fromkeys(missions["manager"]))
     for metric in METRICS:
         values = missions.astype({metric: float}).dropna(subset=metric)
-        cells = values.groupby(["manager", ENSEMBLE_COLUMN, "condition"], observed=True)[metric]
+        cells = values.groupby(["manager", "ensemble_member", "condition"], observed=True)[metric]
         means, variances = cells.mean().unstack(), cells.var().unstack()
         have = [manager for manager in managers if manager in means.index.get_level_values(0)]
         n = cells.size().mean()

@@ -18,9 +18,7 @@ import pandas
 
 from calibration.cases import fitted_scenario, read_cases, read_problem
 from calibration.fit import fit
-from suave_des import find, mean_of, read_runs, run_campaign
-from suave_des.estimates import std_of
-from suave_des.results.validation import sample
+from suave_des import find, read_runs, run_campaign
 
 METRICS = ("search_time_s", "distance_inspected_m")
 WITHIN_STD = 0.5
@@ -60,25 +58,24 @@ def split_check(
 def _row(
     manager: str, metric: str, published: pandas.DataFrame, frame: pandas.DataFrame
 ) -> dict[str, object]:
-    theirs, ours = (sample(side, manager, metric).tolist() for side in (published, frame))
-    if len(theirs) < 2 or not ours:
+    theirs, ours = (
+        side.loc[side["manager"] == manager, metric].dropna() for side in (published, frame)
+    )
+    if len(theirs) < 2 or ours.empty:
         raise ValueError(
             f"manager {manager}: {len(theirs)} published and {len(ours)} simulated missions are too few"
         )
-    means, stds = (
-        [estimate(each).value for each in (theirs, ours)] for estimate in (mean_of, std_of)
-    )
-    difference = means[1] - means[0]
-    in_std = difference / stds[0] if stds[0] else float("nan")
+    difference = ours.mean() - theirs.mean()
+    in_std = difference / theirs.std() if theirs.std() else float("nan")
     return {
         "left_out": manager,
         "metric": metric,
         "published_n": len(theirs),
-        "published_mean": means[0],
-        "published_std": stds[0],
+        "published_mean": theirs.mean(),
+        "published_std": theirs.std(),
         "predicted_n": len(ours),
-        "predicted_mean": means[1],
-        "predicted_std": stds[1],
+        "predicted_mean": ours.mean(),
+        "predicted_std": ours.std(),
         "difference": difference,
         "difference_in_std": in_std,
         "within": abs(in_std) <= WITHIN_STD,

@@ -20,9 +20,8 @@ import pandas
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from suave_des import run_campaign
+from suave_des import mean_of, run_campaign
 from suave_des.results import style
-from suave_des.results.statistics import mean_interval
 
 FIRST_RUNS = 3
 SEED = 1
@@ -109,8 +108,9 @@ def paired(ours: pandas.Series[float], theirs: pandas.Series[float]) -> dict[str
         runs.
     """
     difference = (ours - theirs).dropna()
-    found = mean_interval(difference.to_numpy(float))
-    low, high = found.interval or (np.nan, np.nan)
+    low, high = mean_of(difference.tolist()).interval or (np.nan, np.nan)
+    if difference.nunique() == 1:  # of equal values nothing is known of their spread
+        low, high = np.nan, np.nan
     first = difference[difference.index <= FIRST_RUNS].mean()
     return {
         "n": len(difference),

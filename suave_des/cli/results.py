@@ -4,6 +4,7 @@ for a browser.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,7 +12,7 @@ import typer
 
 from suave_des.campaign import progress
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.console import TEXT_WIDTH, output, print_table
+from suave_des.cli.console import TEXT_WIDTH, counted, errors, output, print_table
 from suave_des.cli.options import (
     Fields,
     Files,
@@ -40,7 +41,9 @@ from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.records.mission_folder import MissionRecord
+    from suave_des.records.runs import Runs
     from suave_des.results.mission import Rules
+    from suave_des.results.validation import Validation
     from suave_des.tables import Written
 
 
@@ -140,9 +143,14 @@ def compare(
     if simulated:
         comparison = compare_assisted(groups)
     else:
-        comparison = compare_groups(
-            groups, against=against, half_widths=half_width or (), unpaired=unpaired
-        )
+        with counted("comparing", errors()) as show:
+            comparison = compare_groups(
+                groups,
+                against=against,
+                half_widths=half_width or (),
+                unpaired=unpaired,
+                on_progress=show,
+            )
     if out is None:
         print(comparison.written(as_format, min(output().width, TEXT_WIDTH)), end="")
     else:
@@ -207,7 +215,6 @@ def validate(
     With a campaign file that sweeps the conditions of the real missions, each is compared under its
     own condition.
     """
-    from suave_des import __version__
     from suave_des.results.real import (
         PAPERS_RUNS,
         numbered,
@@ -220,7 +227,7 @@ def validate(
     from suave_des.results.validation import validate as compare
 
     name = scenario or DEFAULT_SCENARIO
-    out, seed, overwrite = options.get("out"), options.get("seed", 1), "overwrite" in options
+    seed = options.get("seed", 1)
     if runs_file is not None:
         check_no_use(files.given, "with --runs-file", "leave one of them out")
     conditions = read_conditions(name, **files.replacements)
@@ -229,57 +236,88 @@ def validate(
     real = read_real(files_of_data, conditions, runs_in_a_row(name))
     chosen = real.choose(comma_separated(managers))
     shares, limits, targets_paths = targets_of(real, targets)
-    word = "published" if all(map(_is_shipped, real.files)) else "real"
-
     result: CampaignResult | None = None
-    sources: dict[str, object] = {
-        "data": [{"file": _shown(path), "sha256": digest} for path, digest in real.files.items()],
-        "targets": [_shown(path) for path in targets_paths],
-        "seed": seed,
-    }
     if runs_file is not None:
-        from suave_des.records.runs import read_runs
-
-        recorded = read_runs(runs_file, list(conditions.columns))
-        recorded.check_simulated()
-        recorded.choose(chosen)
-        if out is not None:
-            check_output_folder(out, "campaign", overwrite=overwrite)
-            make_output_folder(out)
+        recorded = _recorded(runs_file, list(conditions.columns), chosen, options)
         simulated = recorded.frame
-        sources |= {"runs_file": {"file": _shown(runs_file), "sha256": recorded.files[runs_file]}}
+        made: dict[str, object] = {"runs_file": _provenance(runs_file, recorded.files[runs_file])}
     else:
-        from suave_des.campaign.campaign import run_campaign
-
-        runs = -(-_RUNS // max(1, len(conditions)))
-        settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
-        with progress.shown(name, quiet=quiet) as show:
-            result = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
+        runs = options.get("runs", -(-_RUNS // max(1, len(conditions))))
+        result = _simulated(name, chosen, {**options, "runs": runs}, files, quiet=quiet)
         simulated = result.frame()
-        sources |= {"scenario": result.campaign.loaded.scenario.name, "runs": settings["runs"]}
-        # one has no mission to compare
         if not set(result.campaign.spec.managers) <= set(simulated["manager"]):
-            exit_telling_failures(result)
+            exit_telling_failures(result)  # there is nothing to compare
+        made = {"scenario": result.campaign.loaded.scenario.name, "runs": runs}
     validation = compare(
         real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed
     )
-    console = output()
-    for line in [*real.notes, ""] if real.notes else ():
-        console.print(line)
-    for table in validation.tables(word):
-        print_table(console, table)
-        console.print()
-    console.print("\n".join(validation.remarks(word)))
-    if out is None:
-        console.print("\nNo files were written; --out DIR keeps the tables.")
-    else:
-        about = {"version": __version__, "command": command_line(), **sources}
-        write_beside(out, validation.texts(about), LISTINGS["campaign"])
-        console.print(f"\nTables and validation.json are in {out}")
+    word = "published" if all(map(_is_shipped, real.files)) else "real"
+    _print_validation(validation, word, real.notes)
+    sources = {
+        "data": [_provenance(path, digest) for path, digest in real.files.items()],
+        "targets": list(map(_shown, targets_paths)),
+        "seed": seed,
+    }
+    _keep_validation(validation, options.get("out"), sources | made)
     if result is not None:
         exit_telling_failures(result)
     if strict and not validation.all_met:
         raise typer.Exit(TARGETS_NOT_MET)
+
+
+def _recorded(file: Path, columns: Sequence[str], managers: Sequence[str], options: Given) -> Runs:
+    """Read the missions to compare, and check the folder for the tables."""
+    from suave_des.records.runs import read_runs
+
+    recorded = read_runs(file, columns)
+    recorded.check_simulated()
+    recorded.choose(managers)
+    out = options.get("out")
+    if out is not None:
+        check_output_folder(out, "campaign", overwrite="overwrite" in options)
+        make_output_folder(out)
+    return recorded
+
+
+def _simulated(
+    name: str, managers: Sequence[str], options: Given, files: Files, *, quiet: bool
+) -> CampaignResult:
+    """Run the missions to compare."""
+    from suave_des.campaign.campaign import run_campaign
+
+    settings: Given = {"workers": None, "command": command_line(), **options}
+    with progress.shown(name, quiet=quiet) as show:
+        return run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
+
+
+def _print_validation(validation: Validation, real: str, notes: Sequence[str]) -> None:
+    console = output()
+    for note in notes:
+        console.print(note)
+    if notes:
+        console.print()
+    for table in validation.tables(real):
+        print_table(console, table)
+        console.print()
+    console.print("\n".join(validation.remarks(real)))
+
+
+def _keep_validation(
+    validation: Validation, out: Path | None, sources: Mapping[str, object]
+) -> None:
+    """Write the files of a validation into a folder, if there is one, and say so."""
+    from suave_des import __version__
+
+    if out is None:
+        output().print("\nNo files were written; --out DIR keeps the tables.")
+        return
+    about = {"version": __version__, "command": command_line(), **sources}
+    write_beside(out, validation.texts(about), LISTINGS["campaign"])
+    output().print(f"\nTables and validation.json are in {out}")
+
+
+def _provenance(path: Path, digest: str) -> dict[str, str]:
+    return {"file": _shown(path), "sha256": digest}
 
 
 def _shown(path: Path) -> str:
@@ -381,27 +419,31 @@ def replay(
     from suave_des.pages.replay import missions_in, missions_run, replay_page
     from suave_des.scenario.loader import load_scenario
 
-    folders = folders or []
-    if bool(folders) == (scenario is not None):
-        problem = "both DIR and --scenario are given" if folders else "there is nothing to play"
-        raise InputError(
-            problem, remedy="give DIR, the --out folder of run or campaign, or --scenario NAME"
-        )
+    _check_one_source(folders or [], scenario)
+    names = comma_separated(managers)
+    run = 1 if run_number is None else run_number
+    page_file = out or (folders[0] if folders else Path()) / "replay.html"
     if folders:
         check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
     else:
         check_no_use({"--point": point}, "without a campaign's folder")
-    page_file = out or (folders[0] if folders else Path()) / "replay.html"
-    names, run = comma_separated(managers), 1 if run_number is None else run_number
     if out is not None or not folders:
         check_output_file(page_file, overwrite=True)
     if scenario is not None:
         loaded = load_scenario(scenario, **files.replacements)
         missions = missions_run(loaded, names or ("metacontrol",), run, 1 if seed is None else seed)
     else:
-        missions = missions_in(folders, names, run, point or 0, confirmed=yes)
+        missions = missions_in(folders or [], names, run, point or 0, confirmed=yes)
     write_page(page_file, replay_page(missions), show=show)
     print(f"{' and '.join(each.name for each in missions)}: {page_file}")
+
+
+def _check_one_source(folders: Sequence[Path], scenario: str | None) -> None:
+    """Check that there are missions to play, and that it is clear which."""
+    if bool(folders) == (scenario is not None):
+        problem = "both DIR and --scenario are given" if folders else "there is nothing to play"
+        remedy = "give DIR, the --out folder of run or campaign, or --scenario NAME"
+        raise InputError(problem, remedy=remedy)
 
 
 def report(

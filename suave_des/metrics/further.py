@@ -116,7 +116,8 @@ class FurtherMetrics:
         )
 
     def _area_covered_m2(self, now_s: float) -> float:
-        vehicle, visibility = self.thrusters.vehicle, self.measurements[WATER_VISIBILITY]
+        vehicle = self.thrusters.vehicle
+        visibility = self.measurements[WATER_VISIBILITY]
         vehicle.position(now_s)  # fills the track until now
         visibility_m = measured_at_rows(visibility.times_s, visibility.values, len(vehicle.track))
         tangent = self.scenario.vehicle.camera.tangent
@@ -141,7 +142,8 @@ class FurtherMetrics:
     ) -> float | None:
         now_s = float(self.env.now)
         count = measured.count_until(now_s)
-        times_s, values = measured.times_s[:count], measured.values[:count]
+        times_s = measured.times_s[:count]
+        values = measured.values[:count]
         if not count or now_s <= times_s[0]:
             return None
         ends_s = (*times_s[1:], now_s)

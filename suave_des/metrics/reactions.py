@@ -8,8 +8,8 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from operator import itemgetter
-from typing import Any
+from operator import attrgetter
+from typing import NamedTuple
 
 import simpy
 
@@ -21,6 +21,37 @@ from suave_des.scenario.modes import Mode
 
 _LATER_S = 1e-4
 """From a time to the times after it, with all rounding errors."""
+
+
+class _Failure(NamedTuple):
+    """A thruster failure is reported."""
+
+    t_s: float
+
+
+class _Fitting(NamedTuple):
+    """From this visibility message on another altitude fits, or none does."""
+
+    t_s: float
+    altitude_m: float | None
+
+
+class _BatteryLevel(NamedTuple):
+    """A message of the battery's level."""
+
+    t_s: float
+    is_low: bool
+
+
+class _Effect(NamedTuple):
+    """A mode has taken effect."""
+
+    t_s: float
+    function: str
+    mode: Mode
+
+
+_Entry = _Failure | _Fitting | _BatteryLevel | _Effect
 
 
 @dataclass(eq=False)
@@ -47,18 +78,18 @@ class ReactionMeter:
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Note a component's status."""
         if diagnostic.value == FAILED:
-            self._entries.append((self.env.now, _OpenEvents.failure, None))
+            self._entries.append(_Failure(self.env.now))
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Note that a mode has taken effect."""
-        self._entries.append((self.env.now, _OpenEvents.mode_effect, (function, mode)))
+        self._entries.append(_Effect(self.env.now, function, mode))
 
     def reactions_s(self) -> list[float]:
         """The reactions completed by now, in the order of their completion."""
         open_events = _OpenEvents(self.visibility.next_message_s, self.initial_altitude_m)
         entries = [*self._fitting_altitudes(), *self._low_battery(), *self._entries]
-        for t_s, method, value in sorted(entries, key=itemgetter(0)):
-            method(open_events, t_s, value)
+        for entry in sorted(entries, key=attrgetter("t_s")):
+            open_events.take(entry)
         return open_events.completed_s
 
     def mean_s(self) -> float | None:
@@ -68,15 +99,13 @@ class ReactionMeter:
 
     def _fitting_altitudes(self) -> list[_Entry]:
         """The messages from which on another altitude fits than before."""
-        thresholds_m, altitudes_m = (
-            self.settings.visibility_thresholds_m,
-            self.settings.expected_altitudes_m,
-        )
+        thresholds_m = self.settings.visibility_thresholds_m
+        altitudes_m = self.settings.expected_altitudes_m
         crossings_s, regions = self.visibility.crossings(thresholds_m[::-1])
         fitting_m = [None, *(altitude_m for altitude_m in altitudes_m[::-1] for _ in range(2))]
         # later ones are not answered
-        passed = bisect_right(crossings_s, self._entries[-1][0]) if self._entries else 0
-        return [(crossings_s[n], _OpenEvents.expect, fitting_m[regions[n]]) for n in range(passed)]
+        passed = bisect_right(crossings_s, self._entries[-1].t_s) if self._entries else 0
+        return [_Fitting(crossings_s[n], fitting_m[regions[n]]) for n in range(passed)]
 
     def _low_battery(self) -> Iterator[_Entry]:
         """The messages of a low battery, and each after these that says that it is not."""
@@ -86,7 +115,7 @@ class ReactionMeter:
             for t_s, level in zip(self.battery.times_s[:count], self.battery.values, strict=False):
                 low = level < self.settings.battery_limit
                 if low or was_low:
-                    yield t_s, _OpenEvents.battery, low
+                    yield _BatteryLevel(t_s, low)
                 was_low = low
 
 
@@ -107,18 +136,21 @@ class _OpenEvents:
         self._since_s: dict[str, float] = {}  # when each kind of event began that is open
         self.completed_s: list[float] = []
 
-    def failure(self, t_s: float, _: None) -> None:
-        """A thruster failure is reported."""
-        if not self._recovering:
-            self._since_s.setdefault("failure", t_s)
+    def take(self, entry: _Entry) -> None:
+        """Take an entry; they come in order of time."""
+        match entry:
+            case _Failure(t_s):
+                if not self._recovering:
+                    self._since_s.setdefault("failure", t_s)
+            case _Fitting(t_s, altitude_m):
+                self._expected_m = altitude_m
+                self._compare_at(t_s)
+            case _BatteryLevel(t_s, is_low):
+                self._battery(t_s, is_low)
+            case _Effect(t_s, function, mode):
+                self._mode_effect(t_s, function, mode)
 
-    def expect(self, t_s: float, altitude_m: float | None) -> None:
-        """From this visibility message on another altitude fits, or none does."""
-        self._expected_m = altitude_m
-        self._compare_at(t_s)
-
-    def battery(self, t_s: float, low: bool) -> None:
-        """A message of the battery's level."""
+    def _battery(self, t_s: float, low: bool) -> None:
         if low:
             self._since_s.setdefault("low battery", t_s)
             # one that is open is dropped; if it lasts, it begins anew afterwards
@@ -128,9 +160,7 @@ class _OpenEvents:
             self._compare_at(self._next_message_s(t_s))
         self._battery_low = low
 
-    def mode_effect(self, t_s: float, effect: tuple[str, Mode]) -> None:
-        """A mode has taken effect."""
-        function, mode = effect
+    def _mode_effect(self, t_s: float, function: str, mode: Mode) -> None:
         if function == MAINTAIN_MOTION:
             self._recovering = mode.active
         if not mode.active:
@@ -160,7 +190,3 @@ class _OpenEvents:
                 self._since_s.setdefault("mismatch", message_s)
             elif self._since_s.get("mismatch", -math.inf) >= message_s:
                 del self._since_s["mismatch"]
-
-
-_Entry = tuple[float, Callable[[_OpenEvents, float, Any], None], Any]
-"""Time, method that takes the entry, and its value."""

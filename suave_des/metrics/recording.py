@@ -57,32 +57,36 @@ class Recorder:
         """Keep a component's report, or the first value and the crossings of a measured quality
         attribute.
         """
-        key, value = diagnostic.key, diagnostic.value
+        key = diagnostic.key
+        value = diagnostic.value
         if diagnostic.kind == Kind.COMPONENT_STATUS:
-            self.log(
-                "leak_monitor" if key == HULL else "thruster_monitor",
-                "component_status",
-                f"{key} {value}",
-            )
-        elif key in (WATER_VISIBILITY, BATTERY_LEVEL) and isinstance(value, float):
-            word, unit, limits = "battery", "", [self.metric.battery_limit]
-            if key == WATER_VISIBILITY:
-                word, unit, limits = "visibility", " m", sorted(self.metric.visibility_thresholds_m)
-            before, reached = self._reached.get(key), bisect_right(limits, value)
-            if before is None:
-                self.log(f"{word}_monitor", "first_measurement", f"{value:.2f}{unit}")
-            elif reached != before:
-                way, limit = (
-                    ("rises to", limits[reached - 1])
-                    if reached > before
-                    else ("falls below", limits[reached])
-                )
-                self.log(
-                    f"{word}_monitor",
-                    f"{word}_crossing",
-                    f"{way} {limit:g}{unit} ({value:.2f}{unit})",
-                )
-            self._reached[key] = reached
+            monitor = "leak_monitor" if key == HULL else "thruster_monitor"
+            self.log(monitor, "component_status", f"{key} {value}")
+        elif not isinstance(value, float):
+            return
+        elif key == WATER_VISIBILITY:
+            limits_m = sorted(self.metric.visibility_thresholds_m)
+            self._measured(key, value, limits_m, "visibility", " m")
+        elif key == BATTERY_LEVEL:
+            self._measured(key, value, [self.metric.battery_limit], "battery", "")
+
+    def _measured(
+        self, key: str, value: float, limits: Sequence[float], word: str, unit: str
+    ) -> None:
+        """Keep the first value of a quality attribute, and when it reaches or leaves a limit."""
+        monitor = f"{word}_monitor"
+        measured = f"{value:.2f}{unit}"
+        before = self._reached.get(key)
+        reached = bisect_right(limits, value)
+        if before is None:
+            self.log(monitor, "first_measurement", measured)
+        elif reached > before:
+            text = f"rises to {limits[reached - 1]:g}{unit} ({measured})"
+            self.log(monitor, f"{word}_crossing", text)
+        elif reached < before:
+            text = f"falls below {limits[reached]:g}{unit} ({measured})"
+            self.log(monitor, f"{word}_crossing", text)
+        self._reached[key] = reached
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""

@@ -154,7 +154,8 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
         from the point seen first, x and y; seen: time, x and y of the first sight, or None; cycles:
         see explain_cycles.
     """
-    metrics, track = mission.metrics, mission.trajectory.round(_DECIMALS)
+    metrics = mission.metrics
+    track = mission.trajectory.round(_DECIMALS)
     modes = {
         function: [(span.begin_s, span.what) for span in spans]
         for function, spans in mode_spans(mission).items()
@@ -210,7 +211,9 @@ def _inspected(
     points = way[:, :2].tolist()
     track = mission.trajectory
     found: list[tuple[float, int, float]] = []
-    next_point, was_following, start_m = 0, False, 0.0
+    next_point = 0
+    was_following = False
+    start_m = 0.0
     for t_s, x_m, y_m in zip(track["t_s"], track["x_m"], track["y_m"], strict=True):
         place = bisect_right(mode_times, t_s) - 1
         is_following = place >= 0 and modes[place][1] != UNGROUND_MODE
@@ -246,7 +249,8 @@ def explain_cycles(mission: MissionRecord) -> Plain:
         because of which facts). rules: text of each rule that took part. note: why some of it is
         missing, or empty.
     """
-    scenario, cycles = mission.settings, list[Plain]()
+    scenario = mission.settings
+    cycles = list[Plain]()
     known: Plain = {"cycles": cycles, "inferences": [], "rules": {}, "note": ""}
     if not mission.knowledge:
         return known
@@ -325,7 +329,8 @@ class _Explainer:
         """The index of what follows; the numbers in its derivations are those of the first such
         cycle.
         """
-        facts, state = reasoning.inference.facts, reasoning.inference.state
+        facts = reasoning.inference.facts
+        state = reasoning.inference.state
         if not facts:
             return -1
         key = facts, state.objectives, state.groundings, state.components

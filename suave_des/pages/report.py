@@ -139,8 +139,7 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
     every = max(1, math.ceil(len(frame) / MOST_DRAWN))
     has_runs = bool(frame["run"].notna().all())
     if every > 1:
-        place = frame["run"] if has_runs else pandas.Series(range(len(frame)), frame.index)
-        frame = frame[(place % every) == (1 if has_runs else 0)]
+        frame = frame[(frame["run"] - 1) % every == 0] if has_runs else frame.iloc[::every]
     seeds = frame["seed"].astype(str).tolist()
     columns = {
         "group": numbers[frame.index].tolist(),
@@ -148,11 +147,8 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
         "seed": seeds[:1] if len(set(seeds)) == 1 else seeds,
         "found": _plain(frame["pipeline_found"].astype(float)),
     }
-    titles = {
-        name: METRICS[name].heading
-        for name in _CHARTED
-        if name in frame and frame[name].notna().any()
-    }
+    charted = [name for name in _CHARTED if name in frame and frame[name].notna().any()]
+    titles = {name: METRICS[name].heading for name in charted}
     columns |= {name: _plain(frame[name]) for name in (*titles, *missions.swept)}
     names = [each.name for each in groups]
     return {
@@ -171,16 +167,19 @@ def _plain(column: pandas.Series) -> list[Any]:
     """Return values as JSON has them: numbers with few digits, None where there is none."""
     if not pandas.api.types.is_numeric_dtype(column):
         return column.astype(str).tolist()
-    values = column.astype(float).round(_DIGITS).tolist()
-    return [
-        None if not math.isfinite(value) else int(value) if value.is_integer() else value
-        for value in values
-    ]
+    return list(map(_short, column.astype(float).round(_DIGITS).tolist()))
+
+
+def _short(value: float) -> float | None:
+    if not math.isfinite(value):
+        return None
+    return int(value) if value.is_integer() else value
 
 
 def _made(folder: Path) -> dict[str, Any]:
     """Read how the campaign in a folder was made; little is known of other folders."""
-    about, path = read_manifest(folder), folder / MANIFEST_FILE
+    about = read_manifest(folder)
+    path = folder / MANIFEST_FILE
     return {
         "folder": str(folder),
         "command": shlex.join(about.command),

@@ -25,7 +25,7 @@ from suave_des.records.runs import (
     is_foreign,
     runs_in,
 )
-from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest
+from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest, read_note
 
 Source = pandas.DataFrame | str | Path | Sequence[str | Path]
 """Missions: a data frame with the columns of runs.csv, or folders and files."""
@@ -93,6 +93,8 @@ def read_missions(paths: Sequence[Path]) -> Missions:
 
 def _read_source(path: Path) -> Missions:
     """Read the folder of a campaign, a folder of the exemplar's files, or a single file."""
+    if (path / STORE_FILE).is_file():
+        read_note(path / STORE_FILE, "request")  # which refuses a store that is not ours
     if (path / RUNS_FILE).exists():
         return _read_file(path / RUNS_FILE, is_of_folder=True)
     if path.is_dir():

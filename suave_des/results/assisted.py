@@ -122,7 +122,8 @@ def _weighed(
 ) -> Estimate:
     """Estimate the mean with a weight of the simulation."""
     real, same, population = sides
-    n, between = len(real), spread_of(population, chance.population) ** 2
+    n = len(real)
+    between = spread_of(population, chance.population) ** 2
     seen = float((real - weight * same).var(ddof=1))
     least = (1.0 - weight) ** 2 * between + chance.real + weight**2 * chance.same
     of_population = float(population.var(ddof=1)) / len(population)
@@ -202,7 +203,8 @@ def compare_assisted(real: Groups) -> AssistedComparison:
         InputError: the missions are too few.
     """
     in_real, in_same, drawn = real.sides
-    rows, notes = [], [*real.missions.notes, *real.notes]
+    rows = []
+    notes = [*real.missions.notes, *real.notes]
     for metric in real.metrics:
         names = []
         for name in dict.fromkeys(group.name for group in real.groups):
@@ -342,7 +344,8 @@ def _worth(real: Sample, assisted: Estimate) -> dict[str, int | None]:
     """
     if len(real) < LEAST_TO_WEIGH:
         return {}
-    std, half = std_of(real.tolist()), (assisted.high - assisted.low) / 2.0
+    std = std_of(real.tolist())
+    half = (assisted.high - assisted.low) / 2.0
     return {
         "equal_conditions_low": statistics.runs_for(std.low, half),
         "equal_conditions_high": statistics.runs_for(std.high, half),
@@ -359,9 +362,11 @@ def _name(row: Row) -> str:
 def _cells(row: Row, metric: Metric) -> tuple[str, ...]:
     alone, assisted = (estimate_in(row, name) for name in ("alone", "assisted"))
     if row["other"]:
-        value, interval = metric.difference, metric.difference_interval
+        value = metric.difference
+        interval = metric.difference_interval
     else:
-        value, interval = metric.number, metric.interval
+        value = metric.number
+        interval = metric.interval
     return (
         _name(row),
         f"{row['runs']} in {row['conditions']}",
@@ -400,7 +405,8 @@ def _help(row: Row, metric: Metric) -> str:
     if not row["helps"]:
         return "the interval is not noticeably narrower with the simulation"
     narrower = f"the interval is {row['narrower']:.1f} times narrower with the simulation"
-    low, high = row.get("equal_conditions_low"), row.get("equal_conditions_high")
+    low = row.get("equal_conditions_low")
+    high = row.get("equal_conditions_high")
     if low is None or high is None:
         return narrower
     return f"{narrower}, as that of {low:,} to {high:,} conditions with real missions alone"

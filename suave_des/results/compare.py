@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypedDict, Unpack
 
 import numpy as np
 import pandas
@@ -29,6 +30,7 @@ from suave_des.results.assisted import AssistedComparison, compare_assisted
 from suave_des.results.comparison import Comparison, concluded
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
 from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
+from suave_des.results.real import CONDITION
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
 
@@ -169,22 +171,36 @@ def compare_groups(
     against: str | None = None,
     half_widths: Sequence[str] = (),
     unpaired: bool = False,
+    on_progress: Callable[[int, int], None] = lambda done, all_of_them: None,
 ) -> Comparison:
-    """Compare groups of missions; see compare_folders."""
+    """Compare groups of missions; see compare_folders. `on_progress` is told how many of how many
+    differences are done.
+    """
     statistics.library()
-    widths, pairs = _half_widths(half_widths, groups.metrics), _pairs(groups.groups, against)
-    asked = (
-        (*pair, metric, widths.get(metric.name)) for metric in groups.metrics for pair in pairs
-    )
-    found = [_difference(*each, unpaired=unpaired) for each in asked]
-    for column, name in (("p", "p_holm"), ("mean_p", "mean_p_holm")):
-        tested = [row for row in found if row.get(column) is not None]
-        ps = statistics.holm([row[column] for row in tested])
-        for row, p in zip(tested, ps, strict=True):
-            row[name] = p
-    largest = _largest(() if unpaired else pairs, groups.metrics[0], groups.missions.folders)
+    widths = _half_widths(half_widths, groups.metrics)
+    pairs = _pairs(groups.groups, against)
+    values = {metric.name: _values(groups.groups, metric.name) for metric in groups.metrics}
+    asked = [(metric, *pair) for metric in groups.metrics for pair in pairs]
+    found = []
+    for done, (metric, first, second) in enumerate(asked):
+        on_progress(done, len(asked))
+        samples = _samples(first, second, values[metric.name], unpaired=unpaired)
+        found.append(_difference(first, second, metric, samples, widths.get(metric.name)))
+    _correct(found, "p")
+    _correct(found, "mean_p")
+    first_metric = groups.metrics[0]
+    together = () if unpaired else pairs
+    largest = _largest(together, first_metric, values[first_metric.name], groups.missions.folders)
     summaries = [_summary(group, metric) for metric in groups.metrics for group in groups.groups]
     return concluded(groups, summaries, found, *largest)
+
+
+def _correct(rows: Sequence[dict[str, Any]], column: str) -> None:
+    """Add Holm's correction of the p in a column for all tests together."""
+    tested = [row for row in rows if row.get(column) is not None]
+    ps = statistics.holm([row[column] for row in tested])
+    for row, p in zip(tested, ps, strict=True):
+        row[f"{column}_holm"] = p
 
 
 def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, float]:
@@ -205,17 +221,22 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
     """Pair the managers at each point of a sweep; the points of a manager, if it is the only
     one.
     """
-    pairs = [(one, other) for one, other in combinations(groups, 2) if one.point == other.point]
-    if against is None:
-        return pairs or list(combinations(groups, 2))
+    each_with_each = list(combinations(groups, 2))
+    pairs = each_with_each if against is None else _pairs_against(groups, against)
+    return [(one, other) for one, other in pairs if one.point == other.point] or pairs
+
+
+def _pairs_against(groups: Sequence[Group], against: str) -> list[tuple[Group, Group]]:
+    """Pair each with the group of that name, or with the one of that manager at its point."""
     by_name = {group.name: group for group in groups}
     if against in by_name:
-        pairs = [(group, by_name[against]) for group in groups if group.name != against]
-        return [pair for pair in pairs if pair[0].point == pair[1].point] or pairs
+        return [(group, by_name[against]) for group in groups if group.name != against]
+    managers = dict.fromkeys(group.name.removesuffix(group.point) for group in groups)
+    if against not in managers:
+        raise unknown(
+            f"nothing is called {shown(against)}", against, managers, "there are", "against"
+        )
     at_points = [(group, by_name.get(f"{against}{group.point}")) for group in groups]
-    if not any(chosen for _, chosen in at_points):
-        known = {group.name.removesuffix(group.point): group for group in groups}
-        raise unknown(f"nothing is called {shown(against)}", against, known, "there are", "against")
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
@@ -229,50 +250,63 @@ def _summary(group: Group, metric: Metric) -> dict[str, Any]:
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample) or np.isinf(sample).any():
         return row
-    is_share = metric.name == FOUND and group.is_of_missions
-    mean = (
-        share_of(int(sample.sum()), len(sample)) if is_share else statistics.mean_interval(sample)
-    )
-    row["mean"] = mean.cut(0.0, 1.0) if metric.name == FOUND else mean
-    row |= zip(
-        ("q1", "median", "q3"), np.percentile(sample, (25.0, 50.0, 75.0)).tolist(), strict=True
-    )
+    row["mean"] = _mean(group, metric, sample)
+    row["q1"], row["median"], row["q3"] = np.percentile(sample, (25.0, 50.0, 75.0)).tolist()
     row["std"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
-    if metric.name == SEARCH_TIME and group.is_of_missions:
-        was_found = rows[FOUND_BY_HORIZON].to_numpy(float)
-        if math.isfinite(group.horizon_s) and not np.isnan(was_found).any():
-            restricted, half = statistics.search_times(sample, was_found > 0.0, group.horizon_s)
-            row |= {
-                "horizon_s": group.horizon_s,
-                "restricted_mean_s": restricted,
-                "censored_median_s": half,
-            }
+    if metric.name == SEARCH_TIME and group.is_of_missions and math.isfinite(group.horizon_s):
+        row |= _until_found(sample, rows[FOUND_BY_HORIZON].to_numpy(float), group.horizon_s)
     return row
 
 
+def _mean(group: Group, metric: Metric, sample: Sample) -> Estimate:
+    """Estimate a mean; of missions that found the pipeline, the share."""
+    if metric.name != FOUND:
+        return statistics.mean_interval(sample)
+    if group.is_of_missions:
+        return share_of(int(sample.sum()), len(sample))
+    if group.counted == CONDITION:
+        return statistics.wilson(float(sample.sum()), len(sample))
+    return statistics.mean_interval(sample).cut(0.0, 1.0)
+
+
+def _until_found(
+    times_s: Sample, was_found: NDArray[np.float64], horizon_s: float
+) -> dict[str, Any]:
+    """Estimate times until the pipeline is found, where it is known which missions found it."""
+    if np.isnan(was_found).any():
+        return {}
+    restricted, half = statistics.search_times(times_s, was_found > 0.0, horizon_s)
+    return {"horizon_s": horizon_s, "restricted_mean_s": restricted, "censored_median_s": half}
+
+
 def _difference(
-    first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool
+    first: Group,
+    second: Group,
+    metric: Metric,
+    samples: _Samples,
+    half_width: float | None,
 ) -> dict[str, Any]:
     """Estimate the difference of two groups in one metric, and test it; half_width None: as usual
     for the metric.
     """
-    is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
+    is_paired, why, x, y = samples
     row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row
-    if metric.name == FOUND and first.is_of_missions and second.is_of_missions:
+    kinds = {first.counted, second.counted}
+    if metric.name == FOUND and kinds == {"mission"}:
         row |= _shares_compared(x > 0.0, y > 0.0, is_paired=is_paired)
     else:
         row |= _values_compared(x, y, is_paired=is_paired)
-    if metric.name == FOUND:
+    if metric.name == FOUND and kinds == {CONDITION} and is_paired:
+        row["difference"] = statistics.paired_share_difference(x, y)
+    elif metric.name == FOUND:
         row["difference"] = row["difference"].cut(-1.0, 1.0)
     if math.isnan(row["difference"].value):
         return row
-    half_width = (
-        half_width or metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
-    )
-    return row | _runs_needed(x, y, half_width, is_paired=is_paired)
+    usual = metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
+    return row | _runs_needed(x, y, half_width or usual, is_paired=is_paired)
 
 
 def _shares_compared(
@@ -326,73 +360,126 @@ def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) ->
     return row
 
 
-def _samples(
-    first: Group, second: Group, metric: str, *, unpaired: bool
-) -> tuple[bool, str, Sample, Sample]:
-    """Return whether two groups are paired, why, and their values, those of the same runs in the
-    same order if so.
+class _Samples(NamedTuple):
+    """The values of two groups, those of the same runs in the same order if they are paired."""
+
+    is_paired: bool
+    why: str
+    first: Sample
+    second: Sample
+
+
+@dataclass(frozen=True)
+class _Values:
+    """The values of one metric, by group.
+
+    Attributes:
+        alone: those that a group has.
+        by_run: of groups whose runs are known, in the order of `runs`, nan where there is none.
+        runs: numbers of all runs of any group.
     """
-    x, y = first.frame[metric], second.frame[metric]
-    if metric in TIMES and first.horizon_s != second.horizon_s:
+
+    metric: str
+    alone: Mapping[str, Sample]
+    by_run: Mapping[str, Sample]
+    runs: NDArray[np.float64]
+
+
+def _values(groups: Sequence[Group], metric: str) -> _Values:
+    """Return the values of a metric."""
+    alone = {group.name: group.frame[metric].dropna().to_numpy(float) for group in groups}
+    with_runs = {group.name: group.frame[metric] for group in groups if group.has_runs}
+    if not with_runs:
+        return _Values(metric, alone, {}, np.array([]))
+    together = pandas.concat(with_runs, axis=1)
+    by_run = {name: together[name].to_numpy(float) for name in with_runs}
+    return _Values(metric, alone, by_run, together.index.get_level_values("run").to_numpy(float))
+
+
+def _samples(first: Group, second: Group, values: _Values, *, unpaired: bool) -> _Samples:
+    """Return the values of two groups, paired if their runs share random numbers or conditions."""
+    x = values.alone[first.name]
+    y = values.alone[second.name]
+    if not unpaired and first.has_runs and second.has_runs:
+        both = np.array([values.by_run[first.name], values.by_run[second.name]])
+        both = both[:, ~np.isnan(both).any(axis=0)]
+        is_paired = both.shape[1] >= min(2, len(x), len(y))
+    else:
+        is_paired = False
+    if is_paired:
+        why = _why_paired(first, max(len(x), len(y)) - both.shape[1], len(both[0]))
+        x, y = both
+    else:
+        why = "not paired: as asked" if unpaired else _why_apart(first, second)
+    if values.metric in TIMES and first.horizon_s != second.horizon_s:
         horizon_s = min(first.horizon_s, second.horizon_s)
-        x, y = x.clip(upper=horizon_s), y.clip(upper=horizon_s)
-    apart = x.dropna().to_numpy(float), y.dropna().to_numpy(float)
-    if unpaired:
-        return False, "not paired: as asked", *apart
-    if not (first.has_runs and second.has_runs):
-        return (
-            False,
-            "not paired: real missions, or missions without seed, share no random numbers",
-            *apart,
+        return _Samples(is_paired, why, np.minimum(x, horizon_s), np.minimum(y, horizon_s))
+    return _Samples(is_paired, why, x, y)
+
+
+def _why_paired(group: Group, left: int, common: int) -> str:
+    """Say by what two groups are paired, and how many have a value under only one of them."""
+    what = "runs"
+    if group.counted == CONDITION:
+        what = "conditions"
+        why = "paired by condition, under which both have missions"
+    elif "run_idx" in group.frame:
+        why = "paired by run_idx, as the exemplar's own test does"
+    else:
+        why = (
+            "paired by run number, as runs with the same seed and number share their random numbers"
         )
-    common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
-    both = common.dropna()
-    if len(both) < min(2, *map(len, apart)):
-        why = "not paired: fewer than two runs of the same seed and number have a value under both"
-        return False, why, *apart
-    left = max(map(len, apart)) - len(both)
-    rest = (
-        f"; runs with a value under only one of them ({left}) are left out"
-        if left and len(both)
-        else ""
-    )
-    if "run_idx" in first.frame:
-        why = f"paired by run_idx, as the exemplar's own test does{rest}"
-        return True, why, both["x"].to_numpy(), both["y"].to_numpy()
-    why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
-    return True, why, both["x"].to_numpy(), both["y"].to_numpy()
+    if left and common:
+        return f"{why}; {what} with a value under only one of them ({left}) are left out"
+    return why
+
+
+def _why_apart(first: Group, second: Group) -> str:
+    if not (first.has_runs and second.has_runs):
+        return "not paired: real missions, or missions without seed, share no random numbers"
+    if CONDITION in (first.counted, second.counted):
+        return "not paired: fewer than two conditions of one source have a value under both"
+    return "not paired: fewer than two runs of the same seed and number have a value under both"
 
 
 def _largest(
-    pairs: Sequence[tuple[Group, Group]], metric: Metric, folders: Mapping[str, Path]
+    pairs: Sequence[tuple[Group, Group]],
+    metric: Metric,
+    values: _Values,
+    folders: Mapping[str, Path],
 ) -> tuple[Table, str]:
     """Return the least and the greatest difference of each pair, and the command that replays the
     largest of all.
     """
-    rows, found = [], []
+    rows = []
+    replays = [(0.0, "")]
     for first, second in pairs:
         if not all(each.has_runs and each.is_of_missions for each in (first, second)):
             continue
-        apart = first.frame[metric.name] - second.frame[metric.name]
-        apart = apart[np.isfinite(apart)]
-        if apart.any():
-            ends = least_and_greatest(apart)
-            cells = (text for value, run in ends for text in (metric.difference(value), str(run)))
-            rows.append((f"{first.name} - {second.name}", *cells))
-            firsts = pandas.concat([first.frame.head(1), second.frame.head(1)])
-            managers, sources = (
-                firsts[name].astype(str).unique() for name in ("manager", "source")
-            )
-            if (
-                not first.point
-                and 1 in (len(managers), len(sources))
-                and folders.keys() >= set(sources)
-            ):
-                size, run = max((abs(value), run) for value, run in ends)
-                places = (str(folders[source]) for source in sources)
-                chosen = "--run", str(run), "--managers", ",".join(managers)
-                found.append((size, shlex.join(["suave-des", "replay", *places, *chosen])))
+        apart = values.by_run[first.name] - values.by_run[second.name]
+        is_known = np.isfinite(apart)
+        if not apart[is_known].any():
+            continue
+        ends = least_and_greatest(apart[is_known], values.runs[is_known])
+        cells = [text for value, run in ends for text in (metric.difference(value), str(run))]
+        rows.append((f"{first.name} - {second.name}", *cells))
+        size, run = max((abs(value), run) for value, run in ends)
+        command = _replay_command(first, second, run, folders)
+        if command:
+            replays.append((size, command))
+    headings = ("difference", "least", "run", "greatest", "run")
     title = f"runs that differ most: {metric.heading}"
-    return Table(("difference", "least", "run", "greatest", "run"), rows, title), max(
-        found, default=(0.0, "")
-    )[1]
+    return Table(headings, rows, title), max(replays)[1]
+
+
+def _replay_command(first: Group, second: Group, run: int, folders: Mapping[str, Path]) -> str:
+    """Return the command that replays a run of two groups; empty if none does."""
+    both = [each.frame.iloc[0] for each in (first, second)]
+    managers = list(dict.fromkeys(str(each["manager"]) for each in both))
+    sources = list(dict.fromkeys(str(each["source"]) for each in both))
+    is_one_pair = len(managers) == 1 or len(sources) == 1
+    if first.point or not is_one_pair or not folders.keys() >= set(sources):
+        return ""
+    places = [str(folders[source]) for source in sources]
+    chosen = ["--run", str(run), "--managers", ",".join(managers)]
+    return shlex.join(["suave-des", "replay", *places, *chosen])

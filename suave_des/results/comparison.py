@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import pandas
@@ -17,7 +18,7 @@ from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.results.conclusions import conclusion, overall_conclusion
 from suave_des.results.groups import Groups, listed
 from suave_des.results.statistics import A12, RANK_BISERIAL
-from suave_des.tables import EFFECT, Section, Table, Written, capital, rows_of
+from suave_des.tables import EFFECT, Section, Table, Written, capital
 
 Row = Mapping[str, Any]
 """A row of a frame by column, None where there is nothing."""
@@ -90,6 +91,8 @@ class Comparison(Written):
             difference), half_width (of the interval for which the number of runs is given),
             runs_needed_paired (runs of each manager for that, if they are paired),
             runs_needed_unpaired (none: over ten million, or not known), and conclusion.
+        of_groups: the rows of summaries, with whole estimates; likewise of_pairs those of
+            differences.
         counted: what n counts: "mission", or "run" or "draw" where missions are averaged over
             these.
         largest: of each pair the least and the greatest difference in the first metric, each with
@@ -98,13 +101,24 @@ class Comparison(Written):
     """
 
     conclusion: str
-    summaries: pandas.DataFrame
-    differences: pandas.DataFrame
     notes: tuple[str, ...]
+    of_groups: Sequence[Row] = field(repr=False)
+    of_pairs: Sequence[Row] = field(repr=False)
     metrics: tuple[Metric, ...] = field(repr=False)
     counted: str = field(default="mission", repr=False)
     largest: Table = field(default=_NO_TABLE, repr=False)
     replay: str = field(default="", repr=False)
+
+    @cached_property
+    def summaries(self) -> pandas.DataFrame:
+        """What is estimated of each group; see the class."""
+        return _frame(self.of_groups, _SUMMARY).astype({"horizon_s": "Float64"})
+
+    @cached_property
+    def differences(self) -> pandas.DataFrame:
+        """What is estimated of each pair; see the class."""
+        counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
+        return _frame(self.of_pairs, _DIFFERENCE).astype(counts)
 
     def frames(self) -> dict[str, pandas.DataFrame]:
         """Return both frames."""
@@ -116,16 +130,15 @@ class Comparison(Written):
         """
         needed = []
         for metric in self.metrics:
-            own = [
-                rows_of(frame[frame["metric"] == metric.name]) for frame in self.frames().values()
-            ]
+            groups = [each for each in self.of_groups if each["metric"] == metric.name]
+            pairs = [each for each in self.of_pairs if each["metric"] == metric.name]
             tables = (
-                _summary_table(metric, own[0]),
-                _search_table(own[0]),
-                _difference_table(metric, own[1]),
+                _summary_table(metric, groups),
+                _search_table(groups),
+                _difference_table(metric, pairs),
             )
-            sentences = [each["conclusion"] for each in own[1]]
-            needed += [_runs_row(each, metric) for each in own[1] if each["half_width"] is not None]
+            sentences = [each["conclusion"] for each in pairs]
+            needed += [_runs_row(each, metric) for each in pairs if each["half_width"] is not None]
             yield Section(metric.heading, [each for each in tables if each.rows], sentences)
         if needed:
             headings = ("difference", "for ±", "paired", "not paired", "variance ratio")
@@ -168,38 +181,41 @@ class Comparison(Written):
         """Write two tables for LaTeX with booktabs: means and standard deviations as in the paper,
         and differences.
         """
-        metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or list(
-            self.metrics
-        )
+        notes = [f"% Note: {note}." for note in self.notes]
+        lines = [r"% needs \usepackage{booktabs}", *notes, self._latex_of_means()]
+        if self.of_pairs:
+            lines.append(self._latex_of_differences())
+        return "\n".join(lines) + "\n"
+
+    def _latex_of_means(self) -> str:
+        metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or self.metrics
         by_group: dict[str, list[str]] = {}
         for metric in metrics:
-            for each in rows_of(self.summaries[self.summaries["metric"] == metric.name]):
-                cells = metric.number(each["mean"]), metric.number(each["std"])
+            for each in self.of_groups:
+                if each["metric"] != metric.name:
+                    continue
+                cells = metric.number(each["mean"].value), metric.number(each["std"])
                 by_group.setdefault(each["group"], [each["group"]]).extend(cells)
         shown = [row for row in by_group.values() if any(row[1:])]
-        means = Table(
-            ("Manager", *("Mean", "Std") * len(metrics)), shown, "Means and standard deviations."
-        )
-        lines = [r"% needs \usepackage{booktabs}", *(f"% Note: {note}." for note in self.notes)]
+        headings = ("Manager", *("Mean", "Std") * len(metrics))
+        table = Table(headings, shown, "Means and standard deviations.")
         over = [capital(metric.heading) for metric in metrics]
-        lines.append(means.latex(over, label="tab:means", note=self._sizes()))
-        if len(self.differences):
-            rows: list[tuple[str, ...]] = []
-            for metric in self.metrics:
-                own = self.differences[
-                    (self.differences["metric"] == metric.name) & self.differences["test"].notna()
-                ]
-                rows += [(capital(metric.heading),)] if len(own) else []
-                cells_of = (_difference_row(each, metric) for each in rows_of(own))
-                rows += [
-                    (name, mean, interval, effect, p)
-                    for name, _, mean, interval, _, p, effect in cells_of
-                ]
-            headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
-            table = Table(headings, rows, "Differences between managers.")
-            text = table.latex(label="tab:differences", note=" ".join(self._methods()))
-            lines.append(text.replace("p (Holm)", "$p$ (Holm)"))
-        return "\n".join(lines) + "\n"
+        return table.latex(over, label="tab:means", note=self._sizes())
+
+    def _latex_of_differences(self) -> str:
+        rows: list[tuple[str, ...]] = []
+        tested = [each for each in self.of_pairs if each["test"]]
+        for metric in self.metrics:
+            own = [each for each in tested if each["metric"] == metric.name]
+            if own:
+                rows.append((capital(metric.heading),))
+            for each in own:
+                name, _, mean, interval, _, p, effect = _difference_row(each, metric)
+                rows.append((name, mean, interval, effect, p))
+        headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
+        table = Table(headings, rows, "Differences between managers.")
+        text = table.latex(label="tab:differences", note=" ".join(self._methods()))
+        return text.replace("p (Holm)", "$p$ (Holm)")
 
     def _sizes(self) -> str:
         sizes = self.summaries.drop_duplicates("group").set_index("group")["n"]
@@ -232,7 +248,7 @@ def _summary_table(metric: Metric, summaries: Sequence[Row]) -> Table:
             if each["q1"] is None
             else metric.interval(Estimate(each["median"], each["q1"], each["q3"]))
         )
-        mean = metric.number(each["mean"]), metric.interval(estimate_in(each, "mean"))
+        mean = metric.number(each["mean"].value), metric.interval(each["mean"])
         spread = metric.number(each["std"]), metric.number(each["median"]), quartiles
         rows.append((each["group"], f"{each['n']:,}", *mean, *spread)[:width])
     return Table(headings[:width], rows)
@@ -253,19 +269,20 @@ def _search_table(summaries: Sequence[Row]) -> Table:
     )
     rows = []
     for each in known:
-        mean = estimate_in(each, "restricted_mean_s")
-        half_s, low_s, high_s = (
-            each[name] for name in ("censored_median_s", *interval_names("censored_median_s"))
-        )
-        if abs(mean.value - each["mean"]) < 0.005 and half_s is not None:
+        mean = each["restricted_mean_s"]
+        half = each["censored_median_s"]
+        if abs(mean.value - each["mean"].value) < 0.005 and math.isfinite(half.value):
             continue  # as in the table above
-        ends = "not reached" if low_s is None else f"{low_s:.0f} to {_seconds(high_s)}"
-        rows.append((each["group"], f"{mean.value:.2f}", mean.text(".1f"), _seconds(half_s), ends))
+        is_reached = math.isfinite(half.low)
+        ends = f"{half.low:.0f} to {_seconds(half.high)}" if is_reached else "not reached"
+        rows.append(
+            (each["group"], f"{mean.value:.2f}", mean.text(".1f"), _seconds(half.value), ends)
+        )
     return Table(headings, rows, "missions that never found it as censored (Kaplan-Meier)")
 
 
-def _seconds(value: float | None) -> str:
-    return "not reached" if value is None else f"{value:.0f}"
+def _seconds(value: float) -> str:
+    return f"{value:.0f}" if math.isfinite(value) else "not reached"
 
 
 def _difference_table(metric: Metric, differences: Sequence[Row]) -> Table:
@@ -280,7 +297,8 @@ def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
     names = f"{each['group']} - {each['other']}", ", ".join(f"{n:,}" for n in sizes)
     if not each["test"]:
         return *names, "", "", "", "", ""
-    mean, size = estimate_in(each, "difference"), estimate_in(each, "effect")
+    mean = each["difference"]
+    size = estimate_in(each, "effect")
     effect = "" if each["effect"] is None else f"{size.value:.2f}"
     effect += f" ({size.text('.2f')})" if size.has_interval else ""
     return (
@@ -334,14 +352,13 @@ def concluded(
     for row in differences:
         row["tests"] = len(tested)
         row["conclusion"] = conclusion(row, by_name[row["metric"]])
-    counts = dict.fromkeys(("runs_needed_paired", "runs_needed_unpaired"), "Int64")
-    frames = (
-        _frame(summaries, _SUMMARY).astype({"horizon_s": "Float64"}),
-        _frame(differences, _DIFFERENCE).astype(counts),
-    )
     sentences = " ".join(_conclusions(groups, summaries, differences))
     notes = (*groups.missions.notes, *groups.notes, *_worse_paired(differences))
-    return Comparison(sentences, *frames, notes, groups.metrics, groups.counted, largest, replay)
+    of_groups = [dict.fromkeys(_SUMMARY) | {"mean": Estimate()} | dict(row) for row in summaries]
+    of_pairs = [dict.fromkeys(_DIFFERENCE) | row for row in differences]
+    return Comparison(
+        sentences, notes, of_groups, of_pairs, groups.metrics, groups.counted, largest, replay
+    )
 
 
 def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
@@ -350,12 +367,11 @@ def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
     """
     plain = []
     for row in rows:
-        cells: dict[str, Any] = dict.fromkeys(columns) | dict(row)
+        cells = dict(row)
         for name, found in row.items():
             if isinstance(found, Estimate):
-                cells |= found.columns(name) | {
-                    f"{name}_interval": found.method if found.has_interval else None
-                }
+                cells |= found.columns(name)
+                cells[f"{name}_interval"] = found.method if found.has_interval else None
         plain.append(cells)
     return pandas.DataFrame(plain, columns=columns)
 

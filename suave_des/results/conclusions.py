@@ -34,7 +34,8 @@ _OPEN = (
 
 def conclusion(found: Row, metric: Metric) -> str:
     """Write what one difference shows: a sentence each for means, ranks and pairs."""
-    group, other = found["group"], found["other"]
+    group = found["group"]
+    other = found["other"]
     if not found["test"]:
         return (
             f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
@@ -60,9 +61,11 @@ def difference_claim(first: str, second: str, value: float, metric: Metric) -> s
     second.
     """
     if value > 0.0:
-        greater, less = first, second
+        greater = first
+        less = second
     else:
-        greater, less = second, first
+        greater = second
+        less = first
     size = metric.amount(abs(value))
     if metric.better < 0:
         return f"{less} {metric.less.format(size)} {greater}"
@@ -75,7 +78,9 @@ def difference_claim(first: str, second: str, value: float, metric: Metric) -> s
 
 
 def _sentence_of_means(found: Row, metric: Metric) -> str:
-    group, other, apart = found["group"], found["other"], found["difference"]
+    group = found["group"]
+    other = found["other"]
+    apart = found["difference"]
     if math.isnan(apart.value):
         return f"The mean {_without_mean(metric)} of {group} and {other} cannot be compared, as no time limit is known."
     test = f"{_sizes(found)}, {_mean_test(found)}, {_p_text(_mean_p(found), found)}"
@@ -99,14 +104,17 @@ def _sentence_of_means(found: Row, metric: Metric) -> str:
 
 
 def _sentence_of_ranks(found: Row, metric: Metric) -> str:
-    group, other = found["group"], found["other"]
+    group = found["group"]
+    other = found["other"]
     test = f"{_SHORT[found['test']]}, {_p_text(found['p_holm'], found)}"
     if not _has_ranks_shown(found):
         return f"By ranks, no difference is shown ({test})."
     if _direction_of_ranks(found) > 0.0:
-        greater, less = group, other
+        greater = group
+        less = other
     else:
-        greater, less = other, group
+        greater = other
+        less = group
     if metric.better < 0:
         return f"By ranks, {less} {less_words(metric)} {greater} ({test})."
     return f"By ranks, {greater} {greater_words(metric)} {less} ({test})."
@@ -116,24 +124,35 @@ def _sentence_of_pairs(found: Row, metric: Metric) -> str:
     """Write in how many pairs, or comparisons of each mission with each, one has the better
     value.
     """
-    group, other = found["group"], found["other"]
-    more, less = found["share_greater"], found["share_less"]
-    if metric.better < 0:
-        better, word = (less, more), "lower"
-    else:
-        better, word = (more, less), "greater"
-    equal = 1.0 - more - less
+    first_wins, second_wins = _wins(found, metric)
+    equal = 1.0 - first_wins - second_wins
     if found["paired"]:
         n = found["n"]
-        first, second, rest = (round(share * n) for share in (*better, equal))
-        text = f"Of {number_of(n, 'pair')}, {group} has the {word} {metric.title} in {first}, {other} in {second}"
-        return f"{text}; {rest} {'is' if rest == 1 else 'are'} equal." if rest else f"{text}."
-    first_text, second_text = map(percent, better)
-    text = (
-        f"Of all comparisons of one with the other, {group} has the {word} {metric.title} in {first_text}, {other} in"
-        f" {second_text}"
-    )
-    return f"{text}; {percent(equal)} are equal." if equal > 1e-9 else f"{text}."
+        of = number_of(n, "pair")
+        first, second, rest = (f"{round(share * n)}" for share in (first_wins, second_wins, equal))
+        is_any_equal = rest != "0"
+        are = "is" if rest == "1" else "are"
+    else:
+        of = "all comparisons of one with the other"
+        first, second, rest = map(percent, (first_wins, second_wins, equal))
+        is_any_equal = equal > 1e-9
+        are = "are"
+    value = f"the {_better_word(metric)} {metric.title}"
+    text = f"Of {of}, {found['group']} has {value} in {first}, {found['other']} in {second}"
+    return f"{text}; {rest} {are} equal." if is_any_equal else f"{text}."
+
+
+def _wins(found: Row, metric: Metric) -> tuple[float, float]:
+    """Return in which shares of pairs or comparisons the first, and the second, has the better
+    value.
+    """
+    if metric.better < 0:
+        return found["share_less"], found["share_greater"]
+    return found["share_greater"], found["share_less"]
+
+
+def _better_word(metric: Metric) -> str:
+    return "lower" if metric.better < 0 else "greater"
 
 
 def less_words(metric: Metric) -> str:
@@ -269,11 +288,15 @@ def overall_conclusion(
     best = max(means, key=lambda name: metric.better * means[name])
     against = [each for each in own if best in (each["group"], each["other"])]
     sentences = _means_of_best(best, metric, against, means, len(groups) - 1)
-    with_ranks = [each for each in against if not _is_of_shares(each) and not _is_equal(each)]
-    if with_ranks:
-        sentences.append(_ranks_of_best(best, metric, with_ranks))
-        sentences.append(_pairs_of_best(best, metric, with_ranks))
-    return " ".join(sentences)
+    return " ".join([*sentences, *_ranks_and_pairs_of_best(best, metric, against)])
+
+
+def _ranks_and_pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) -> list[str]:
+    """Write what ranks and pairs show of the best mean, where there are any."""
+    ranked = [each for each in against if not _is_of_shares(each) and not _is_equal(each)]
+    if not ranked:
+        return []
+    return [_ranks_of_best(best, metric, ranked), _pairs_of_best(best, metric, ranked)]
 
 
 def _is_about(found: Row, metric: Metric, groups: Sequence[str]) -> bool:
@@ -312,7 +335,8 @@ def _claim_of_best(
     best: str, metric: Metric, better: Sequence[Row], alike: Sequence[Row], is_best_of_all: bool
 ) -> str:
     """Write by how much the best mean is better than those from which it differs."""
-    amounts, test = _and(_amounts(best, metric, better)), _ps(better)
+    amounts = _and(_amounts(best, metric, better))
+    test = _ps(better)
     if not is_best_of_all:
         rest = _and([_not_shown(each, best) for each in alike]) if alike else ""
         no_others = f"; no difference of the means is shown to {rest}" if rest else ""
@@ -348,37 +372,39 @@ def _ranks_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
             greater.append(each)
         else:
             less.append(each)
-    clauses = [
-        f"{best} {words} {_and([_other(each, best) for each in rows])} ({_ps_of_ranks(rows)})"
-        for words, rows in ((less_words(metric), less), (greater_words(metric), greater))
-        if rows
-    ]
+    clauses = []
+    if less:
+        clauses.append(f"{best} {less_words(metric)} {_others(less, best)} ({_ps_of_ranks(less)})")
+    if greater:
+        words = greater_words(metric)
+        clauses.append(f"{best} {words} {_others(greater, best)} ({_ps_of_ranks(greater)})")
     if alike:
-        names = _and([_other(each, best) for each in alike])
-        clauses.append(f"no difference is shown between {best} and {names}")
+        clauses.append(f"no difference is shown between {best} and {_others(alike, best)}")
     return f"By ranks, {'; '.join(clauses)}."
 
 
 def _pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
     """Write in how many pairs the one with the best mean has the better value."""
-    word, opposite = ("lower", "higher") if metric.better < 0 else ("greater", "smaller")
+    opposite = "higher" if metric.better < 0 else "smaller"
     parts = []
     for each in against:
-        more, less = each["share_greater"], each["share_less"]
-        is_first = each["group"] == best
-        has_greater, has_less = (more, less) if is_first else (less, more)
-        wins, losses = (has_less, has_greater) if metric.better < 0 else (has_greater, has_less)
+        first_wins, second_wins = _wins(each, metric)
+        if each["group"] == best:
+            wins = first_wins
+            losses = second_wins
+        else:
+            wins = second_wins
+            losses = first_wins
         other = _other(each, best)
         if each["paired"]:
             n = each["n"]
-            parts.append(
-                f"in {round(wins * n)} of {number_of(n, 'pair')} with {other} ({opposite} in {round(losses * n)})"
-            )
+            of = f"{round(wins * n)} of {number_of(n, 'pair')}"
+            lost = f"{round(losses * n)}"
         else:
-            parts.append(
-                f"in {percent(wins)} of all comparisons with {other} ({opposite} in {percent(losses)})"
-            )
-    return f"{best} has the {word} {metric.title} {_and(parts)}."
+            of = f"{percent(wins)} of all comparisons"
+            lost = percent(losses)
+        parts.append(f"in {of} with {other} ({opposite} in {lost})")
+    return f"{best} has the {_better_word(metric)} {metric.title} {_and(parts)}."
 
 
 def _favours(found: Row, name: str, metric: Metric) -> bool:
@@ -433,6 +459,10 @@ def _largest(ps: Sequence[float], found: Row) -> str:
 
 def _other(found: Row, name: str) -> str:
     return str(found["other"] if found["group"] == name else found["group"])
+
+
+def _others(rows: Sequence[Row], name: str) -> str:
+    return _and([_other(each, name) for each in rows])
 
 
 def _and(parts: Sequence[str]) -> str:

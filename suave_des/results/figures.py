@@ -20,15 +20,17 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, number_of, shown, unknown
 from suave_des.estimates import Estimate, mean_of
 from suave_des.files import write_file
-from suave_des.records.metrics import METRICS, PAPER_METRICS
+from suave_des.records.metrics import METRICS, PAPER_METRICS, Metric
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
@@ -126,20 +128,8 @@ def draw_differences(drawn: Groups) -> style.Picture:
     Raises:
         InputError: no two groups have runs that share their random numbers.
     """
-    groups = drawn.groups
-    is_few = len(groups) <= _EACH_WITH_EACH
-    pairs = list(combinations(groups, 2)) if is_few else [(one, groups[0]) for one in groups[1:]]
-    colours = {group.name: style.line(number)["color"] for number, group in _looks(groups)}
-    rows = []
-    for one, other in pairs:
-        is_paired = one.has_runs and other.has_runs
-        apart = [
-            _finite(one.frame[metric] - other.frame[metric])
-            for metric in PAPER_METRICS
-            if is_paired
-        ]
-        if apart and all(map(len, apart)):
-            rows.append((one, other, apart))
+    colours = {group.name: style.line(number)["color"] for number, group in _looks(drawn.groups)}
+    rows = list(_apart(drawn.groups))
     if not rows:
         problem = "no two of these have runs that share their random numbers"
         raise InputError(
@@ -149,40 +139,42 @@ def draw_differences(drawn: Groups) -> style.Picture:
         )
     height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
-    shares = drawn.counted in ("draw", "value")
-    for place, (axes, _, title) in enumerate(_metric_panels(figure)):
+    is_of_runs = drawn.counted in ("mission", "run")
+    for axes, metric, title in _metric_panels(figure):
         axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
         for row, (one, _, apart) in enumerate(rows):
             _draw_row_of_differences(
-                axes, row, apart[place], colours[one.name], has_numbers=not shares
+                axes, row, apart[metric], colours[one.name], has_numbers=is_of_runs
             )
         axes.set_xlabel(f"difference in {title}")
         axes.margins(x=0.22)
         axes.grid(axis="y", visible=False)
     left = figure.axes[0]
     names = [
-        f"{one.name}\n\N{MINUS SIGN} {other.name} (n = {len(apart[0]):,})"
+        f"{one.name}\n\N{MINUS SIGN} {other.name} (n = {len(apart[PAPER_METRICS[0]]):,})"
         for one, other, apart in rows
     ]
     left.set_yticks(range(len(rows)), [style.text(folded(name)) for name in names])
     left.set_ylim(len(rows) - 0.4, -0.6)
-    handles: list[Artist] = [
-        Line2D(
-            [],
-            [],
-            lw=1.2,
-            marker="D",
-            ms=3,
-            mfc="white",
-            color=style.BLACK,
-            label="mean, 95% interval",
-        ),
-        Line2D(
-            [], [], color=style.GREY, marker="o", ms=2.5, lw=0, label="draw" if shares else "run"
-        ),
-    ]
-    _legend(figure, handles, [str(handle.get_label()) for handle in handles])
+    mean = Line2D([], [], lw=1.2, marker="D", ms=3, mfc="white", color=style.BLACK)
+    each = Line2D([], [], color=style.GREY, marker="o", ms=2.5, lw=0)
+    _legend(figure, [mean, each], ["mean, 95% interval", "run" if is_of_runs else drawn.counted])
     return figure
+
+
+def _apart(
+    groups: Sequence[Group],
+) -> Iterator[tuple[Group, Group, dict[str, pandas.Series[float]]]]:
+    """Yield pairs of groups with the differences of their common runs, by metric."""
+    if len(groups) <= _EACH_WITH_EACH:
+        pairs = list(combinations(groups, 2))
+    else:
+        pairs = [(one, groups[0]) for one in groups[1:]]
+    for one, other in pairs:
+        if one.has_runs and other.has_runs:
+            apart = {name: _finite(one.frame[name] - other.frame[name]) for name in PAPER_METRICS}
+            if all(map(len, apart.values())):
+                yield one, other, apart
 
 
 def _draw_row_of_differences(
@@ -205,7 +197,9 @@ def _draw_row_of_differences(
         "capsize": 2.5,
     }
     axes.errorbar(found.value, row - 0.1, xerr=errors, color="k", **look)
-    ends = zip(least_and_greatest(apart), (("right", -4), ("left", 4)), strict=True)
+    runs = apart.index.get_level_values("run").to_numpy(float)
+    extremes = least_and_greatest(np.array(apart, dtype=np.float64), runs)
+    ends = zip(extremes, (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
         place: dict[str, Any] = {
             "textcoords": "offset points",
@@ -313,7 +307,8 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
         raise InputError(
             problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them"
         )
-    frame, columns = missions.frame.assign(curve=_names), len(parameters)
+    frame = missions.frame.assign(curve=_names)
+    columns = len(parameters)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     height_in = 4.0 + 0.2 * math.ceil((frame["curve"].nunique() + 1) / 3)
     figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
@@ -368,15 +363,8 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         (curve, *values): rows
         for curve, values, rows in _independent_at(brought, [up, across], others)
     }
-    keys = pandas.MultiIndex.from_tuples(cells, names=["curve", up, across])
-    means = {
-        metric: pandas.Series([_mean(rows[metric]).value for rows in cells.values()], keys)
-        for metric in PAPER_METRICS
-    }
-    columns, rows = (list(pandas.unique(frame[name])) for name in (across, up))
-    rows, columns = (
-        sorted(each) if not isinstance(each[0], str) else each for each in (rows, columns)
-    )
+    rows = _in_order(frame[up])
+    columns = _in_order(frame[across])
     if max(len(rows), len(columns)) > _MOST_CELLS:
         problem = f"{len(columns)} by {len(rows)} means are too many for numbers"
         remedy = f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
@@ -384,29 +372,47 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     height = len(managers) * (0.24 * len(rows) + 0.3) + 0.9
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
+    keys = pandas.MultiIndex.from_tuples(cells, names=["curve", up, across])
     for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
-        low, high = means[metric].min(), means[metric].max()
+        means = pandas.Series([_mean(runs[metric]).value for runs in cells.values()], keys)
+        ends = means.min(), means.max()
         for axes, manager in zip(of_metric, managers, strict=True):
-            grid = means[metric][manager].unstack(across).reindex(index=rows, columns=columns)
-            image = axes.imshow(
-                grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower"
-            )
-            for (row, column), value in np.ndenumerate(grid.to_numpy(float)):
-                ink = "white" if value < (low + high) / 2.0 else style.BLACK
-                number = METRICS[metric].number(value) if np.isfinite(value) else ""
-                axes.text(column, row, number, color=ink, ha="center", va="center", fontsize=6.5)
+            grid = means[manager].unstack(across).reindex(index=rows, columns=columns)
+            image = _draw_grid(axes, grid.to_numpy(float), METRICS[metric], ends)
             axes.set_title(style.text(folded(manager)))
-            axes.grid(visible=False)
         figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
-        of_metric[-1].set_xlabel(_folded(key_words(across)))
-        for axis, values in ((of_metric[-1].xaxis, columns), (of_metric[-1].yaxis, rows)):
-            axis.set_ticks(
-                range(len(values)), [_folded(style.text(value_words(each)), 14) for each in values]
-            )
+        lowest = of_metric[-1]
+        lowest.set_xlabel(_folded(key_words(across)))
+        lowest.set_xticks(range(len(columns)), _ticks(columns))
+        lowest.set_yticks(range(len(rows)), _ticks(rows))
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
-    counts = [len(rows) for rows in cells.values()]
+    counts = [len(runs) for runs in cells.values()]
     _write_below(figure, _averaged(frame, counts, others))
     return figure
+
+
+def _in_order(parameter: pandas.Series) -> list[Any]:
+    """Return the values of a parameter: numbers by size, words in the order of the sweep."""
+    values = list(pandas.unique(parameter))
+    return values if isinstance(values[0], str) else sorted(values)
+
+
+def _draw_grid(
+    axes: Axes, grid: NDArray[np.float64], metric: Metric, ends: tuple[float, float]
+) -> AxesImage:
+    """Draw means as numbers on their colours, which reach from one end to the other."""
+    low, high = ends
+    image = axes.imshow(grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
+    for (row, column), value in np.ndenumerate(grid):
+        ink = "white" if value < (low + high) / 2.0 else style.BLACK
+        number = metric.number(value) if np.isfinite(value) else ""
+        axes.text(column, row, number, color=ink, ha="center", va="center", fontsize=6.5)
+    axes.grid(visible=False)
+    return image
+
+
+def _ticks(values: Sequence[object]) -> list[str]:
+    return [_folded(style.text(value_words(value)), 14) for value in values]
 
 
 def _chosen(missions: Missions, parameters: Sequence[str]) -> list[str]:
@@ -422,7 +428,8 @@ def _chosen(missions: Missions, parameters: Sequence[str]) -> list[str]:
 
 def _averaged(frame: pandas.DataFrame, counts: Sequence[int], others: Sequence[str]) -> str:
     """Say of how many runs, or draws that runs share, means are, and over what each is averaged."""
-    low, high = min(counts), max(counts)
+    low = min(counts)
+    high = max(counts)
     alike = max(alike_by_source(frame).values(), default=1)
     what = "run" if alike == 1 else "draw"
     of = f"means of n = {low if low == high else f'{low} to {high}'} {what}{'s' * (high > 1)}"
@@ -451,7 +458,8 @@ def _independent_at(
     Raises:
         InputError: none is.
     """
-    alike, is_empty = alike_by_source(frame), True
+    alike = alike_by_source(frame)
+    is_empty = True
     for _, source in frame.groupby("source", sort=False, observed=True):
         for values, whole in source.groupby(list(keys), dropna=False, observed=True):
             for curve, part in whole.groupby("curve", sort=False, observed=True):
@@ -501,11 +509,10 @@ def _draw_panel(
 def _set_ticks(axes: Axes, places: pandas.Series[float], words: Sequence[str]) -> None:
     """Mark swept words, or the swept values if there are few, on the horizontal axis."""
     if words:
-        shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
         long = max(map(len, words)) > 6 and len(words) > 2
         axes.set_xticks(
             range(len(words)),
-            shown_words,
+            _ticks(words),
             rotation=30 if long else 0,
             ha="right" if long else "center",
         )
@@ -615,7 +622,8 @@ def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) 
     Raises:
         InputError: it cannot be written.
     """
-    picture, metadata = io.BytesIO(), _UNDATED.get(out.suffix.lower())
+    picture = io.BytesIO()
+    metadata = _UNDATED.get(out.suffix.lower())
     figure.savefig(
         picture, format=out.suffix[1:].lower(), bbox_inches=bbox_inches, metadata=metadata
     )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import pandas
+from numpy.typing import NDArray
 
 from suave_des.errors import InputError, shown, unknown
 from suave_des.records.metrics import (
@@ -30,12 +32,14 @@ from suave_des.results.horizon import (
     at_horizons,
     to_horizon,
 )
-from suave_des.results.real import common_limit_s, matched
+from suave_des.results.real import CONDITION, NUMBER_COLUMNS, common_limit_s, matched
 
 _USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
 """More make tables that nobody reads, and thousands of tests."""
 _MEMBER = "ensemble_member"
+_CLUSTER = "condition of real missions"
+"""Column with the numbers of conditions, none where missions are taken as independent."""
 _FEW = 20
 _PLACES = ("real missions", "assisted by", "population")
 """Of errors in real missions and those that assist them."""
@@ -48,10 +52,11 @@ class Group:
     Attributes:
         name: the manager's, with its source or its value of a sweep where several have the same.
         frame: a row for each independent value: for each mission, or, where points of a sweep are
-            averaged, for each run, whose random numbers all points share; or for each draw that
-            several runs share. Where seed and run are known, they are its index. Times of search
-            and detection are brought to the horizon.
-        is_of_missions: whether each row is one mission.
+            averaged, for each run, whose random numbers all points share; for each draw that
+            several runs share; or for each condition of real missions. Where seed and run are
+            known, they are its index; of conditions, their source and number. Times of search and
+            detection are brought to the horizon.
+        counted: what each row is: "mission", "run", "draw" or "condition".
         point: the end of the name that tells the value of a sweep; empty if all values are in the
             group.
         horizon_s: up to which times of search and detection count; infinite if it is not known.
@@ -59,9 +64,14 @@ class Group:
 
     name: str
     frame: pandas.DataFrame
-    is_of_missions: bool = True
+    counted: str = "mission"
     point: str = ""
     horizon_s: float = math.inf
+
+    @property
+    def is_of_missions(self) -> bool:
+        """Whether each row is one mission."""
+        return self.counted == "mission"
 
     @property
     def has_runs(self) -> bool:
@@ -78,8 +88,8 @@ class Groups:
     Attributes:
         groups: in the order of their first missions.
         notes: what a reader should know about the groups.
-        counted: what the rows of groups are: "mission", "run", "draw", or "value" where they
-            differ.
+        counted: what the rows of groups are: "mission", "run", "draw", "condition", or "value"
+            where they differ.
         time_limit_s: the shortest horizon of a group. Of real missions that simulated ones assist,
             the limit of all; infinite if it is not known.
         lost: by name of a group that did not find the pipeline in most of its missions, in how
@@ -133,14 +143,17 @@ def grouped(
     frame = at_horizons(frame, missions.swept, by)
     averaged = [name for name in missions.swept if averages and name not in by]
     alike = alike_by_source(frame) if averages else {}
-    groups, lacking = [], []
+    if averages:
+        frame = frame.assign(**{_CLUSTER: _conditions(frame, missions.swept)})
+    groups = []
+    lacking = []
     for part, name, point in _parts(frame, managers, by):
         found = independent(part, _same_points(frame, part, by), averaged, alike)
         if found.left_out:
             runs = found.left_out + len(found.rows)
             lacking.append(f"{name} {found.left_out} of {runs}")
         horizon_s = float(part[HORIZON].iloc[0])
-        groups.append(Group(name, _by_run(found.rows), found.are_missions, point, horizon_s))
+        groups.append(Group(name, _by_run(found.rows), found.counted, point, horizon_s))
     on_points = list(_notes_on_points(groups, averaged, frame, lacking))
     chosen = _chosen_metrics(metrics, groups)
     notes = [
@@ -246,7 +259,8 @@ def _assisted(
     sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
     _check_numbers(sides, chosen)
     limit_s = common_limit_s(sides)
-    in_same, in_population = same.frame, population.frame
+    in_same = same.frame
+    in_population = population.frame
     if math.isfinite(limit_s):
         frame = to_horizon(frame, limit_s)
         in_same = to_horizon(in_same, limit_s)
@@ -264,13 +278,12 @@ def _assisted(
     return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost, matching)
 
 
-def least_and_greatest(values: pandas.Series[float]) -> list[tuple[float, int]]:
-    """Return the least and the greatest of values by (seed, run), each with its run."""
-    runs = values.index.get_level_values("run")
-    return [
-        (float(values.iloc[at]), int(runs[at]))
-        for at in (int(values.argmin()), int(values.argmax()))
-    ]
+def least_and_greatest(
+    values: NDArray[np.float64], runs: NDArray[np.float64]
+) -> list[tuple[float, int]]:
+    """Return the least and the greatest of values, each with its run."""
+    places = int(values.argmin()), int(values.argmax())
+    return [(float(values[place]), int(runs[place])) for place in places]
 
 
 def check_swept(missions: Missions, names: Sequence[str], place: str) -> None:
@@ -290,33 +303,35 @@ def check_swept(missions: Missions, names: Sequence[str], place: str) -> None:
 
 def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[tuple[str, str]]:
     """Return of each group the name, and the end of it that tells the values of a sweep."""
-    sources: dict[object, set[object]] = {}
-    for manager, source, *_ in keys:
-        sources.setdefault(manager, set()).add(source)
+    managers_with_source = dict.fromkeys((manager, source) for manager, source, *_ in keys)
+    sources = Counter(manager for manager, _ in managers_with_source)
     ends = [name.rpartition(".")[2] for name in by]
     labels = ends if len(set(ends)) == len(ends) else by
-    numbers = {
-        value
-        for _, _, *values in keys
-        for value in values
-        if isinstance(value, float) and value == value
-    }
-    # or all digits
-    form = "g" if len({f"{number:g}" for number in numbers}) == len(numbers) else ""
+    text = _texts_of_values({value for _, _, *values in keys for value in values})
+    names = []
+    for manager, source, *values in keys:
+        named = zip(labels, values, strict=True)
+        point = "".join(f", {label} {text(value)}" for label, value in named)
+        of_source = f" ({printable(str(source))})" if sources[manager] > 1 else ""
+        names.append((f"{printable(str(manager))}{of_source}{point}", point))
+    return names
+
+
+def _texts_of_values(values: Iterable[object]) -> Callable[[object], str]:
+    """Return what writes values of a sweep: numbers short, or, where two would be the same, with
+    all digits.
+    """
+    numbers = [value for value in values if isinstance(value, float) and value == value]
+    is_short_enough = len({f"{number:g}" for number in numbers}) == len(numbers)
 
     def text(value: object) -> str:
         if value != value:
             return "not swept"
-        return f"{value:{form}}" if isinstance(value, float) else printable(str(value))
+        if isinstance(value, float):
+            return f"{value:g}" if is_short_enough else f"{value}"
+        return printable(str(value))
 
-    names = []
-    for manager, source, *values in keys:
-        point = "".join(
-            f", {label} {text}" for label, text in zip(labels, map(text, values), strict=True)
-        )
-        of_source = f" ({printable(str(source))})" if len(sources[manager]) > 1 else ""
-        names.append((f"{printable(str(manager))}{of_source}{point}", point))
-    return names
+    return text
 
 
 def _chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
@@ -338,10 +353,8 @@ def _chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Met
 
 
 def _counted(groups: Sequence[Group]) -> str:
-    kinds = {group.is_of_missions for group in groups}
-    if kinds == {False}:
-        return "draw" if any(runs_sharing_draw(group.frame) > 1 for group in groups) else "run"
-    return "mission" if kinds == {True} else "value"
+    kinds = {group.counted for group in groups}
+    return kinds.pop() if len(kinds) == 1 else "value"
 
 
 def _check_numbers(sides: Mapping[str, pandas.DataFrame], metrics: Sequence[Metric]) -> None:
@@ -387,14 +400,15 @@ class Independent(NamedTuple):
     """What of missions is independent of each other.
 
     Attributes:
-        rows: missions, or their averages over points of a sweep, or runs of a draw.
-        are_missions: whether each row is one mission.
+        rows: missions, or their averages over points of a sweep, runs of a draw, or missions of a
+            condition.
+        counted: what each row is, as of Group.
         left_out: number of runs that lack a point.
     """
 
     rows: pandas.DataFrame
-    are_missions: bool
-    left_out: int
+    counted: str
+    left_out: int = 0
 
 
 def independent(
@@ -413,16 +427,47 @@ def independent(
         alike: by source how many runs in a row share their draws, and are averaged; 1 if a source
             is not named.
     """
+    if _CLUSTER in part and part[_CLUSTER].notna().all():
+        return Independent(_over_conditions(part), CONDITION)
     points = len(whole[list(averaged)].drop_duplicates()) if averaged else 1
     sharing = alike.get(str(part["source"].iloc[0]), 1)
-    rows, left_out = part, 0
+    rows = part
+    counted = "mission"
+    left_out = 0
     if points > 1:
+        counted = "run"
         rows = _means(part, points)
         left_out = part.groupby(["seed", "run"], observed=True).ngroups - len(rows)
     if sharing > 1:
+        counted = "draw"
         draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)["run"].nunique()
         rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
-    return Independent(rows, points == sharing == 1, left_out)
+    return Independent(rows, counted, left_out)
+
+
+def _conditions(frame: pandas.DataFrame, swept: Sequence[str]) -> pandas.Series[float]:
+    """Return the numbers of the conditions of real missions; nan where they are not all known, or
+    all the same.
+    """
+    found = pandas.Series(math.nan, frame.index)
+    real = frame[frame["scenario"] == ""]
+    for _, part in real.groupby("source", observed=True):
+        for name in (each for each in NUMBER_COLUMNS if each not in swept):
+            values = part[name] if name in part else pandas.Series("", part.index)
+            if values.nunique() > 1 and (values.notna() & (values != "")).all():
+                found[part.index] = pandas.factorize(values, sort=True)[0] + 1.0
+                break
+    return found
+
+
+def _over_conditions(part: pandas.DataFrame) -> pandas.DataFrame:
+    """Average the missions of each condition that have a value; each condition is a run, so that
+    those of one source are paired.
+    """
+    numbers = list(part.select_dtypes("number").columns.difference(["run"]))
+    seed = f"conditions of {part['source'].iloc[0]}"
+    conditions = part.assign(run=part[_CLUSTER], seed=seed).groupby(["seed", "run"])
+    return conditions[numbers].mean().reset_index()
 
 
 def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.DataFrame:
@@ -449,36 +494,66 @@ def _notes(
     frame: pandas.DataFrame,
     alike_by_source: Mapping[str, int],
 ) -> Iterator[str]:
-    if (alike := max(alike_by_source.values(), default=1)) > 1:
-        is_one = frame.loc[frame["source"].isin(list(alike_by_source)), SHARING].eq(alike).all()
-        what = (
-            f"the {alike} runs that share each draw"
-            if is_one
-            else f"every {alike} runs, of which some share a draw"
-        )
-        others = len(alike_by_source) < frame["source"].nunique()
-        of = f" of {', '.join(map(printable, alike_by_source))}" if others else ""
-        yield (
-            f"the values of {what} (runs_per_draw){of} are averaged: draws are independent, and runs are not; n and the"
-            f" runs needed{of and ' there'} are numbers of {'draws' if is_one else 'these averages'}"
-        )
-    if averaged and not all(group.is_of_missions for group in groups):
-        yield (
-            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep share its random"
-            " numbers, so that runs are independent and missions are not"
-        )
+    yield from _notes_on_averages(groups, averaged, frame, alike_by_source)
     members = frame[_MEMBER].nunique() if _MEMBER in frame else 0
     if members > 1:
         yield (
-            f"runs have {members} sets of parameters (an ensemble): intervals and tests are for chance among runs with"
-            " these sets; how much the sets differ is in ensemble.csv"
+            f"runs have {members} sets of parameters (an ensemble): intervals and tests are for"
+            " chance among runs with these sets; how much the sets differ is in ensemble.csv"
         )
-    if len(scenarios := set(frame["scenario"]) - {""}) > 1:
-        yield f"the missions are of different scenarios: {', '.join(sorted(scenarios))}"
-    if (few := min(len(group.frame) for group in groups)) < _FEW:
-        yield f"intervals and numbers of runs needed are rough, as one of them has fewer than {_FEW} runs ({few})"
+    scenarios = sorted(set(frame["scenario"]) - {""})
+    if len(scenarios) > 1:
+        yield f"the missions are of different scenarios: {', '.join(scenarios)}"
+    few = min(len(group.frame) for group in groups)
+    if few < _FEW:
+        yield (
+            "intervals and numbers of runs needed are rough, as one of them has fewer than"
+            f" {_FEW} runs ({few})"
+        )
     if any(group.frame[FOUND].isna().all() for group in groups):
         yield "some files do not say which missions found the pipeline"
+
+
+def _notes_on_averages(
+    groups: Sequence[Group],
+    averaged: Sequence[str],
+    frame: pandas.DataFrame,
+    alike_by_source: Mapping[str, int],
+) -> Iterator[str]:
+    yield from _note_on_draws(frame, alike_by_source)
+    if any(group.counted == CONDITION for group in groups):
+        yield (
+            "missions of one condition are alike: the values of those that have one are averaged,"
+            " each condition counts the same, and n and the runs needed are numbers of conditions"
+        )
+    if averaged and not all(group.is_of_missions for group in groups):
+        yield (
+            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep"
+            " share its random numbers, so that runs are independent and missions are not"
+        )
+
+
+def _note_on_draws(frame: pandas.DataFrame, alike_by_source: Mapping[str, int]) -> Iterator[str]:
+    """Say that runs which share a draw are averaged, and in which sources."""
+    alike = max(alike_by_source.values(), default=1)
+    if alike == 1:
+        return
+    if frame.loc[frame["source"].isin(list(alike_by_source)), SHARING].eq(alike).all():
+        what = f"the {alike} runs that share each draw"
+        numbers = "draws"
+    else:
+        what = f"every {alike} runs, of which some share a draw"
+        numbers = "these averages"
+    if len(alike_by_source) < frame["source"].nunique():
+        of = f" of {', '.join(map(printable, alike_by_source))}"
+        needed = "runs needed there"
+    else:
+        of = ""
+        needed = "runs needed"
+    yield (
+        f"the values of {what} (runs_per_draw){of} are averaged: draws are independent, and runs"
+        f" are not; n and the {needed} are numbers of {numbers}"
+    )
 
 
 def _mostly_lost(groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
@@ -560,7 +635,8 @@ def _ended_early(groups: Sequence[Group]) -> Iterator[str]:
         ended_s = group.frame[ENDED] if group.is_of_missions else pandas.Series(dtype=float)
         ended_s = ended_s[ended_s < group.horizon_s - SAME_LIMIT_S]
         if len(ended_s):
-            low, high = ended_s.min(), ended_s.max()
+            low = ended_s.min()
+            high = ended_s.max()
             until = f" to {high:.0f}" if high > low else ""
             times.append(f"{group.name} after {low:.0f}{until} s")
     if times:

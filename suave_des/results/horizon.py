@@ -58,11 +58,10 @@ def _time_limits_s(frame: pandas.DataFrame, swept: Sequence[str]) -> pandas.Seri
     the time of those of a manager that did not find the pipeline, unless one of them found it
     later, or any mission of the source lasted longer: then these had ended before the limit.
     """
-    source, own = (
-        _numbers(frame, ["source", *swept]),
-        _numbers(frame, ["source", "manager", *swept]),
-    )
-    times_s, is_lost = frame[SEARCH_TIME], frame[FOUND] == 0.0
+    source = _numbers(frame, ["source", *swept])
+    own = _numbers(frame, ["source", "manager", *swept])
+    times_s = frame[SEARCH_TIME]
+    is_lost = frame[FOUND] == 0.0
     lost_s = times_s.where(is_lost).groupby(own).transform("max")
     found_s = times_s.where(~is_lost).groupby(own).transform("max")
     limits_s = lost_s.where(~(found_s > lost_s + SAME_LIMIT_S), math.inf)
@@ -92,8 +91,10 @@ def to_horizon(
     Of campaigns, a time of detection that is missing is that of a mission that never saw the
     pipeline.
     """
-    times_s, found = frame[SEARCH_TIME], frame[FOUND]
-    is_lost, is_late = found == 0.0, times_s > horizon_s
+    times_s = frame[SEARCH_TIME]
+    found = frame[FOUND]
+    is_lost = found == 0.0
+    is_late = times_s > horizon_s
     ended_s = frame[[SEARCH_TIME, *({DURATION} & set(frame))]].min(axis=1)
     brought: dict[str, Any] = {
         SEARCH_TIME: times_s.where(~is_lost & ~is_late, horizon_s),

@@ -134,12 +134,10 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
     The first mode of a function in a task is none, nor is what is requested between a task's end
     and that.
     """
-    mode_set, in_use, modes, found = (
-        details(record, "mode_set"),
-        set[str](),
-        dict[str, str](),
-        list[Adaptation](),
-    )
+    mode_set = details(record, "mode_set")
+    in_use = set[str]()
+    modes = dict[str, str]()
+    found = list[Adaptation]()
     for t_s, event, detail in zip(
         *(record.events[name] for name in ("t_s", "event", "detail")), strict=True
     ):
@@ -178,7 +176,8 @@ def _functions_of(record: MissionRecord, task: str) -> set[str]:
 def _cause(record: MissionRecord, function: str, before: str, after: Span) -> str:
     """Return what was reported shortly before a change of mode and concerns its function."""
     if function == MAINTAIN_MOTION:
-        words, changes = {True: "failed", False: "recovered"}, component_changes(record)
+        words = {True: "failed", False: "recovered"}
+        changes = component_changes(record)
         causes = [
             (t_s, f"{component_words(name)} {words[is_failed]}") for t_s, name, is_failed in changes
         ]
@@ -257,7 +256,9 @@ def draw_map(record: MissionRecord) -> style.Picture:
     marks = list(_marks(record))
     figure = style.Picture(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
     panels = figure.subplot_mosaic("aa;bc", height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))
-    whole, zoom, time = panels["a"], panels["b"], panels["c"]
+    whole = panels["a"]
+    zoom = panels["b"]
+    time = panels["c"]
     frame = _search_frame(record)
     _draw_plan(whole, record, colours)
     whole.add_patch(
@@ -406,7 +407,8 @@ def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
             axes.plot(
                 mark.x_m, mark.y_m, "o", color=mark.colour, ms=3.5, mec="white", mew=0.6, zorder=4
             )
-            x, y = mark.x_m * points_per_m, mark.y_m * points_per_m
+            x = mark.x_m * points_per_m
+            y = mark.y_m * points_per_m
             free = (offset for offset in _LETTER_OFFSETS if is_free(x + offset[0], y + offset[1]))
             offset = next(free, _LETTER_OFFSETS[0])
             taken.append((x + offset[0], y + offset[1]))
@@ -420,7 +422,8 @@ def _search_frame(record: MissionRecord) -> Bbox:
     """Return the frame around the vehicle's path until detection and the detected point, with a
     margin.
     """
-    way, metrics = record.trajectory, record.metrics
+    way = record.trajectory
+    metrics = record.metrics
     search = way.loc[way["t_s"] <= metrics["search_time_s"], ["x_m", "y_m"]].to_numpy(float)
     if metrics["pipeline_found"]:
         search = np.vstack([search, [metrics["detection_x_m"], metrics["detection_y_m"]]])
@@ -604,7 +607,8 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
     """Return the requested altitude above the sea bed over time, nan where there was none."""
     follow_m = record.settings.revision.follow.altitude_m
     asked: dict[str, float] = {}
-    times_s, altitudes_m = [0.0], [np.nan]
+    times_s = [0.0]
+    altitudes_m = [np.nan]
     changes = [
         (span.begin_s, function, span.what)
         for function, spans in mode_spans(record).items()
@@ -628,22 +632,19 @@ def _lines(record: MissionRecord) -> Iterator[_Line]:
     for function, spans in mode_spans(record).items():
         bars = []
         for span in spans:
-            if function_mode_words(function, span.what) != "off":
-                is_moving = span.what in colours and function in (
-                    GENERATE_SEARCH_PATH,
-                    FOLLOW_PIPELINE,
-                )
-                colour = (
-                    colours[span.what]
-                    if is_moving
-                    else _ON
-                    if "recover" not in span.what
-                    else style.ORANGE
-                )
-                bars.append((span, colour, function_mode_words(function, span.what)))
+            words = function_mode_words(function, span.what)
+            if words != "off":
+                bars.append((span, _mode_colour(function, span.what, colours), words))
         yield function_words(function), bars
     for component, spans in sorted(failure_spans(record).items()):
         yield component_words(component), [(span, _FAILED, "failed") for span in spans]
+
+
+def _mode_colour(function: str, mode: str, colours: Mapping[str, str]) -> str:
+    """Return the colour of a mode's bar: of what moves the vehicle as on the map."""
+    if mode in colours and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
+        return colours[mode]
+    return style.ORANGE if "recover" in mode else _ON
 
 
 def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
@@ -652,41 +653,52 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
     """
     end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
     letter_s = _LETTER_IN / _LINES_IN * end_s
-    named, unnamed = set[tuple[int, str]](), dict[tuple[int, str], str]()
-    for row, (_, bars) in enumerate(lines):
+    legend: dict[str, str] = {}
+    for row, (name, bars) in enumerate(lines):
+        named: set[str] = set()
+        unnamed: dict[str, str] = {}
         ends_s = [*(span.begin_s for span, _, _ in bars[1:]), end_s]
         for (span, colour, text), next_s in zip(bars, ends_s, strict=True):
-            width_s = span.end_s - span.begin_s
-            axes.barh(
-                row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2
-            )
             label = style.text(text)
-            if 0.0 < width_s >= len(label) * letter_s:
-                luminance = np.dot((0.299, 0.587, 0.114), to_rgb(colour))
-                ink = style.BLACK if luminance > 0.5 else "white"
-                look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "color": ink}
-                axes.text(span.begin_s + 1.0, row, label, zorder=3, clip_on=True, **look)
-            elif next_s - span.end_s > len(label) * letter_s:
-                axes.text(span.end_s + 1.0, row, label, zorder=3, va="center", fontsize=_BAR_POINTS)
+            if _draw_bar(axes, row, (span, colour, label), next_s, letter_s):
+                named.add(label)
             else:
-                unnamed[row, label] = colour
-                continue
-            named.add((row, label))
-    legend = [
-        Patch(color=colour, label=f"{style.text(lines[row][0])}: {label}")
-        for (row, label), colour in unnamed.items()
-        if (row, label) not in named
-    ]
+                unnamed[label] = colour
+        for label in unnamed:
+            if label not in named:
+                legend[f"{style.text(name)}: {label}"] = unnamed[label]
     if legend:
-        place: dict[str, Any] = {
-            "loc": "lower right",
-            "bbox_to_anchor": (1.0, 1.0),
-            "borderaxespad": 0.2,
-        }
-        axes.legend(handles=legend, ncols=4, handlelength=1.2, **place)
+        patches = [Patch(color=colour, label=label) for label, colour in legend.items()]
+        axes.legend(
+            handles=patches,
+            ncols=4,
+            handlelength=1.2,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            borderaxespad=0.2,
+        )
     axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
+
+
+def _draw_bar(
+    axes: Axes, row: int, bar: tuple[Span, str, str], next_s: float, letter_s: float
+) -> bool:
+    """Draw a bar with its text, if there is room for it, and return whether there is."""
+    span, colour, label = bar
+    width_s = span.end_s - span.begin_s
+    axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
+    look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3}
+    if 0.0 < width_s >= len(label) * letter_s:
+        luminance = np.dot((0.299, 0.587, 0.114), to_rgb(colour))
+        ink = style.BLACK if luminance > 0.5 else "white"
+        axes.text(span.begin_s + 1.0, row, label, color=ink, clip_on=True, **look)
+        return True
+    if next_s - span.end_s > len(label) * letter_s:
+        axes.text(span.end_s + 1.0, row, label, **look)
+        return True
+    return False
 
 
 def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:

@@ -11,7 +11,8 @@ may be in them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Unpack
@@ -358,43 +359,54 @@ def read_real(
         InputError: with file and line: a file cannot be read, two are the same, a manager has
             several of the exemplar's missions, or a condition cannot be determined.
     """
-    read, files = [read_runs(path) for path in paths], dict[Path, str]()
-    for path, digest in (item for runs in read for item in runs.files.items()):
-        if same := next((other for other in files if files[other] == digest), None):
-            raise InputError(
-                f"has the same content as {same}", file=path, remedy="give each file once"
-            )
-        files[path] = digest
+    read = [read_runs(path) for path in paths]
+    files = _each_once(read)
     notes = [f"{note}." for runs in read for note in runs.notes]
     frame = pandas.concat([runs.frame for runs in read], ignore_index=True)
     check_one_mission(frame, ", ".join(map(str, files)))
-    if conditions is not None and len(conditions):
-        named = [name for name in (*conditions, *NUMBER_COLUMNS) if name in frame]
-        try:
-            frame = numbered(frame, conditions, runs_each).drop(
-                columns=[name for name in named if name != CONDITION]
-            )
-            _check_starts(frame, _starts_of(conditions))
-        except InputError as error:
-            if error.place is not None:
-                lines = [
-                    (path, int(line))
-                    for runs in read
-                    for path in runs.files
-                    for line in runs.frame.index
-                ]
-                raise line_error(*lines[int(error.place)], error.problem, error.remedy) from None
-            raise InputError(
-                error.problem, file=", ".join(map(str, files)), remedy=error.remedy
-            ) from None
-        if not named:
-            notes.append(
-                "The data do not name the conditions of their missions: they are taken in order,"
-                f" {_missions_each(frame)}."
-            )
-        texts = (_condition_text(conditions, number) for number in range(1, len(conditions) + 1))
-        notes += (f"Condition {number}: {text}" for number, text in enumerate(texts, 1))
+    if conditions is None or conditions.empty:
+        return Runs(files, frame, tuple(notes))
+    named = frame.columns.intersection([*conditions, *NUMBER_COLUMNS])
+    with _at_their_lines(read):
+        frame = numbered(frame, conditions, runs_each)
+        _check_starts(frame, _starts_of(conditions))
+    frame = frame.drop(columns=named.difference([CONDITION]))
+    if named.empty:
+        notes.append(
+            "The data do not name the conditions of their missions: they are taken in order,"
+            f" {_missions_each(frame)}."
+        )
+    for number in range(1, len(conditions) + 1):
+        notes.append(f"Condition {number}: {_condition_text(conditions, number)}")
     return Runs(files, frame, tuple(notes))
+
+
+def _each_once(read: Sequence[Runs]) -> dict[Path, str]:
+    """Return the files of missions with their digests; no two may have the same content."""
+    files: dict[Path, str] = {}
+    known: dict[str, Path] = {}
+    for runs in read:
+        for path, digest in runs.files.items():
+            if digest in known:
+                problem = f"has the same content as {known[digest]}"
+                raise InputError(problem, file=path, remedy="give each file once")
+            files[path] = digest
+            known[digest] = path
+    return files
+
+
+@contextmanager
+def _at_their_lines(read: Sequence[Runs]) -> Iterator[None]:
+    """Give errors about a row of all these missions its file and line, and others the files."""
+    try:
+        yield
+    except InputError as error:
+        lines = [(path, line) for runs in read for path in runs.files for line in runs.frame.index]
+        if error.place is not None:
+            path, line = lines[int(error.place)]
+            raise line_error(path, int(line), error.problem, error.remedy) from None
+        files = ", ".join(dict.fromkeys(str(path) for path, _ in lines))
+        raise InputError(error.problem, file=files, remedy=error.remedy) from None
 
 
 def _missions_each(frame: pandas.DataFrame) -> str:
@@ -429,7 +441,8 @@ def common_limit_s(sides: Mapping[str, pandas.DataFrame]) -> float:
     }
     for (other, theirs), (place, ours) in combinations(limits_s.items(), 2):
         for manager in ours.index.intersection(theirs.index):
-            ends_s, others_s = float(ours[manager]), float(theirs[manager])
+            ends_s = float(ours[manager])
+            others_s = float(theirs[manager])
             if math.isnan(ends_s):  # none of these found the pipeline later than the others' limit
                 ends_s = max(others_s, float(longest_s[place][manager]))
             elif math.isnan(others_s):
@@ -531,7 +544,8 @@ def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]
         for value in flown[~flown.astype(str).isin(known)][:1]:
             raise InputError(f"it never draws {name}={value}, a real condition", remedy=_DRAW)
         return
-    low, high = float(numbers.min()), float(numbers.max())
+    low = float(numbers.min())
+    high = float(numbers.max())
     beyond = (high - low) * (_BEYOND + _BEYOND_OF_FEW / len(numbers)) + _ABSOLUTE
     for value in values[(values < low - beyond) | (values > high + beyond)][:1]:
         problem = f"it draws {name} from {low:g} to {high:g}, and a real condition has {value:g}"
@@ -552,7 +566,8 @@ def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) 
     file = read_campaign_file(campaign)
     if file is None or not file.settings.sweep:
         return pandas.DataFrame()
-    loaded, settings = load_scenario(file.scenario, **replacements), file.settings
+    loaded = load_scenario(file.scenario, **replacements)
+    settings = file.settings
     try:
         varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw)
         check_drawn(*varied)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
@@ -55,6 +55,8 @@ from suave_des.tables import Table, markdown_text, rows_of
 COMPARED = (*PAPER_METRICS, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
 _LEAST_AGREEMENT = 0.5
+_LEAST_CONDITIONS = 2
+"""With one, missions are independent."""
 _TARGET = ("kind", "subject", "what", "value", "low", "high")
 _SIGNIFICANT_DIGITS = 8
 
@@ -139,6 +141,11 @@ class Validation:
             f"Means must lie in the {real} mean's 95% t interval, standard deviations in the {real} one's"
             " 95% chi-square interval."
         )
+        if len(self.conditions):
+            yield (
+                "Missions of one condition are alike: 95% intervals of means and of differences of"
+                " means are over the conditions (Student's t)."
+            )
         met = self.targets["met"].tolist()
         is_met, is_not = ("is" if met.count(each) == 1 else "are" for each in (True, False))
         yield f"{met.count(True)} of {number_of(len(met), 'target')} {is_met} met, {met.count(False)} {is_not} not met."
@@ -201,30 +208,67 @@ def validate(
     common_limit_s(dict(zip(("real missions", "simulated missions"), sides, strict=True)))
     not_found_s, sides = _with_common_limit(sides)
     real, ours = sides
-    samples = {
-        (metric, manager): both
-        for metric in COMPARED
-        for manager in managers
-        if all(map(len, both := [sample(side, manager, metric) for side in sides]))
-    }
+    samples = _samples(sides, managers)
     cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
+    conditions = compare_conditions(real, ours, managers, COMPARED)
+    if len(conditions):
+        _put_over_conditions(cells, real, conditions)
     # so narrow that none needs it
     cells = cells.drop(columns=list(interval_names("simulated_std")), errors="ignore")
-    of_one_metric = [both for both in combinations(samples, 2) if both[0][0] == both[1][0]]
     pairs = pandas.DataFrame(
-        [_pair(*both, [samples[each] for each in both], generators) for both in of_one_metric]
+        _pair(one, other, (samples[one], samples[other]), generators)
+        for one, other in combinations(samples, 2)
+        if one[0] == other[0]
     )
     counted = compare_shares(shares, real, ours, managers)
-    conditions = compare_conditions(real, ours, managers, COMPARED)
     required = _targets(cells, pairs, counted, over_conditions(conditions), limits)
-    targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
-    value, low, high = (
-        targets["value"],
-        targets["low"].fillna(-math.inf),
-        targets["high"].fillna(math.inf),
+    return Validation(
+        tuple(managers), cells, pairs, counted, conditions, _judged(required), not_found_s
     )
-    targets["met"] = value.between(low, high).astype(object).where(value.notna(), None)
-    return Validation(tuple(managers), cells, pairs, counted, conditions, targets, not_found_s)
+
+
+def _samples(
+    sides: Sequence[pandas.DataFrame], managers: Sequence[str]
+) -> dict[tuple[str, str], list[Sample]]:
+    """Return the values of each metric and manager on each side, where all sides have some."""
+    found = {}
+    for metric in COMPARED:
+        for manager in managers:
+            samples = [sample(side, manager, metric) for side in sides]
+            if all(map(len, samples)):
+                found[metric, manager] = samples
+    return found
+
+
+def _put_over_conditions(
+    cells: pandas.DataFrame, real: pandas.DataFrame, conditions: pandas.DataFrame
+) -> None:
+    """Put intervals over conditions in place of those that take missions as independent: of real
+    means, and of differences, which are then means over the conditions.
+    """
+    for row, cell in cells.iterrows():
+        manager = cell["manager"]
+        metric = cell["metric"]
+        own = real.loc[real["manager"] == manager, [metric, CONDITION]].dropna()
+        if own[CONDITION].nunique() < _LEAST_CONDITIONS:
+            continue
+        mean = mean_of(own[metric].astype(float).tolist(), own[CONDITION].tolist())
+        of_both = conditions[(conditions["manager"] == manager) & (conditions["metric"] == metric)]
+        apart = statistics.mean_interval(
+            (of_both["simulated_mean"] - of_both["real_mean"]).to_numpy(float)
+        )
+        columns = mean.columns("published_mean") | apart.columns("difference_of_means")
+        cells.loc[row, list(columns)] = pandas.Series(columns, dtype=float)
+
+
+def _judged(required: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
+    """Return requirements, with whether each is met: None of one that cannot be judged."""
+    targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
+    value = targets["value"]
+    low = targets["low"].fillna(-math.inf)
+    high = targets["high"].fillna(math.inf)
+    met = value.between(low, high).astype(object).where(value.notna(), None)
+    return targets.assign(met=met)
 
 
 def _with_common_limit(
@@ -278,7 +322,8 @@ def _cell(
     real, ours = samples
     from scipy.stats import ks_2samp  # with ties its p is too high
 
-    rng, ks = generators(f"bootstrap/{manager}/{metric}"), ks_2samp(real, ours)
+    rng = generators(f"bootstrap/{manager}/{metric}")
+    ks = ks_2samp(real, ours)
     ad = statistics.anderson_darling(real, ours, generators(f"permutations/{manager}/{metric}"))
     return {
         "manager": manager,
@@ -301,7 +346,9 @@ def _pair(
     """Compare two managers in a metric (metric, manager), each with its real and its simulated
     sample.
     """
-    metric, first, second = one[0], one[1], other[1]
+    metric = one[0]
+    first = one[1]
+    second = other[1]
     (real, ours), (other_real, other_ours) = samples
     # By the normal approximation, as the subsamples below are tested.
     published = statistics.mann_whitney(real, other_real, "asymptotic")
@@ -340,10 +387,8 @@ def compare_shares(
     validation_shares.csv.
     """
     sides = published, simulated
-    known, where = (
-        Region({"pipeline_found": ((0.0, 1.0),)}),
-        Region({"pipeline_found": ((1.0, 1.0),)}),
-    )
+    known = Region({"pipeline_found": ((0.0, 1.0),)})
+    where = Region({"pipeline_found": ((1.0, 1.0),)})
     found = [
         Share(manager=manager, name="pipeline found", among=known, where=where)
         for manager in managers
@@ -474,7 +519,8 @@ def _targets(
 
 
 def _targets_of_cell(cell: Mapping[Any, Any]) -> Iterator[tuple[Any, ...]]:
-    manager, metric = cell["manager"], cell["metric"]
+    manager = cell["manager"]
+    metric = cell["metric"]
     for kind in ("mean", "std"):
         low, high = (cell[name] for name in interval_names(f"published_{kind}"))
         is_known = low is not None and not math.isnan(low)

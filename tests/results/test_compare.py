@@ -3,6 +3,9 @@ follows.
 """
 
 import re
+import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +17,12 @@ from scipy import stats
 from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
+from suave_des.records.missions import missions_in
 from suave_des.resources import find
 from suave_des.results import statistics
 from suave_des.results.compare import Choices, compare_folders
 from suave_des.results.comparison import Comparison
+from suave_des.results.figures import draw_missions
 from tests.helpers.compared import compare_frame, difference, interval, row, rows
 
 PUBLISHED = find("seams2023_runs.csv", "scenarios/published")
@@ -47,6 +52,10 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def draw_missions_in(folders: list[Path]) -> None:
+    draw_missions(missions_in(folders))
+
+
 def runs(**values: list[float]) -> pandas.DataFrame:
     """Missions of managers with given search times, run by run, with seed 1; 300 s: not found."""
     rows = [
@@ -57,6 +66,15 @@ def runs(**values: list[float]) -> pandas.DataFrame:
     frame = pandas.DataFrame(rows, columns=["manager", "run", "search_time_s"]).assign(seed=1)
     times_s = frame["search_time_s"]
     return frame.assign(pipeline_found=times_s < 300.0, distance_inspected_m=300.0 - times_s)
+
+
+@pytest.mark.parametrize("use", [compare_folders, draw_missions_in], ids=["compare", "figure"])
+def test_a_folder_whose_store_is_not_a_campaigns_is_refused(campaign, tmp_path, use):
+    folder = shutil.copytree(campaign, tmp_path / "forged")
+    with closing(sqlite3.connect(folder / "campaign.sqlite")) as store:
+        store.execute("CREATE VIEW endless AS SELECT * FROM outcomes")
+    with pytest.raises(InputError, match="does not have the tables of a campaign's store"):
+        use([folder])
 
 
 class TestPublishedRuns:

@@ -20,9 +20,12 @@ from suave_des.results.statistics import (
     difference_interval,
     mann_whitney,
     mean_interval,
+    means_test,
     paired_share_difference,
     ratio_interval,
+    runs_for,
     sign_of,
+    signed_rank_test,
 )
 from tests.helpers.compared import compare_frame, rows
 
@@ -436,3 +439,30 @@ class TestManagers:
 def test_the_interval_of_a_share_is_scipys(count, n, method):
     reference = stats.binomtest(count, n).proportion_ci(method=method)
     assert share_of(count, n, method).interval == pytest.approx((reference.low, reference.high))
+
+
+class TestQuickForms:
+    """What is computed here in place of a library's function, for speed, has its value."""
+
+    def test_p_of_pairs_is_scipys_to_the_last_digit(self):
+        rng = np.random.default_rng(1)
+        for n in (2, 3, 20, 117):
+            first, second = rng.normal(100.0, 30.0, (2, n)).round(2)
+            expected = float(stats.ttest_rel(first, second).pvalue)
+            assert means_test(first, second, is_paired=True) == ("Student's t", expected)
+
+    def test_signed_ranks_with_ties_are_scipys(self):
+        first = np.array([1.0, 2.0, 2.0, 3.0, 5.0, 8.0, 9.0, 9.0])
+        second = np.array([2.0, 1.0, 4.0, 1.0, 2.0, 6.0, 4.0, 9.0])
+        apart = first - second
+        ranks = stats.rankdata(np.abs(apart[apart != 0.0]))
+        expected = 2.0 * ranks[apart[apart != 0.0] > 0.0].sum() / ranks.sum() - 1.0
+        assert signed_rank_test(first, second)["effect"] == pytest.approx(expected)
+
+    @pytest.mark.parametrize("half_width", [0.001, 0.0123, 0.1, 0.5, 1.0, 3.0, 50.0])
+    def test_no_fewer_runs_make_an_interval_as_narrow(self, half_width):
+        def half(n: int) -> float:
+            return float(stats.t.ppf(0.975, n - 1) / math.sqrt(n))
+
+        n = runs_for(1.0, half_width)
+        assert half(n) <= half_width and (n == 2 or half(n - 1) > half_width)

@@ -4,9 +4,11 @@ regions.
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import pandas
 import pytest
+from scipy import stats
 
 from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
@@ -448,3 +450,40 @@ def test_a_wrong_file_of_shares_is_named_with_its_line(write, content, place, pr
     assert caught.value.file == str(path)
     assert caught.value.place.startswith(place)
     assert problem in caught.value.problem
+
+
+class TestIntervalsOverConditions:
+    """Real missions differ by 40 s between conditions and by 2 s within; simulated ones take 1, 2,
+    or 6 s more."""
+
+    REAL: ClassVar = {1: [50.0, 52.0], 2: [90.0, 92.0], 3: [130.0, 132.0]}
+    SIMULATED: ClassVar = {1: [51.0, 53.0], 2: [92.0, 94.0], 3: [136.0, 138.0]}
+
+    @pytest.fixture
+    def cell(self, few_resamples):
+        found = validate(missions("bt", self.REAL), missions("bt", self.SIMULATED), ["bt"])
+        return found.cells.set_index("metric").loc["search_time_s"]
+
+    def test_a_difference_of_means_has_the_t_interval_over_the_conditions(self, cell):
+        tested = stats.ttest_1samp([1.0, 2.0, 6.0], 0.0).confidence_interval(0.95)
+        ends = [cell[f"difference_of_means_ci95_{end}"] for end in ("low", "high")]
+        assert ends == pytest.approx(list(tested))
+
+    def test_a_real_mean_has_the_t_interval_over_the_conditions(self, cell):
+        low, high = stats.t.interval(0.95, 2, 91.0, stats.sem([51.0, 91.0, 131.0]))
+        ends = [cell[f"published_mean_ci95_{end}"] for end in ("low", "high")]
+        assert ends == pytest.approx([low, high])
+
+    def test_of_one_condition_missions_are_independent(self, few_resamples):
+        real = missions("bt", {1: [50.0, 52.0, 57.0]})
+        found = validate(real, missions("bt", {1: [51.0, 53.0, 55.0]}), ["bt"])
+        expected = stats.t.interval(0.95, 2, 53.0, stats.sem([50.0, 52.0, 57.0]))
+        ends = found.cells.loc[0, ["published_mean_ci95_low", "published_mean_ci95_high"]]
+        assert ends.tolist() == pytest.approx(expected)
+
+
+def test_a_validation_says_that_its_intervals_are_over_conditions(few_resamples):
+    real = missions("bt", {1: [50.0, 52.0], 2: [90.0, 92.0]})
+    assert any(
+        "are over the conditions" in line for line in validate(real, real, ["bt"]).remarks("real")
+    )
