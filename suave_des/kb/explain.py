@@ -576,11 +576,28 @@ class RuleQuestions:
         except ContradictionError:
             raise
         except KnowledgeError:
-            # Where rules ask what is different Pellet can fail on what it is asked besides: what
-            # matches tells.
-            pellet = matching.tracing_pellet(self._usable)
-            facts = Facts(Tracer(self._usable, state, pellet).known)
-            return facts, frozenset(rule for rule in rules if matching.matches(rule, facts))
+            # Where rules ask what is different Pellet can fail on what it is asked besides.
+            known = self._followed(rules, state)
+            facts = Facts(known)
+            return facts, frozenset(
+                rule for rule in rules if matching.matches(rule, facts) or self._adds(rule, state)
+            )
+
+    def _followed(self, rules: Iterable[Rule], state: KnowledgeState) -> tuple[Triple, ...]:
+        """All that follows in a state with some of the rules."""
+        base = self._usable.with_rules(rules)
+        return Tracer(base, state, matching.tracing_pellet(base)).known
+
+    def _adds(self, rule: Rule, state: KnowledgeState) -> bool:
+        """Whether less follows without a rule.
+
+        It may fire with no match: where an individual differs from one of two, but it is not known
+        from which.
+        """
+        rules = self._usable.content.enabled_rules
+        return self._followed((each for each in rules if each is not rule), state) != (
+            self._followed(rules, state)
+        )
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
         fact = matching.stated(atom, binding)
