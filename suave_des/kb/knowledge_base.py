@@ -184,6 +184,7 @@ class KnowledgeBase:
         except ContradictionError as error:
             return Outcome(None, error.problem.removeprefix("contradiction: "))
 
+    @plain_arguments
     def state(
         self,
         file: str | Path | None = None,
@@ -254,6 +255,7 @@ class KnowledgeBase:
         facts = (fact_of((one, name, other), self.base.names) for one, other, name in pairs)
         return tuple(sorted(facts, key=str))
 
+    @plain_arguments
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Explain why a fact or a decision follows in a state.
 
@@ -322,6 +324,7 @@ class KnowledgeBase:
         )
         return compare_decisions(states, before, after, tuple(no_proof))
 
+    @plain_arguments
     def query(
         self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False
     ) -> QueryResult:

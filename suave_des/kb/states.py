@@ -306,9 +306,13 @@ class StateBuilder:
                 raise InputError(
                     f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8"
                 )
-            KnowledgeState.of(measurements={name: value})  # raises if it is not a number
         elif isinstance(value, bool):  # YAML reads a bare FALSE as one
             value = str(value).upper()
+        # Both raise an error if the value is no number, or no text.
+        if kind == "objectives":
+            KnowledgeState.of([ObjectiveState(name, value)])
+        else:
+            KnowledgeState.of(**{kind: {name: value}})
         if isinstance(value, str) and kind in _STATUSES:
             self._check_status(_STATUSES[kind], value)
         if kind == "groundings" and value not in self.base.designs(name):

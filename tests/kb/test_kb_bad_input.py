@@ -101,6 +101,10 @@ def refused(command, name, arguments, said):
             ("infer", "--at", "f_maintain_motion=ungrounded"),
             "--at: f_maintain_motion has no function design 'ungrou",
         ),
+        (
+            ("infer", "--at", "f_maintain_motion=IN_ERROR_\udcff"),  # as the shell's $'\xff' comes
+            "--at: f_maintain_motion: 'IN_ERROR_\\udcff' has a character that no file can hold",
+        ),
         (("infer", "--at", "nowhere@3"), "nowhere: no such folder"),
         (("infer", "--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
         (("infer", "--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
