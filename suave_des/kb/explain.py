@@ -572,16 +572,16 @@ class RuleQuestions:
         try:
             tracer = Tracer(self._usable, state, self._pellet)
             facts = Facts(tracer.known)
-            return facts, frozenset(rules[number] for number in tracer.holding)
+            firing = {rules[number] for number in tracer.holding}
         except ContradictionError:
             raise
         except KnowledgeError:
             # Where rules ask what is different Pellet can fail on what it is asked besides.
-            known = self._followed(rules, state)
-            facts = Facts(known)
-            return facts, frozenset(
-                rule for rule in rules if matching.matches(rule, facts) or self._adds(rule, state)
-            )
+            facts = Facts(self._followed(rules, state))
+            firing = {rule for rule in rules if matching.matches(rule, facts)}
+        if any(atom.predicate in IDENTITIES for rule in rules for atom in rule.body):
+            firing |= {rule for rule in rules if rule not in firing and self._adds(rule, state)}
+        return facts, frozenset(firing)
 
     def _followed(self, rules: Iterable[Rule], state: KnowledgeState) -> tuple[Triple, ...]:
         """All that follows in a state with some of the rules."""
@@ -589,15 +589,15 @@ class RuleQuestions:
         return Tracer(base, state, matching.tracing_pellet(base)).known
 
     def _adds(self, rule: Rule, state: KnowledgeState) -> bool:
-        """Whether less follows without a rule.
+        """Whether something that a rule concludes follows with it alone.
 
-        It may fire with no match: where an individual differs from one of two, but it is not known
-        from which.
+        It may fire with no match that is known: where an individual differs from one of two, but
+        from which does not follow.
         """
         rules = self._usable.content.enabled_rules
-        return self._followed((each for each in rules if each is not rule), state) != (
-            self._followed(rules, state)
-        )
+        fewer = self._followed((each for each in rules if each is not rule), state)
+        more = set(self._followed(rules, state)).difference(fewer)
+        return any(matching.matched(atom, each, {}) for atom in rule.head for each in more)
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
         fact = matching.stated(atom, binding)

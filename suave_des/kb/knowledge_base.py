@@ -20,7 +20,8 @@ from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.explain import Explainer, Explanation
 from suave_des.kb.matching import tracing_pellet
 from suave_des.kb.policy import Policy, make_policy
-from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
+from suave_des.kb.situations import OnCount, Outcome, Situation
+from suave_des.kb.space import PolicySpace, States, decide_all
 from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit, reasoning_on

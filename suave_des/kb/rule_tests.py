@@ -20,7 +20,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.space import Decide, Outcome, Region, Situation, measurements_in, parse_region
+from suave_des.kb.scale import Region, measurements_in, parse_region
+from suave_des.kb.situations import Decide, Outcome, Situation
 from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_state, state_dict
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError

@@ -312,7 +312,8 @@ class StateBuilder:
         if kind == "objectives":
             KnowledgeState.of([ObjectiveState(name, value)])
         else:
-            KnowledgeState.of(**{kind: {name: value}})
+            part: dict[str, Any] = {kind: {name: value}}
+            KnowledgeState.of(**part)
         if isinstance(value, str) and kind in _STATUSES:
             self._check_status(_STATUSES[kind], value)
         if kind == "groundings" and value not in self.base.designs(name):

@@ -88,9 +88,7 @@ def test_a_test_of_rules_with_any_value_is_run_or_refused(
     ids=["component", "objective", "grounding"],
 )
 def test_a_state_takes_text_alone(parts, status):
-    with pytest.raises(
-        InputError, match="^c_thruster_1: .* \\((write it in quotes|write it in UTF-8)\\)$"
-    ):
+    with pytest.raises(InputError, match="c_thruster_1: "):
         KnowledgeState.of(**parts(status))
 
 

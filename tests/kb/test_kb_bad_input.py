@@ -3,11 +3,14 @@ file as it was.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import get_type_hints
 
 import pytest
 
+from suave_des.kb.rule_editor import _rule_xml
+from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord, MissionMetrics
 from suave_des.records.mission_folder import KNOWLEDGE_FILE, knowledge_text
@@ -218,3 +221,34 @@ def test_rules_that_contradict_each_other_are_named(folder, command):
     assert status == 1
     # what follows from them may clash, too
     assert "clash (clash.swrl, line 2), near (clash.swrl, line 1)" in text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("Nowhere(?x) -> Wine(?x)", id="a class that is not there"),
+        pytest.param("Wine(?x) -> Wine(?y)", id="a variable without a value"),
+    ],
+)
+def test_rules_are_printed_as_rules_as_text_can_have_them(folder, command, text):
+    ontology = '<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Wine"/>'
+    xml = _rule_xml(looked_up_in_wine(text))
+    Path("wine.owl").write_text(document(ontology + xml))
+    printed = command("rules", "--ontology", "wine.owl")[1]
+    assert "# Rules as text cannot have this rule: rule odd: " in printed
+    Path("wine.swrl").write_text(printed)
+    status, _, error = command("rules", "--ontology", "wine.owl", "--rules", "wine.swrl")
+    assert (status, error) == (0, "")
+
+
+def looked_up_in_wine(text):
+    """A rule with all names in one namespace, whether or not they are there."""
+    parsed = parse_rule(f"odd: {text}")
+    body, head = (
+        tuple(
+            replace(atom, kind="class", predicate=f"http://x.org/wine#{atom.predicate}")
+            for atom in side
+        )
+        for side in (parsed.body, parsed.head)
+    )
+    return replace(parsed, body=body, head=head)

@@ -71,28 +71,21 @@ class Vocabulary:
         """Collect the names in triples of ontologies; the individuals are further ones, that exist
         only in states.
         """
-        kinds: dict[str, set[str]] = defaultdict(
-            set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}}
-        )
+        triples = tuple(triples)
+        kinds: dict[str, set[str]] = defaultdict(set)
+        for name in (rdf.OWL + "Thing", rdf.OWL + "Nothing"):
+            kinds[name].add("class")
         ranges: dict[str, set[str]] = defaultdict(set)
-        used, whole = set[str](), set[str]()
         for subject, predicate, value in triples:
-            used |= {term for term in (subject, predicate, value) if isinstance(term, str)}
-            if isinstance(value, Lit) and value.datatype in rdf.WHOLE:
-                whole.add(predicate)
-            if predicate == rdf.RDF_TYPE and isinstance(value, str):
-                if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
-                    kinds[subject].add(_DECLARED.get(value, "individual"))
+            name = value if isinstance(value, str) else None
+            if predicate == rdf.RDF_TYPE and name is not None:
+                if name in _DECLARED or not name.startswith(rdf.LANGUAGE_NAMESPACES):
+                    kinds[subject].add(_DECLARED.get(name, "individual"))
             elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
-                kinds[subject].add("individual")
-                if isinstance(value, str):
-                    kinds[value].add("individual")
-            elif (
-                predicate == rdf.RDFS + "range"
-                and isinstance(value, str)
-                and value.startswith(rdf.XSD)
-            ):
-                ranges[subject].add(value)
+                for term in filter(None, (subject, name)):
+                    kinds[term].add("individual")
+            elif predicate == rdf.RDFS + "range" and name is not None and name.startswith(rdf.XSD):
+                ranges[subject].add(name)
         for iri in individuals:
             kinds[iri].add("individual")
         # All ranges of a property hold at once; which values several of them leave is not worked
@@ -100,11 +93,13 @@ class Vocabulary:
         single = {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
         texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
         return cls(
-            {iri: frozenset(found) for iri, found in kinds.items()},
-            single | texts,
-            enumerations,
-            frozenset(used),
-            frozenset(whole),
+            kinds={iri: frozenset(found) for iri, found in kinds.items()},
+            ranges=single | texts,
+            enumerations=enumerations,
+            used=frozenset(term for each in triples for term in each if isinstance(term, str)),
+            whole=frozenset(
+                p for _, p, o in triples if isinstance(o, Lit) and o.datatype in rdf.WHOLE
+            ),
         )
 
     def with_rules(self, rules: Iterable[Rule]) -> Vocabulary:
@@ -326,7 +321,8 @@ def _argument_problems(
             and atom.kind in _DECLARED_AS
             and atom.predicate != rdf.OWL + "Thing"
             and not atom.expression
-            and term.iri not in vocabulary.used.union(vocabulary.kinds)
+            and term.iri not in vocabulary.used
+            and term.iri not in vocabulary.kinds
         ):
             words = f"individual {thing} is not defined"
             yield Problem(place, words, vocabulary.guess(term.iri, ("individual",)))
@@ -394,16 +390,13 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
     individuals: dict[str, Place | None] = {}
     values: dict[str, Place | None] = {}
     for atom, number, name in _uses(rule.atoms):
-        (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number))
+        places = values if atom.takes_value(number) else individuals
+        places.setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(filter(None, (individuals[name], values[name])), default=None)
         yield Problem(place, f"?{name} stands for an individual and for a value", None)
-    bound = {
-        name for atom in rule.body if atom.kind in swrl.FACT_KINDS for name in atom.variables()
-    }
-    builtins = [atom for atom in rule.body if atom.kind == "builtin" and atom.arguments]
-    while more := {name for atom in builtins for name in swrl.computed(atom, bound)} - bound:
-        bound |= more
+    bound = _bound_in(rule)
+    builtins = [atom for atom in rule.body if atom.kind == "builtin"]
     ranges = [atom for atom in rule.body if atom.kind == "range"]
     for atom, number, name in _uses([*builtins, *ranges]):
         if name not in bound:
@@ -413,6 +406,15 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         if name not in bound:
             words = f"?{name} occurs in the head, but the body does not bind it"
             yield Problem(atom.place(number), words, nearest(name, bound))
+
+
+def _bound_in(rule: Rule) -> set[str]:
+    """The variables of a rule that facts give a value, or built-ins compute from these."""
+    facts = (atom for atom in rule.body if atom.kind in swrl.FACT_KINDS)
+    bound = {name for atom in facts for name in atom.variables()}
+    while more := {name for atom in rule.body for name in swrl.computed(atom, bound)} - bound:
+        bound |= more
+    return bound
 
 
 # Rules as text.
