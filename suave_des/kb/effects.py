@@ -9,7 +9,8 @@ more to say, every value counts, as it is.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator
 from decimal import Decimal
 from typing import Final
 
@@ -263,12 +264,16 @@ def _has_equal_individuals(base: Ontology) -> bool:
         return True
     kind = (rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty")
     functional = {s for s, p, o in triples if (p, o) == kind}
-    own = [(s, p) for s, p, o in triples if p in functional and isinstance(o, str)]
-    if len({*own}) < len(own):
+    own = Counter((s, p) for s, p, o in triples if p in functional and isinstance(o, str))
+    if own and max(own.values()) > 1:
         return True
-    rules = base.content.enabled_rules
-    if any(atom.predicate in IDENTITIES for rule in rules for atom in rule.atoms):
+    return any(_equates(rule, functional) for rule in base.content.enabled_rules)
+
+
+def _equates(rule: Rule, functional: Collection[str]) -> bool:
+    """Whether a rule speaks of identity, concludes a value, or what may make individuals equal."""
+    if any(atom.predicate in IDENTITIES for atom in rule.atoms):
         return True
-    heads = [atom for rule in rules for atom in rule.head]
-    gives_value = any(atom.predicate in _OF_VALUES for atom in heads)
-    return gives_value or any(a.kind == "object" and a.predicate in functional for a in heads)
+    concluded = {atom.predicate for atom in rule.head}
+    links = {atom.predicate for atom in rule.head if atom.kind == "object"}
+    return not (concluded.isdisjoint(_OF_VALUES) and links.isdisjoint(functional))

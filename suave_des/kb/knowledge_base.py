@@ -392,12 +392,11 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
             columns = list(map(str, result.vars or ()))
             if "*" in text.partition("{")[0]:  # all variables, which rdflib returns in any order
                 columns.sort()
-            rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
-            ordered = "OrderBy" in str(query.algebra)
-            return QueryResult(
-                tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)), unknown
-            )
-        triples = [tuple(_text(graph, term) for term in triple) for triple in result.graph or ()]
+            rows = [_texts(graph, (row[name] for name in columns)) for row in result]  # type: ignore
+            if "OrderBy" not in str(query.algebra):
+                rows.sort(key=_sortable)
+            return QueryResult(tuple(columns), tuple(rows), unknown)
+        triples = [_texts(graph, triple) for triple in result.graph or ()]
         return QueryResult(
             ("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)), unknown
         )
@@ -419,6 +418,10 @@ def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:
 
 def _sortable(row: tuple[str | None, ...]) -> tuple[str, ...]:
     return tuple(cell or "" for cell in row)
+
+
+def _texts(graph: rdflib.Graph, terms: Iterable[object]) -> tuple[str | None, ...]:
+    return tuple(_text(graph, term) for term in terms)
 
 
 def _text(graph: rdflib.Graph, term: object) -> str | None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -210,30 +210,40 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
     others = [name for name in down if name not in (own, "reports")]
     found = _outcomes(cases, kept, len(down))
     ranges = [_ranges(number, policy, found.values()) for number in range(len(attributes))]
-    *over, across = ranges or [[]]
-    merged: dict[Any, list[str]] = {}  # what components report, of each different row
-    for names, row in found.items():
-        known = dict(zip(down, names, strict=True))
-        before = [known[name] for name in (own, *others)]
-        for at in itertools.product(*over):
-            places = [first for first, _ in at]
-            cells = [row[*places, last] for last, _ in across] or [row[()]]
-            label = tuple(before), tuple(words for _, words in at), tuple(cells)
-            merged.setdefault(label, []).append(known.get("reports", ""))
     headings = ["now", *(name.removesuffix("_now") for name in others)]
     if "reports" in kept:
         headings.append("components")
     headings += attributes[:-1]
     rows = []
-    for (before, places, cells), reports in merged.items():
+    for (before, places, cells), reports in _merged(found, down, [own, *others], ranges).items():
         reported = [", ".join(reports)] if "reports" in kept else []
         rows.append([*before, *reported, *places, *cells])
+    outcomes = [words for _, words in ranges[-1]] if ranges else ["then"]
     what = f", by measured {', '.join(attributes)}" if attributes else ""
-    outcomes = [words for _, words in across] or ["then"]
     table = Table(
         [*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes))
     )
     return table, len(headings), attributes[-1] if attributes else ""
+
+
+def _merged(
+    found: Mapping[tuple[str, ...], _Row],
+    down: Sequence[str],
+    designs: Sequence[str],
+    ranges: Sequence[Sequence[tuple[int, str]]],
+) -> dict[Any, list[str]]:
+    """What components report in each different row: designs, words for places, and outcomes."""
+    *over, across = ranges or [[]]
+    merged: dict[Any, list[str]] = {}
+    for names, row in found.items():
+        known = dict(zip(down, names, strict=True))
+        before = tuple(known[name] for name in designs)
+        for at in itertools.product(*over):
+            places = [first for first, _ in at]
+            cells = [row[*places, last] for last, _ in across] or [row[()]]
+            label = before, tuple(words for _, words in at), tuple(cells)
+            merged.setdefault(label, []).append(known.get("reports", ""))
+    return merged
 
 
 def _needed(policy: Policy, function: str) -> tuple[Any, list[str]]:

@@ -563,8 +563,9 @@ def never_comparable(material: Material) -> Iterator[Finding]:
             if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
                 continue
             kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
+            numbers = [bool(kind) and kind <= rdf.NUMERIC for kind in kinds]
             texts = [bool(kind) and kind <= _TEXTS for kind in kinds]
-            if any(texts) and any(kind and kind <= rdf.NUMERIC for kind in kinds):
+            if True in texts and True in numbers:
                 place = texts.index(True)
                 term = atom.arguments[place]
                 problem = f"{swrl.write_term(term)} is no number, and never compares with one"
@@ -679,17 +680,18 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
     for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
         for atom, name in _attributes_asked(rule):
-            is_measured = measured is None or name in measured
             unmeasured = f"missions do not measure {name}"
+            is_measured = measured is None or name in measured
             if atom.arguments[0] not in held:
                 if not is_measured and name not in valued:
                     yield rule, atom, f"{unmeasured}, and no ontology has a value of it", None
-            elif name in model.attributes and not has_own_values:
-                if name not in estimated:
-                    problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
-                    yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
-                elif not is_measured:
-                    yield rule, atom, f"{unmeasured}, so no grounding has a value of it", None
+            elif has_own_values or name not in model.attributes:
+                continue
+            elif name not in estimated:
+                problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
+                yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
+            elif not is_measured:
+                yield rule, atom, f"{unmeasured}, so no grounding has a value of it", None
 
 
 def _attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:

@@ -212,13 +212,12 @@ class Content:
         properties.update(name for _, name, _ in filter(rdf.is_fact, self.triples))
         classes = {*decisions.classes}.union(*(kinds.get(kind, ()) for kind in _CLASSES))
         classes.update(name for _, name in rdf.memberships(self.triples))
-        for atom in (atom for rule in self.enabled_rules for atom in rule.body):
-            if atom.kind in ("object", "data") and atom.predicate:
-                properties.add(atom.predicate)
-            if atom.kind == "class" and atom.predicate and not atom.expression:
-                classes.add(atom.predicate)
+        asked = [atom for rule in self.enabled_rules for atom in rule.body if not atom.expression]
+        properties.update(atom.predicate for atom in asked if atom.kind in ("object", "data"))
+        classes.update(atom.predicate for atom in asked if atom.kind == "class")
         annotations = kinds.get(rdf.OWL + "AnnotationProperty", set())
-        return Terms(_named(properties - annotations), _named(classes))
+        # What has no name is an atom that SWRL does not know.
+        return Terms(_named(properties - annotations - {""}), _named(classes - {""}))
 
     def n_triples(self, rules: Sequence[Rule] | None = None) -> str:
         """Write all of it for a reasoner, with the enabled rules or those given."""

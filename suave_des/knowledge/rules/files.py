@@ -72,34 +72,14 @@ class Vocabulary:
         only in states.
         """
         triples = tuple(triples)
-        kinds: dict[str, set[str]] = defaultdict(set)
-        for name in (rdf.OWL + "Thing", rdf.OWL + "Nothing"):
-            kinds[name].add("class")
-        ranges: dict[str, set[str]] = defaultdict(set)
-        for subject, predicate, value in triples:
-            name = value if isinstance(value, str) else None
-            if predicate == rdf.RDF_TYPE and name is not None:
-                if name in _DECLARED or not name.startswith(rdf.LANGUAGE_NAMESPACES):
-                    kinds[subject].add(_DECLARED.get(name, "individual"))
-            elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
-                for term in filter(None, (subject, name)):
-                    kinds[term].add("individual")
-            elif predicate == rdf.RDFS + "range" and name is not None and name.startswith(rdf.XSD):
-                ranges[subject].add(name)
-        for iri in individuals:
-            kinds[iri].add("individual")
-        # All ranges of a property hold at once; which values several of them leave is not worked
-        # out.
-        single = {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
         texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
+        literals = [(p, o) for _, p, o in triples if isinstance(o, Lit)]
         return cls(
-            kinds={iri: frozenset(found) for iri, found in kinds.items()},
-            ranges=single | texts,
+            kinds=_kinds(triples, individuals),
+            ranges=_ranges(triples) | texts,
             enumerations=enumerations,
             used=frozenset(term for each in triples for term in each if isinstance(term, str)),
-            whole=frozenset(
-                p for _, p, o in triples if isinstance(o, Lit) and o.datatype in rdf.WHOLE
-            ),
+            whole=frozenset(p for p, literal in literals if literal.datatype in rdf.WHOLE),
         )
 
     def with_rules(self, rules: Iterable[Rule]) -> Vocabulary:
@@ -143,6 +123,36 @@ class Vocabulary:
         if bare in known and bare != name:
             return f"did you mean {' or '.join(self.candidates(bare))}?"
         return nearest(bare, known)
+
+
+def _kinds(triples: Iterable[rdf.Triple], individuals: Iterable[str]) -> dict[str, frozenset[str]]:
+    """What each name is declared as or used as; further individuals are given."""
+    kinds: dict[str, set[str]] = defaultdict(set)
+    kinds[rdf.OWL + "Thing"].add("class")
+    kinds[rdf.OWL + "Nothing"].add("class")
+    for subject, predicate, value in triples:
+        if predicate == rdf.RDF_TYPE and isinstance(value, str):
+            if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
+                kinds[subject].add(_DECLARED.get(value, "individual"))
+        elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
+            kinds[subject].add("individual")
+            if isinstance(value, str):
+                kinds[value].add("individual")
+    for iri in individuals:
+        kinds[iri].add("individual")
+    return {iri: frozenset(found) for iri, found in kinds.items()}
+
+
+def _ranges(triples: Iterable[rdf.Triple]) -> dict[str, frozenset[str]]:
+    """The datatype of each property that has one range.
+
+    All ranges of a property hold at once; which values several of them leave is not worked out.
+    """
+    ranges: dict[str, set[str]] = defaultdict(set)
+    for subject, predicate, value in triples:
+        if predicate == rdf.RDFS + "range" and str(value).startswith(rdf.XSD):
+            ranges[subject].add(str(value))
+    return {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
 
 
 class Problem(NamedTuple):
