@@ -30,7 +30,8 @@ from suave_des.errors import KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import Body, Probes, testable_order
 from suave_des.kb.rule_tests import RuleTest, passes
-from suave_des.kb.space import Decide, PolicySpace, Situation, States, compare, difference
+from suave_des.kb.situations import Decide, Situation, compare, difference
+from suave_des.kb.space import PolicySpace, States, spread
 from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
@@ -85,7 +86,8 @@ def _goals(rules: Iterable[Rule]) -> Iterator[Goal]:
         yield Goal(rule.name, -1, FIRES, holds=atoms)
         yield Goal(rule.name, -1, FIRES_NOT, fails=atoms)
         for number, atom in enumerate(atoms):
-            before, text = atoms[:number], write_atom(atom)
+            before = atoms[:number]
+            text = write_atom(atom)
             if atom.predicate in swrl.COMPARISONS and len(atom.arguments) == 2:
                 for order, (sign, _) in ORDERS.items():
                     compared = replace(atom, predicate=swrl.COMPARISON_OF[sign])
@@ -132,24 +134,27 @@ class Coverage(NamedTuple):
 
     def table(self) -> Table:
         """The goals of each rule."""
-        rows = []
-        for rule in sorted({goal.rule for goal in self.goals}):
-            own = [goal for goal in self.goals if goal.rule == rule]
-            covered, missing, no_state = (
-                sum(goal in kind for goal in own)
-                for kind in (self.covered, self.missing, self.unreachable)
-            )
-            fired, not_fired = (
-                str(self.covered[Goal(rule, -1, outcome)]) for outcome in (FIRES, FIRES_NOT)
-            )
-            share = f"{covered}/{covered + missing}"
-            rows.append((rule, fired, not_fired, share, str(missing or ""), str(no_state or "")))
-        covered, reachable = len(self.covered), len(self.covered) + len(self.missing)
-        title = (
-            f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
-        )
+        covered = len(self.covered)
+        reachable = covered + len(self.missing)
+        share = covered / reachable if reachable else 1.0
         return Table(
-            ("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll"
+            ("rule", "fired", "not fired", "covered", "missing", "no state"),
+            [self._row(rule) for rule in sorted({goal.rule for goal in self.goals})],
+            f"coverage: {covered} of {reachable}, {share:.0%}",
+            "lrrrll",
+        )
+
+    def _row(self, rule: str) -> tuple[str, ...]:
+        own = [goal for goal in self.goals if goal.rule == rule]
+        covered = sum(goal in self.covered for goal in own)
+        missing = sum(goal in self.missing for goal in own)
+        return (
+            rule,
+            str(self.covered[Goal(rule, -1, FIRES)]),
+            str(self.covered[Goal(rule, -1, FIRES_NOT)]),
+            f"{covered}/{covered + missing}",
+            str(missing or ""),
+            str(len(own) - covered - missing or ""),
         )
 
     def lines(self) -> Iterator[str]:
@@ -196,36 +201,21 @@ def measure_coverage(
 
 # Mutants.
 
-_NOT_HORN: Final = (
-    *(
-        "unionOf",
-        "complementOf",
-        "oneOf",
-        "disjointUnionOf",
-        "maxCardinality",
-        "maxQualifiedCardinality",
-    ),
-    *(
-        "cardinality",
-        "qualifiedCardinality",
-        "minQualifiedCardinality",
-        "minCardinality",
-        "allValuesFrom",
-    ),
-)
+_NOT_HORN: Final = [
+    "unionOf",
+    "complementOf",
+    "oneOf",
+    "disjointUnionOf",
+    "maxCardinality",
+    "maxQualifiedCardinality",
+    "cardinality",
+    "qualifiedCardinality",
+    "minQualifiedCardinality",
+    "minCardinality",
+    "allValuesFrom",
+]
 #: By how much thresholds are moved, up and down.
 _MOVED: Final = (Decimal("1.1"), Decimal("0.9"))
-#: Kinds of changes.
-OPERATORS: Final = (
-    *(
-        "comparison turned",
-        "comparison shifted",
-        "atom dropped",
-        "variable exchanged",
-        "conclusion changed",
-    ),
-    *("rule removed", "threshold moved", "status exchanged", "individual exchanged"),
-)
 _T = TypeVar("_T")
 
 
@@ -234,7 +224,7 @@ class Mutant:
     """A knowledge base with one change.
 
     Attributes:
-        operator: one of OPERATORS.
+        operator: kind of the change, one of OPERATORS.
         new: the rule in its place; None where it is removed.
     """
 
@@ -257,16 +247,15 @@ class Mutant:
         """What is changed, in one line."""
         if self.new is None:
             return "the rule is removed"
-        before, after = (list(map(write_atom, rule.atoms)) for rule in (self.old, self.new))
-        at = next(
-            (n for n, (one, other) in enumerate(zip(before, after, strict=False)) if one != other),
-            -1,
+        before = list(map(write_atom, self.old.atoms))
+        after = list(map(write_atom, self.new.atoms))
+        differing = (
+            at for at, pair in enumerate(zip(before, after, strict=False)) if len({*pair}) > 1
         )
-        return (
-            f"{before[at]} becomes {after[at]}"
-            if len(before) == len(after)
-            else f"{before[at]} is left out"
-        )
+        at = next(differing, -1)
+        if len(before) > len(after):
+            return f"{before[at]} is left out"
+        return f"{before[at]} becomes {after[at]}"
 
     def __str__(self) -> str:
         return f"{self.name}: {self.operator}: {self.text}"
@@ -281,16 +270,15 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
     """All mutants of the enabled rules, by rule and operator; those that no reasoner could use are
     left out.
     """
-    found = [Mutant("rule removed", rule, None) for rule in base.content.enabled_rules]
-    for operator, rule, number, atom in _changes(base):
-        body, head = list(rule.body), list(rule.head)
-        side, at = (body, number) if number < len(body) else (head, number - len(body))
-        side[at : at + 1] = [] if atom is None else [atom]
-        new = replace(rule, body=tuple(body), head=tuple(head), triples=())
-        is_same = new.head == rule.head and set(new.body) == set(rule.body)
-        if not is_same and not fatal_problems(new, base.vocabulary):
-            found.append(Mutant(operator, rule, new))
-    found.sort(key=lambda one: (one.name, OPERATORS.index(one.operator)))
+    offered = _Offered.of(base)
+    found = [
+        Mutant(operator, rule, new)
+        for operator, changed in OPERATORS.items()
+        for rule in base.content.enabled_rules
+        for new in changed(rule, offered)
+        if new is None or _is_usable(new, rule, base)
+    ]
+    found.sort(key=lambda one: one.name)
     different: dict[object, Mutant] = {}
     for mutant in found:
         after = mutant.new and (mutant.new.body, mutant.new.head)
@@ -298,67 +286,165 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
     return tuple(different.values())
 
 
-def _changes(base: Ontology) -> Iterator[tuple[str, Rule, int, Atom | None]]:
-    """Operator, rule, number of one of its atoms, and another one for its place; None: none."""
-    rules = base.content.enabled_rules
-    classes: dict[str, list[str]] = {}
-    for individual, name in memberships(base.content.triples):
-        classes.setdefault(name, []).append(individual)
-    literals: dict[str, set[Lit]] = {}
-    for atom in (atom for rule in rules for atom in rule.atoms if atom.kind == "data"):
-        known = literals.setdefault(atom.predicate, set())
-        known |= {
-            term for term in atom.arguments if isinstance(term, Lit) and term.datatype not in EXACT
-        }
-    for rule in rules:
-        is_value: dict[Term, bool] = {}
-        for atom in rule.atoms:
-            for place, term in enumerate(atom.arguments):
-                if isinstance(term, Variable):
-                    is_value[term] = is_value.get(term, False) or atom.takes_value(place)
-        for number, atom in enumerate(rule.atoms):
-            in_body = number < len(rule.body)
-            if in_body and len(rule.body) > 1:
-                yield "atom dropped", rule, number, None
-            if in_body and atom.predicate in swrl.COMPARISONS:
-                for operator, sign in _signs(swrl.COMPARISONS[atom.predicate]):
-                    yield operator, rule, number, replace(atom, predicate=swrl.COMPARISON_OF[sign])
-            for place, term in enumerate(atom.arguments):
-                operator = ""
-                others: Sequence[Term] = ()
-                # the next one of the rule that stands for the same kind
-                if isinstance(term, Variable) and in_body:
-                    operator = "variable exchanged"
-                    others = [
-                        _next(term, [each for each in is_value if is_value[each] == is_value[term]])
-                    ]
-                elif isinstance(term, Named):  # the next one of its class
-                    operator = "individual exchanged"
-                    groups = (
-                        each for each in classes.values() if term.iri in each and len(each) > 1
-                    )
-                    others = [Named(_next(term.iri, group)) for group in groups][:1]
-                elif isinstance(term, Lit) and term.datatype in EXACT:
-                    operator, others = "threshold moved", list(_tenths(term))
-                # others that rules mention of the same property
-                elif isinstance(term, Lit) and atom.kind == "data":
-                    operator = "status exchanged" if in_body else "conclusion changed"
-                    known = literals[atom.predicate]
-                    others = [each for each in sorted(known) if each.datatype == term.datatype]
-                    if term.datatype == XSD + "boolean":
-                        others = [
-                            Lit("false" if term.text in ("true", "1") else "true", term.datatype)
-                        ]
-                for other in others:
-                    arguments = (*atom.arguments[:place], other, *atom.arguments[place + 1 :])
-                    yield operator, rule, number, replace(atom, arguments=arguments)
+def _is_usable(new: Rule, old: Rule, base: Ontology) -> bool:
+    """Whether a changed rule says something else, and a reasoner can use it."""
+    is_same = new.head == old.head and set(new.body) == set(old.body)
+    return not is_same and not fatal_problems(new, base.vocabulary)
 
 
-def _signs(sign: str) -> Iterator[tuple[str, str]]:
-    """Other signs for a comparison, by operator; the same sign where there is none."""
-    yield "comparison turned", {"=": "!=", "!=": "="}.get(sign) or swrl.mirrored(sign)
-    if sign not in ("=", "!="):
-        yield "comparison shifted", sign.removesuffix("=") if sign.endswith("=") else f"{sign}="
+class _Offered(NamedTuple):
+    """What can stand in place of something of its kind.
+
+    Attributes:
+        members: the individuals of each class.
+        literals: those that rules mention of each property, but for numbers.
+    """
+
+    members: tuple[list[str], ...]
+    literals: Mapping[str, set[Lit]]
+
+    @classmethod
+    def of(cls, base: Ontology) -> _Offered:
+        """Collect it from ontologies and enabled rules."""
+        members: dict[str, list[str]] = {}
+        for individual, name in memberships(base.content.triples):
+            members.setdefault(name, []).append(individual)
+        literals: dict[str, set[Lit]] = {}
+        for rule in base.content.enabled_rules:
+            for at, term in _terms(rule):
+                if isinstance(term, Lit) and term.datatype not in EXACT:
+                    literals.setdefault(rule.atoms[at.atom].predicate, set()).add(term)
+        return cls(tuple(members.values()), literals)
+
+
+class _At(NamedTuple):
+    """Numbers of an atom of a rule, and of one of its arguments."""
+
+    atom: int
+    argument: int
+
+
+def _terms(rule: Rule) -> Iterator[tuple[_At, Term]]:
+    """The terms of a rule, each with its place."""
+    for number, atom in enumerate(rule.atoms):
+        for place, term in enumerate(atom.arguments):
+            yield _At(number, place), term
+
+
+def _with_atom(rule: Rule, number: int, atom: Atom) -> Rule:
+    """A rule with another atom in the place of one."""
+    atoms = (*rule.atoms[:number], atom, *rule.atoms[number + 1 :])
+    size = len(rule.body)
+    return replace(rule, body=atoms[:size], head=atoms[size:], triples=())
+
+
+def _with_term(rule: Rule, at: _At, term: Term) -> Rule:
+    """A rule with another term in the place of one."""
+    atom = rule.atoms[at.atom]
+    arguments = (*atom.arguments[: at.argument], term, *atom.arguments[at.argument + 1 :])
+    return _with_atom(rule, at.atom, replace(atom, arguments=arguments))
+
+
+def _comparisons(rule: Rule) -> Iterator[tuple[int, Atom, str]]:
+    """The comparisons of a rule: number, atom and sign."""
+    for number, atom in enumerate(rule.body):
+        if atom.predicate in swrl.COMPARISONS:
+            yield number, atom, swrl.COMPARISONS[atom.predicate]
+
+
+def _comparison_turned(rule: Rule, _: _Offered) -> Iterator[Rule]:
+    for number, atom, sign in _comparisons(rule):
+        turned = {"=": "!=", "!=": "="}.get(sign) or swrl.mirrored(sign)
+        yield _with_atom(rule, number, replace(atom, predicate=swrl.COMPARISON_OF[turned]))
+
+
+def _comparison_shifted(rule: Rule, _: _Offered) -> Iterator[Rule]:
+    shifts = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
+    for number, atom, sign in _comparisons(rule):
+        if sign in shifts:
+            yield _with_atom(
+                rule, number, replace(atom, predicate=swrl.COMPARISON_OF[shifts[sign]])
+            )
+
+
+def _atom_dropped(rule: Rule, _: _Offered) -> Iterator[Rule]:
+    if len(rule.body) > 1:
+        for number in range(len(rule.body)):
+            rest = (*rule.body[:number], *rule.body[number + 1 :])
+            yield replace(rule, body=rest, triples=())
+
+
+def _variable_exchanged(rule: Rule, _: _Offered) -> Iterator[Rule]:
+    """By the next one of the rule that stands for the same kind, an individual or a value."""
+    is_value: dict[Term, bool] = {}
+    for at, term in _terms(rule):
+        if isinstance(term, Variable):
+            takes_value = rule.atoms[at.atom].takes_value(at.argument)
+            is_value[term] = is_value.get(term, False) or takes_value
+    for at, term in _terms(rule):
+        if isinstance(term, Variable) and at.atom < len(rule.body):
+            alike = [each for each in is_value if is_value[each] == is_value[term]]
+            yield _with_term(rule, at, _next(term, alike))
+
+
+def _individual_exchanged(rule: Rule, offered: _Offered) -> Iterator[Rule]:
+    """By the next one of the first class that has others."""
+    for at, term in _terms(rule):
+        if isinstance(term, Named):
+            groups = [each for each in offered.members if term.iri in each and len(each) > 1]
+            for group in groups[:1]:
+                yield _with_term(rule, at, Named(_next(term.iri, group)))
+
+
+def _threshold_moved(rule: Rule, _: _Offered) -> Iterator[Rule]:
+    """Up and down by a tenth."""
+    for at, term in _terms(rule):
+        if isinstance(term, Lit) and term.datatype in EXACT:
+            number = Decimal(term.text.strip())
+            for factor in _MOVED:
+                moved = number * factor if number else factor - 1
+                text = format(moved.normalize(), "f")
+                yield _with_term(rule, at, Lit(text, XSD + "decimal"))
+
+
+def _status_exchanged(rule: Rule, offered: _Offered) -> Iterator[Rule]:
+    return _literals_exchanged(rule, offered, range(len(rule.body)))
+
+
+def _conclusion_changed(rule: Rule, offered: _Offered) -> Iterator[Rule]:
+    return _literals_exchanged(rule, offered, range(len(rule.body), len(rule.atoms)))
+
+
+def _literals_exchanged(rule: Rule, offered: _Offered, atoms: range) -> Iterator[Rule]:
+    """Exchange the literals of some atoms by others that rules mention of the same property."""
+    for at, term in _terms(rule):
+        if at.atom not in atoms or rule.atoms[at.atom].kind != "data":
+            continue
+        if isinstance(term, Lit) and term.datatype not in EXACT:
+            known = offered.literals[rule.atoms[at.atom].predicate]
+            for other in _others(term, known):
+                yield _with_term(rule, at, other)
+
+
+def _others(value: Lit, known: Iterable[Lit]) -> list[Lit]:
+    if value.datatype == XSD + "boolean":
+        text = "false" if value.text in ("true", "1") else "true"
+        return [Lit(text, value.datatype)]
+    return [each for each in sorted(known) if each.datatype == value.datatype]
+
+
+#: What each kind of change makes of a rule; None: the rule is removed.
+OPERATORS: Final[Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None]]]] = {
+    "comparison turned": _comparison_turned,
+    "comparison shifted": _comparison_shifted,
+    "atom dropped": _atom_dropped,
+    "variable exchanged": _variable_exchanged,
+    "conclusion changed": _conclusion_changed,
+    "rule removed": lambda rule, offered: [None],
+    "threshold moved": _threshold_moved,
+    "status exchanged": _status_exchanged,
+    "individual exchanged": _individual_exchanged,
+}
 
 
 def _next(one: _T, alike: Sequence[_T]) -> _T:
@@ -366,21 +452,11 @@ def _next(one: _T, alike: Sequence[_T]) -> _T:
     return alike[(alike.index(one) + 1) % len(alike)]
 
 
-def _tenths(value: Lit) -> Iterator[Lit]:
-    """A number moved up and down by a tenth."""
-    number = Decimal(value.text.strip())
-    for factor in _MOVED:
-        moved = number * factor if number else factor - 1
-        yield Lit(format(moved.normalize(), "f"), XSD + "decimal")
-
-
 def sample(mutants: Sequence[Mutant], most: int | None) -> tuple[Mutant, ...]:
     """Take at most so many mutants, spread evenly over rules and operators; the same ones each
     time.
     """
-    if most is None or most >= len(mutants):
-        return tuple(mutants)
-    return tuple(mutants[number * len(mutants) // most] for number in range(most))
+    return tuple(mutants if most is None else spread(mutants, most))
 
 
 def is_horn(base: Ontology) -> bool:
@@ -424,13 +500,13 @@ class _Mutants:
     """
 
     def __init__(self, knowledge: KnowledgeBase, mutants: Sequence[Mutant]) -> None:
-        bodies = dict.fromkeys(body for mutant in mutants for body in mutant.bodies if body)
-        is_sure = is_horn(knowledge.base)
-        holding = (
-            Probes(knowledge.base, knowledge.limit, bodies).holding if is_sure else lambda _: None
-        )
         self.knowledge = knowledge
-        self.unchanged, self._holding = cache(knowledge.outcome), cache(holding)
+        self.unchanged = cache(knowledge.outcome)
+        if is_horn(knowledge.base):
+            bodies = dict.fromkeys(body for mutant in mutants for body in mutant.bodies if body)
+            self._holding = cache(Probes(knowledge.base, knowledge.limit, bodies).holding)
+        else:
+            self._holding = cache(lambda _: None)
 
     def touches(self, mutant: Mutant, situation: Situation) -> bool:
         """Whether a change can make a difference in a situation."""
@@ -479,22 +555,20 @@ def mutate(
         KnowledgeError: the reasoner takes too long.
     """
     results: dict[Mutant, MutantResult] = {}
-    in_order, every = (
-        sorted(tests, key=lambda test: len(test.situations)),
-        _Mutants(knowledge, mutants),
-    )
+    quick_first = sorted(tests, key=lambda test: len(test.situations))
+    every = _Mutants(knowledge, mutants)
     for mutant in mutants:
-        if (killer := every.killer(mutant, in_order)) is not None:
+        if (killer := every.killer(mutant, quick_first)) is not None:
             results[mutant] = MutantResult(mutant, KILLED, killer)
             on_result()
     left = [mutant for mutant in mutants if mutant not in results]
     if not left:
         return list(results.values()), 0
-    of_tests = dict.fromkeys(situation for test in tests for situation in test.situations)
     space = knowledge.space
     for mutant in left:  # which may depend on more than the original does
         space = space.common(PolicySpace.of(mutant.applied(knowledge.base), knowledge.settings))
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
+    of_tests = dict.fromkeys(situation for test in tests for situation in test.situations)
     situations = [*of_tests, *map(Situation, states)]
     few = _Mutants(knowledge, left)  # the policy has many more states than the tests
     for mutant in left:
@@ -505,12 +579,10 @@ def mutate(
             results[mutant] = MutantResult(mutant, EQUIVALENT, reason)
         else:
             situation, before, after = found
-            words = (
-                ", in a state of a test that does not expect it" if situation in of_tests else ""
-            )
-            results[mutant] = MutantResult(
-                mutant, SURVIVED, difference(before, after) + words, situation.state
-            )
+            reason = difference(before, after)
+            if situation in of_tests:
+                reason += ", in a state of a test that does not expect it"
+            results[mutant] = MutantResult(mutant, SURVIVED, reason, situation.state)
         on_result()
     return [results[mutant] for mutant in mutants], len(states)
 
@@ -519,15 +591,17 @@ def mutation_table(results: Sequence[MutantResult]) -> Table:
     """What became of the mutants of each operator."""
     kinds = (KILLED, SURVIVED, EQUIVALENT)
     counts = Counter((each.mutant.operator, each.result) for each in results)
-    killed, survived, equivalent = (sum(each.result == kind for each in results) for kind in kinds)
-    share = killed / (killed + survived) if killed + survived else 1.0
-    title = f"mutation: {killed} of {killed + survived} mutants killed, {share:.0%}; {equivalent} equivalent"
-    operators = dict.fromkeys(each.mutant.operator for each in results)
-    return Table(
-        ("operator", *kinds),
-        [(name, *(str(counts[name, kind]) for kind in kinds)) for name in operators],
-        title,
+    total = Counter(each.result for each in results)
+    noticeable = total[KILLED] + total[SURVIVED]
+    share = total[KILLED] / noticeable if noticeable else 1.0
+    title = (
+        f"mutation: {total[KILLED]} of {noticeable} mutants killed, {share:.0%}; "
+        f"{total[EQUIVALENT]} equivalent"
     )
+    rows = []
+    for operator in dict.fromkeys(each.mutant.operator for each in results):
+        rows.append((operator, *(str(counts[operator, kind]) for kind in kinds)))
+    return Table(("operator", *kinds), rows, title)
 
 
 def mutation_lines(results: Sequence[MutantResult], states: int, max_failed: int) -> Iterator[str]:

@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -25,7 +25,7 @@ from suave_des.errors import (
     ordered,
     relative_path,
 )
-from suave_des.kb.space import PolicySpace
+from suave_des.kb.space import PolicySpace, spread
 from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge import rdf
 from suave_des.knowledge.checks import (
@@ -49,6 +49,8 @@ from suave_des.resources import shipped_folder
 
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
+#: The same times the rules, each of which Pellet reads anew for a state: some seconds in all.
+_MAX_RULES_READ: Final = 5_000
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
 _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.NOTE}
 
@@ -114,7 +116,9 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
         # What is in its cache has been asked with this very knowledge base, without a contradiction
         # or a dropped rule.
         pellet = Reasoner(base, "cached", TimeLimit(subject.time_limit_s, "--time-limit"))
-        for state in [KnowledgeState(), *islice(states_to_ask(base, subject.measured), MAX_STATES)]:
+        most = min(MAX_STATES, _MAX_RULES_READ // max(1, len(base.content.enabled_rules)))
+        every = list(states_to_ask(base, subject.measured))
+        for state in [KnowledgeState(), *spread(every, max(most, 1))]:
             pellet.analyze(state)
         yield from ignored_by_pellet(base)
     except InputError as error:

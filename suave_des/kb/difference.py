@@ -18,7 +18,8 @@ from rdflib.term import Node
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate
 from suave_des.kb.matching import Probes
-from suave_des.kb.space import Decide, PolicySpace, Situation, States, add_decisions, compare
+from suave_des.kb.situations import Decide, Situation, compare
+from suave_des.kb.space import PolicySpace, States, add_decisions
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import (

@@ -482,22 +482,17 @@ class RuleQuestions:
         if not rule.enabled:
             answer = f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
             return WhyNot(rule.name, answer)
-        problems = rule_problems(rule, self.base.vocabulary)
-        never = [
-            f"never fires: {each.message}" + (f"; {each.remedy}" if each.remedy else "")
-            for each in problems
-        ]
+        never = self._why_never(rule)
         if rule not in self._usable.rules:
-            return WhyNot(rule.name, next(iter(never), f"never fires: {self._dropped[rule]}"))
+            return WhyNot(rule.name, never or f"never fires: {self._dropped[rule]}")
         known = self._known(state)
         if isinstance(known, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {known}")
         facts, firing = known
-        fires = rule in firing
-        for answer in never if not fires else ():
-            return WhyNot(rule.name, answer)
+        if rule not in firing and never is not None:
+            return WhyNot(rule.name, never)
         binding, failing = matching.nearest_match(rule, facts, start)
-        if fires and (not failing or not start):
+        if rule in firing and not (failing and start):
             shown_bindings = matching.shown_bindings({} if failing else binding, self.base.names)
             said = ", ".join(self._concluded(atom, dict(binding)) for atom in rule.head)
             words = f"it fires{with_bindings(shown_bindings)}, and concludes {said}"
@@ -505,10 +500,22 @@ class RuleQuestions:
         if not failing:
             words = "it does not fire, though each atom of its body holds"
             return WhyNot(rule.name, words, failing=len(rule.body))
-        # What no state can bring comes first.
-        first = rule.body[
-            min(failing, key=lambda number: (not self._is_fixed(rule.body[number]), number))
-        ]
+        return self._failing(rule, binding, failing, facts)
+
+    def _why_never(self, rule: Rule) -> str | None:
+        """Why a rule fires in no state, by the first problem in its text; None: there is none."""
+        for each in rule_problems(rule, self.base.vocabulary):
+            return f"never fires: {each.message}" + (f"; {each.remedy}" if each.remedy else "")
+        return None
+
+    def _failing(
+        self, rule: Rule, binding: Binding, failing: Sequence[int], facts: Facts
+    ) -> WhyNot:
+        """Tell the first atom that fails of the nearest match of a rule; what no state can bring
+        comes first.
+        """
+        fixed = (number for number in failing if self._is_fixed(rule.body[number]))
+        first = rule.body[next(fixed, failing[0])]
         reason = describe_failure(self._usable, first, binding, facts)
         others = len(failing) - 1
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
@@ -572,15 +579,32 @@ class RuleQuestions:
         try:
             tracer = Tracer(self._usable, state, self._pellet)
             facts = Facts(tracer.known)
-            return facts, frozenset(rules[number] for number in tracer.holding)
+            firing = {rules[number] for number in tracer.holding}
         except ContradictionError:
             raise
         except KnowledgeError:
-            # Where rules ask what is different Pellet can fail on what it is asked besides: what
-            # matches tells.
-            pellet = matching.tracing_pellet(self._usable)
-            facts = Facts(Tracer(self._usable, state, pellet).known)
-            return facts, frozenset(rule for rule in rules if matching.matches(rule, facts))
+            # Where rules ask what is different Pellet can fail on what it is asked besides.
+            facts = Facts(self._followed(rules, state))
+            firing = {rule for rule in rules if matching.matches(rule, facts)}
+        if any(atom.predicate in IDENTITIES for rule in rules for atom in rule.body):
+            firing |= {rule for rule in rules if rule not in firing and self._adds(rule, state)}
+        return facts, frozenset(firing)
+
+    def _followed(self, rules: Iterable[Rule], state: KnowledgeState) -> tuple[Triple, ...]:
+        """All that follows in a state with some of the rules."""
+        base = self._usable.with_rules(rules)
+        return Tracer(base, state, matching.tracing_pellet(base)).known
+
+    def _adds(self, rule: Rule, state: KnowledgeState) -> bool:
+        """Whether something that a rule concludes follows with it alone.
+
+        It may fire with no match that is known: where an individual differs from one of two, but
+        from which does not follow.
+        """
+        rules = self._usable.content.enabled_rules
+        fewer = self._followed((each for each in rules if each is not rule), state)
+        more = set(self._followed(rules, state)).difference(fewer)
+        return any(matching.matched(atom, each, {}) for atom in rule.head for each in more)
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
         fact = matching.stated(atom, binding)
@@ -616,31 +640,33 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
     if atom.kind == "same":
         return "these individuals are not known to be the same"
     if atom.kind in FACT_KINDS:
-        subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
-        who, name = (
-            base.names.short(subject) if isinstance(subject, str) else "",
-            local_name(atom.predicate),
-        )
-        given = _GIVEN_BY_STATES.get(atom.predicate, "")
-        if atom.kind == "class":
-            return (
-                f"{who} is not known to be a {name}{given}" if who else f"there is no {name}{given}"
-            )
-        values = facts.values(subject, atom.predicate)
-        if not values:
-            return f"{f'{who} has no' if who else 'nothing has a'} {name}{given}"
-        if wanted is not None:
-            of = f" of {who}" if who else ""
-            return f"found {name} {_list(base, values)}{of}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
-        if who:
-            return f"{who} has {name} {_list(base, values)}, but not as the other atoms need it"
-        return f"no {name} connects what the other atoms need"
+        return _missing(base, atom, binding, facts)
     if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
         return _compared(base, atom, binding)
-    texts = [
-        f"?{name} = {_show(base, binding[name])}" for name in atom.variables() if name in binding
-    ]
+    values = {name: binding[name] for name in atom.variables() if name in binding}
+    texts = [f"?{name} = {_show(base, value)}" for name, value in values.items()]
     return f"it is false for {', '.join(texts) or 'these values'}"
+
+
+def _missing(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
+    """Describe which fact is missing, and what is known in its place."""
+    subject = bound(atom.arguments[0], binding)
+    wanted = bound(atom.arguments[-1], binding)
+    who = base.names.short(subject) if isinstance(subject, str) else ""
+    name = local_name(atom.predicate)
+    given = _GIVEN_BY_STATES.get(atom.predicate, "")
+    if atom.kind == "class":
+        return f"{who} is not known to be a {name}{given}" if who else f"there is no {name}{given}"
+    values = facts.values(subject, atom.predicate)
+    if not values:
+        return f"{who} has no {name}{given}" if who else f"nothing has a {name}{given}"
+    if wanted is not None:
+        of = f" of {who}" if who else ""
+        needed = f"needed {_show(base, wanted)}{_unequal(values, wanted)}"
+        return f"found {name} {_list(base, values)}{of}, {needed}"
+    if who:
+        return f"{who} has {name} {_list(base, values)}, but not as the other atoms need it"
+    return f"no {name} connects what the other atoms need"
 
 
 def _compared(base: Ontology, atom: Atom, binding: Binding) -> str:

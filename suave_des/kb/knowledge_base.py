@@ -20,7 +20,8 @@ from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.explain import Explainer, Explanation
 from suave_des.kb.matching import tracing_pellet
 from suave_des.kb.policy import Policy, make_policy
-from suave_des.kb.space import OnCount, Outcome, PolicySpace, Situation, States, decide_all
+from suave_des.kb.situations import OnCount, Outcome, Situation
+from suave_des.kb.space import PolicySpace, States, decide_all
 from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit, reasoning_on
@@ -184,6 +185,7 @@ class KnowledgeBase:
         except ContradictionError as error:
             return Outcome(None, error.problem.removeprefix("contradiction: "))
 
+    @plain_arguments
     def state(
         self,
         file: str | Path | None = None,
@@ -254,6 +256,7 @@ class KnowledgeBase:
         facts = (fact_of((one, name, other), self.base.names) for one, other, name in pairs)
         return tuple(sorted(facts, key=str))
 
+    @plain_arguments
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Explain why a fact or a decision follows in a state.
 
@@ -322,6 +325,7 @@ class KnowledgeBase:
         )
         return compare_decisions(states, before, after, tuple(no_proof))
 
+    @plain_arguments
     def query(
         self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False
     ) -> QueryResult:
@@ -388,12 +392,11 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
             columns = list(map(str, result.vars or ()))
             if "*" in text.partition("{")[0]:  # all variables, which rdflib returns in any order
                 columns.sort()
-            rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
-            ordered = "OrderBy" in str(query.algebra)
-            return QueryResult(
-                tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)), unknown
-            )
-        triples = [tuple(_text(graph, term) for term in triple) for triple in result.graph or ()]
+            rows = [_texts(graph, (row[name] for name in columns)) for row in result]  # type: ignore
+            if "OrderBy" not in str(query.algebra):
+                rows.sort(key=_sortable)
+            return QueryResult(tuple(columns), tuple(rows), unknown)
+        triples = [_texts(graph, triple) for triple in result.graph or ()]
         return QueryResult(
             ("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)), unknown
         )
@@ -415,6 +418,10 @@ def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:
 
 def _sortable(row: tuple[str | None, ...]) -> tuple[str, ...]:
     return tuple(cell or "" for cell in row)
+
+
+def _texts(graph: rdflib.Graph, terms: Iterable[object]) -> tuple[str | None, ...]:
+    return tuple(_text(graph, term) for term in terms)
 
 
 def _text(graph: rdflib.Graph, term: object) -> str | None:

@@ -13,7 +13,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
-from suave_des.kb.space import Situation
+from suave_des.kb.situations import Situation
 from suave_des.knowledge.ontology import Content, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet, entailed

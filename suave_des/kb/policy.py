@@ -6,22 +6,13 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.errors import number_of
-from suave_des.kb.space import (
-    INCONSISTENT,
-    Decide,
-    Outcome,
-    PolicySpace,
-    Reports,
-    Situation,
-    States,
-    add_decisions,
-    measured_attributes,
-)
+from suave_des.kb.situations import INCONSISTENT, Decide, Outcome, Situation
+from suave_des.kb.space import PolicySpace, Reports, States, add_decisions, measured_attributes
 from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import regions_of
@@ -132,7 +123,8 @@ def make_policy(
         for state, outcome in zip(every, outcomes, strict=True)
     ]
     words = {reports: _in_words(reports, states.space) for reports in states.reports}
-    cases["state"], cases["reports"] = every, [words[state.components] for state in every]
+    cases["state"] = every
+    cases["reports"] = [words[state.components] for state in every]
     cases["flipping"] = flipping
     ineffective = (
         name for name in measured_attributes(base, settings) if name not in states.space.attributes
@@ -164,38 +156,39 @@ def _flipping(
     after: dict[_Task, _Task] = {}
     for state, outcome in zip(states, outcomes, strict=True):
         asked = tuple(each.function for each in state.objectives)
-        chosen = {
-            function: design for function, design in outcome.changes.items() if design != NONE_LEFT
-        }
-        after[asked, state.groundings] = (
-            asked,
-            tuple(sorted({**dict(state.groundings), **chosen}.items())),
-        )
+        designs = dict(state.groundings)
+        for function, design in outcome.changes.items():
+            if design != NONE_LEFT:
+                designs[function] = design
+        after[asked, state.groundings] = asked, tuple(sorted(designs.items()))
     for start in after:
-        way = [start]
-        while (following := after[way[-1]]) in after and following not in way:
-            way.append(following)
-        designs = [dict(groundings) for _, groundings in way] if following == start else []
-        yield tuple(name for name in start[0] if len({each.get(name) for each in designs}) > 1)
+        ways = [dict(groundings) for _, groundings in _round_trip(after, start)]
+        yield tuple(name for name in start[0] if len({each.get(name) for each in ways}) > 1)
+
+
+def _round_trip(after: dict[_Task, _Task], start: _Task) -> list[_Task]:
+    """The tasks that follow one another from one until it comes again; none where it does not."""
+    way = [start]
+    while (following := after[way[-1]]) in after and following not in way:
+        way.append(following)
+    return way if following == start else []
 
 
 def _in_words(reports: Reports, space: PolicySpace) -> str:
     """What components report: counted where they are interchangeable, else named."""
-    counted: Counter[tuple[str, str]] = Counter()
+    counted: Counter[str] = Counter()
+    named = set[str]()
     for component, status in reports:
         kind = next(each for each in space.alike if component in each)
-        label = (
-            component
-            if len(kind) == 1
-            else ""
-            if len(space.alike) == 1
-            else f" of {kind[0]} and alike"
-        )
-        counted[label, status] += 1
-    parts = (
-        f"{label} {status}" if label and not label.startswith(" ") else f"{number} {status}{label}"
-        for (label, status), number in counted.items()
-    )
+        if len(kind) == 1:
+            words = f"{component} {status}"
+            named.add(words)
+        elif len(space.alike) == 1:
+            words = status
+        else:
+            words = f"{status} of {kind[0]} and alike"
+        counted[words] += 1
+    parts = (words if words in named else f"{number} {words}" for words, number in counted.items())
     return " + ".join(parts) or "no report"
 
 
@@ -210,7 +203,55 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
 
     The last measured attribute goes across, all else down.
     """
-    own, groundings = f"{function}_now", [f"{name}_now" for name in policy.functions]
+    own = f"{function}_now"
+    cases, kept = _needed(policy, function)
+    attributes = [name for name in policy.space.attributes if name in kept]
+    down = [name for name in kept if name not in attributes]
+    others = [name for name in down if name not in (own, "reports")]
+    found = _outcomes(cases, kept, len(down))
+    ranges = [_ranges(number, policy, found.values()) for number in range(len(attributes))]
+    headings = ["now", *(name.removesuffix("_now") for name in others)]
+    if "reports" in kept:
+        headings.append("components")
+    headings += attributes[:-1]
+    rows = []
+    for (before, places, cells), reports in _merged(found, down, [own, *others], ranges).items():
+        reported = [", ".join(reports)] if "reports" in kept else []
+        rows.append([*before, *reported, *places, *cells])
+    outcomes = [words for _, words in ranges[-1]] if ranges else ["then"]
+    what = f", by measured {', '.join(attributes)}" if attributes else ""
+    table = Table(
+        [*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes))
+    )
+    return table, len(headings), attributes[-1] if attributes else ""
+
+
+def _merged(
+    found: Mapping[tuple[str, ...], _Row],
+    down: Sequence[str],
+    designs: Sequence[str],
+    ranges: Sequence[Sequence[tuple[int, str]]],
+) -> dict[Any, list[str]]:
+    """What components report in each different row: designs, words for places, and outcomes."""
+    *over, across = ranges or [[]]
+    merged: dict[Any, list[str]] = {}
+    for names, row in found.items():
+        known = dict(zip(down, names, strict=True))
+        before = tuple(known[name] for name in designs)
+        for at in itertools.product(*over):
+            places = [first for first, _ in at]
+            cells = [row[*places, last] for last, _ in across] or [row[()]]
+            label = before, tuple(words for _, words in at), tuple(cells)
+            merged.setdefault(label, []).append(known.get("reports", ""))
+    return merged
+
+
+def _needed(policy: Policy, function: str) -> tuple[Any, list[str]]:
+    """The cases in which a function has an objective, with their outcome, and the dimensions on
+    which that depends.
+    """
+    own = f"{function}_now"
+    groundings = [f"{name}_now" for name in policy.functions]
     cases: Any = policy.cases[policy.cases[own] != ""].copy()
     flips = [f" ({FLIP_FLOP})" if function in flipping else "" for flipping in cases["flipping"]]
     cases["outcome"] = cases[f"{function}_then"] + flips
@@ -220,54 +261,34 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
         fewer = [each for each in kept if each != dimension]
         outcomes = cases[[*fewer, "outcome"]].drop_duplicates()
         if dimension != own and not outcomes.duplicated(fewer).any():
-            kept, cases = fewer, outcomes
-    attributes = [name for name in policy.space.attributes if name in kept]
-    down = [name for name in kept if name not in attributes]
-    found: dict[tuple[str, ...], dict[tuple[int, ...], str]] = {}
+            kept = fewer
+            cases = outcomes
+    return cases, kept
+
+
+#: An outcome for each place of the measured attributes.
+_Row = dict[tuple[int, ...], str]
+
+
+def _outcomes(cases: Any, kept: list[str], down: int) -> dict[tuple[str, ...], _Row]:
+    """What happens by the dimensions that go down, and below them by the places of measured values."""
+    found: dict[tuple[str, ...], _Row] = {}
     for at, outcomes in cases.groupby(kept, sort=False)["outcome"]:
-        one = list(dict.fromkeys(outcomes))
-        text = one[0] if len(one) == 1 else f"{' or '.join(one)}, by the order of the values"
-        found.setdefault(at[: len(down)], {})[at[len(down) :]] = text
-    spans = {
-        name: _spans(number, len(policy.space.scale), found.values())
-        for number, name in enumerate(attributes)
-    }
-    ranges = [
-        [(first, policy.space.scale.text(first, last)) for first, last in each]
-        for each in spans.values()
-    ]
-    *over, across = ranges or [[]]
-    others = [name for name in groundings if name in kept and name != own]
-    merged: dict[Any, list[str]] = {}  # what components report, of each different row
-    for names, row in found.items():
-        known = dict(zip(down, names, strict=True))
-        for at in itertools.product(*over):
-            cells = tuple(row[(*(first for first, _ in at), last)] for last, _ in across) or (
-                row[()],
-            )
-            label = (
-                tuple(map(known.__getitem__, [own, *others])),
-                tuple(words for _, words in at),
-                cells,
-            )
-            merged.setdefault(label, []).append(known.get("reports", ""))
-    reported = ["components"] * ("reports" in kept)
-    headings = ["now", *(name.removesuffix("_now") for name in others), *reported, *attributes[:-1]]
-    rows = [
-        [*before, *[", ".join(reports)] * len(reported), *places, *cells]
-        for (before, places, cells), reports in merged.items()
-    ]
-    what = f", by measured {', '.join(attributes)}" if attributes else ""
-    outcomes = [words for _, words in across] or ["then"]
-    table = Table(
-        [*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes))
-    )
-    return table, len(headings), attributes[-1] if attributes else ""
+        different = list(dict.fromkeys(outcomes))
+        text = different[0]
+        if len(different) > 1:
+            text = f"{' or '.join(different)}, by the order of the values"
+        found.setdefault(at[:down], {})[at[down:]] = text
+    return found
 
 
-def _spans(
-    number: int, places: int, rows: Iterable[dict[tuple[int, ...], str]]
-) -> list[tuple[int, int]]:
+def _ranges(number: int, policy: Policy, rows: Iterable[_Row]) -> list[tuple[int, str]]:
+    """The first place of each range of an attribute in which all outcomes are equal, with words."""
+    scale = policy.space.scale
+    return [(first, scale.text(first, last)) for first, last in _spans(number, len(scale), rows)]
+
+
+def _spans(number: int, places: int, rows: Iterable[_Row]) -> list[tuple[int, int]]:
     """First and last place of each range of an attribute, given by its number, in which all
     outcomes are equal.
     """

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from suave_des.errors import InputError
 from suave_des.kb.policy import FLIP_FLOP, Policy, function_table
-from suave_des.kb.space import INCONSISTENT
+from suave_des.kb.situations import INCONSISTENT
 from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, STAYS
 from suave_des.results.figures import check_picture, write_picture
 from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publication

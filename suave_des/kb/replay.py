@@ -13,7 +13,7 @@ from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.explain import Tracer
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import tracing_pellet, with_bindings
-from suave_des.kb.space import Situation, differing_decisions
+from suave_des.kb.situations import Situation, differing_decisions
 from suave_des.kb.states import ManagingSettings, read_rules, recorded_missions
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.state import NONE_LEFT, STAYS, KnowledgeState

@@ -142,10 +142,20 @@ def _spans_of(file: OntologyFile, name: str, *, with_parts: bool = False) -> lis
     found = [element for element in elements if _is_rule(element) and _name(element) == name]
     if len(found) != names.count(name):
         raise _cannot(file.path)
-    for element in found if with_parts else ():  # which grows on the way
+    return [spans[element] for element in (_with_parts(found, elements) if with_parts else found)]
+
+
+def _with_parts(
+    found: Sequence[etree._Element], elements: Sequence[etree._Element]
+) -> list[etree._Element]:
+    """Elements, and those elsewhere in the file that hold their lists and atoms."""
+    all_found = list(found)
+    for element in all_found:  # which grows on the way
         nodes = {each.get(_NODE_ID) for each in element.iter() if _NODE_ID in each.attrib}
-        found += [each for each in elements if each.get(_NODE_ID) in nodes and each not in found]
-    return [spans[element] for element in found]
+        for each in elements:
+            if each.get(_NODE_ID) in nodes and each not in all_found:
+                all_found.append(each)
+    return all_found
 
 
 def _spans(content: bytes) -> list[_Span]:

@@ -20,11 +20,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.space import Decide, Outcome, Region, Situation, measurements_in, parse_region
+from suave_des.kb.scale import Region, measurements_in, parse_region
+from suave_des.kb.situations import Decide, Outcome, Situation
 from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_state, state_dict
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
-from suave_des.knowledge.rdf import Triple
+from suave_des.knowledge.rdf import Triple, fact_of
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
 from suave_des.records.mission_folder import RecordedMission
@@ -281,12 +282,15 @@ def _unmet(
         return
     if test.contradicts:
         yield "the situation does not contradict itself", None
-    yield from (
-        (f"{fact} does not follow", fact) for fact in test.follows if fact not in outcome.known
-    )
-    yield from ((f"{fact} follows", fact) for fact in test.follows_not if fact in outcome.known)
+    for fact in test.follows:
+        if fact not in outcome.known:
+            yield f"{fact} does not follow", fact
+    for fact in test.follows_not:
+        if fact in outcome.known:
+            yield f"{fact} follows", fact
     for function, wanted in test.decides.items():
-        chosen, present = outcome.choice(function), situation.state.grounded(function)
+        present = situation.state.grounded(function)
+        chosen = outcome.choice(function)
         if chosen != wanted and not (chosen == STAYS and wanted == present):
             happens = f"{present} stays" if chosen == STAYS and present else chosen
             yield f"{function}: {happens}, not {wanted}", function
@@ -301,23 +305,32 @@ def _because(
         if situation.facts:
             knowledge = knowledge.changed(knowledge.base.with_facts(situation.facts))
         if isinstance(about, Fact) and about in test.follows:
-            answers = RuleQuestions(knowledge.base).missing(test.follows[about], state)
-            near = min((answer.failing for answer in answers if answer.failing), default=0)
-            yield from (str(answer) for answer in answers if answer.failing in (0, near))
-            if not answers:
-                yield f"no rule concludes {about}"
+            yield from _why_missing(knowledge, test.follows[about], state)
         elif isinstance(about, Fact):
             yield from knowledge.explain(state, str(about)).lines()
         elif about is not None:
-            reasoning = knowledge.infer(state)
-            decisions = [each for each in reasoning.plan.decisions if each.function == about]
-            yield from (
-                str(each) for one in decisions for each in verdicts(knowledge.base, reasoning, one)
-            )
-            if not decisions:
-                yield f"the objective of {about} requires no adaptation"
+            yield from _why_decided(knowledge, about, state)
     except InputError as error:
         yield str(error)
+
+
+def _why_missing(knowledge: KnowledgeBase, triple: Triple, state: KnowledgeState) -> Iterator[str]:
+    """Why the rules that come nearest do not conclude a fact."""
+    answers = RuleQuestions(knowledge.base).missing(triple, state)
+    near = min((answer.failing for answer in answers if answer.failing), default=0)
+    yield from (str(answer) for answer in answers if answer.failing in (0, near))
+    if not answers:
+        yield f"no rule concludes {fact_of(triple, knowledge.base.names)}"
+
+
+def _why_decided(knowledge: KnowledgeBase, function: str, state: KnowledgeState) -> Iterator[str]:
+    """What the planner made of each design of a function."""
+    reasoning = knowledge.infer(state)
+    decisions = [each for each in reasoning.plan.decisions if each.function == function]
+    for decision in decisions:
+        yield from map(str, verdicts(knowledge.base, reasoning, decision))
+    if not decisions:
+        yield f"the objective of {function} requires no adaptation"
 
 
 def junit_xml(results: Sequence[TestResult]) -> bytes:

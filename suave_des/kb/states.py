@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -101,39 +100,37 @@ class FactReader:
         if OWL + atom.predicate in IDENTITIES and len(atom.arguments) == 2:
             one, other = map(self._individual, atom.arguments)
             return one, OWL + atom.predicate, other
-        kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
-        iris = (
-            (atom.predicate,)
-            if ":" in atom.predicate
-            else self.base.vocabulary.candidates(atom.predicate)
-        )
-        declared = (
-            (iri, kind)
-            for iri in iris
-            for kind in kinds
-            if kind in self.base.vocabulary.kinds.get(iri, ())
-        )
-        concluded = (
-            (head.predicate, _KINDS[head.kind])
-            for rule in self.base.content.enabled_rules
-            for head in rule.head
-            if atom.predicate in (head.predicate, local_name(head.predicate))
-            and _KINDS.get(head.kind) in kinds
-        )
-        predicate, kind = next(chain(declared, concluded), ("", ""))
-        if not predicate:
-            problem = f"there is no {kinds[0].split()[-1]} {shown(local_name(atom.predicate))}"
-            raise InputError(problem, remedy=self.base.vocabulary.guess(atom.predicate, kinds))
-        subject, value = self._individual(atom.arguments[0]), atom.arguments[-1]
+        predicate, kind = self._predicate(atom)
+        subject = self._individual(atom.arguments[0])
+        value = atom.arguments[-1]
         if kind == "class":
             return subject, RDF_TYPE, predicate
         if kind == "object property":
             return subject, predicate, self._individual(value)
-        if isinstance(value, Lit):
-            is_decimal = XSD + "decimal" in self.base.vocabulary.ranges.get(predicate, ())
-            whole = value.datatype == XSD + "integer" and is_decimal
-            return subject, predicate, value._replace(datatype=XSD + "decimal") if whole else value
-        return subject, predicate, Lit(value[0], XSD + "string")
+        if not isinstance(value, Lit):
+            return subject, predicate, Lit(value[0], XSD + "string")
+        is_decimal = XSD + "decimal" in self.base.vocabulary.ranges.get(predicate, ())
+        if value.datatype == XSD + "integer" and is_decimal:
+            value = value._replace(datatype=XSD + "decimal")
+        return subject, predicate, value
+
+    def _predicate(self, atom: Atom) -> tuple[str, str]:
+        """The IRI and the kind of the class or property of a fact: declared, or concluded by a
+        rule.
+        """
+        vocabulary = self.base.vocabulary
+        name = atom.predicate
+        kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
+        for iri in (name,) if ":" in name else vocabulary.candidates(name):
+            for kind in kinds:
+                if kind in vocabulary.kinds.get(iri, ()):
+                    return iri, kind
+        for head in (head for rule in self.base.content.enabled_rules for head in rule.head):
+            kind = _KINDS.get(head.kind, "")
+            if kind in kinds and name in (head.predicate, local_name(head.predicate)):
+                return head.predicate, kind
+        problem = f"there is no {kinds[0].split()[-1]} {shown(local_name(name))}"
+        raise InputError(problem, remedy=vocabulary.guess(name, kinds))
 
     def fact(self, text: str) -> Fact:
         """Read one fact, in the form in which inferences have it.
@@ -306,9 +303,14 @@ class StateBuilder:
                 raise InputError(
                     f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8"
                 )
-            KnowledgeState.of(measurements={name: value})  # raises if it is not a number
         elif isinstance(value, bool):  # YAML reads a bare FALSE as one
             value = str(value).upper()
+        # Both raise an error if the value is no number, or no text.
+        if kind == "objectives":
+            KnowledgeState.of([ObjectiveState(name, value)])
+        else:
+            part: dict[str, Any] = {kind: {name: value}}
+            KnowledgeState.of(**part)
         if isinstance(value, str) and kind in _STATUSES:
             self._check_status(_STATUSES[kind], value)
         if kind == "groundings" and value not in self.base.designs(name):

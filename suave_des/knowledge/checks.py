@@ -15,7 +15,7 @@ from decimal import Decimal
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
@@ -112,56 +112,50 @@ class Material:
         rule that can fire concludes it. Individuals and values are not distinguished. So every rule
         that is returned is dead, but not every dead rule is returned.
         """
-        content, model = self.content, self.base.model
-        leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
-        both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
-        related = [(one, name, str(other)) for one, name, other in content.triples]
-        steps = [(one, other) for one, name, other in related if name in (*leads, *both_ways)]
-        steps += [
-            (other, one)
-            for one, name, other in related
-            if name in (*both_ways, rdf.RDFS + "subPropertyOf")
-        ]
-        held = {rdf.OWL + "Thing"}
-        held |= rdf.terms(
-            rdf.TOMASYS,
-            "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status",
-        )
-        held |= {
-            *(name for _, name in rdf.memberships(content.triples)),
-            *(name for _, name, _ in content.triples),
-        }
-        held |= (
-            {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE} if model.attributes else set()
-        )
-        held |= {rdf.HAS_QA_VALUE} if any(model.estimated.values()) else set()
+        content = self.content
+        held = self._held_without_rules()
+        steps = _schema_steps(content.triples)
+        possible = rdf.reached(held, steps)
         structure = "".join(content.structure)
-        waiting, possible = list(content.enabled_rules), rdf.reached(held, steps)
 
         def allows(atom: Atom) -> bool:
             is_named = atom.kind in ("class", "object", "data") and not atom.expression
             # Class expressions and property chains are not followed.
             return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
 
+        waiting = list(content.enabled_rules)
         while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
+            waiting = [rule for rule in waiting if not all(map(allows, rule.body))]
             held.update(atom.predicate for rule in firing for atom in rule.head)
             possible = rdf.reached(held, steps)
-            waiting = [rule for rule in waiting if rule not in firing]
         return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
+
+    def _held_without_rules(self) -> set[str]:
+        """The classes and properties of what the ontologies or a state may assert."""
+        model = self.base.model
+        held = {rdf.OWL + "Thing"} | rdf.terms(
+            rdf.TOMASYS,
+            "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status",
+        )
+        held.update(name for _, name in rdf.memberships(self.content.triples))
+        held.update(name for _, name, _ in self.content.triples)
+        if model.attributes:
+            held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE}
+        if any(model.estimated.values()):
+            held.add(rdf.HAS_QA_VALUE)
+        return held
 
     @cached_property
     def for_other_models(self) -> list[Rule]:
         """The rules of TOMASys and mros, which have rules for any model, that need what this model
         does not have.
         """
-        known, rules = (
-            self.base.vocabulary.kinds,
-            [rule for rule, _ in self.dead if self.is_of_metamodel(rule)],
-        )
+        known = self.base.vocabulary.kinds
         return [
             rule
-            for rule in rules
-            if all(each.kind == "builtin" or each.predicate in known for each in rule.atoms)
+            for rule, _ in self.dead
+            if self.is_of_metamodel(rule)
+            and all(each.kind == "builtin" or each.predicate in known for each in rule.atoms)
         ]
 
     def is_of_metamodel(self, rule: Rule) -> bool:
@@ -189,6 +183,19 @@ class Material:
         return about_rule(rule, message, place, remedy, level)
 
 
+def _schema_steps(triples: Iterable[rdf.Triple]) -> list[tuple[str, str]]:
+    """Each class or property with those to which its members or values lead."""
+    leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
+    both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
+    steps = []
+    for one, name, other in triples:
+        if name in leads or name in both_ways:
+            steps.append((one, str(other)))
+        if name in both_ways or name == rdf.RDFS + "subPropertyOf":
+            steps.append((str(other), one))
+    return steps
+
+
 def static_findings(subject: Subject, sources: Sources) -> list[Finding]:
     """Find what needs no reasoner, which takes some 10 ms, in files that may have errors.
 
@@ -203,7 +210,8 @@ def static_findings(subject: Subject, sources: Sources) -> list[Finding]:
         base = Ontology.merged(sources, subject.values, subject.operators)
     except KnowledgeError as error:
         return [Finding.of(error)]
-    findings, groups = list[Finding](), []
+    findings = list[Finding]()
+    groups = []
     for file in files:
         findings += map(Finding.of, file.errors)
         if not file.parsed and not file.errors:
@@ -265,58 +273,80 @@ def undefined_names(material: Material) -> Iterator[Finding]:
     Only those of the ontologies' own namespaces: names of other vocabularies may be defined
     elsewhere.
     """
-    model, kinds, triples = (
-        material.base.model,
-        material.base.vocabulary.kinds,
-        material.content.triples,
-    )
-    described = {subject for subject, _, _ in triples} | model.in_states
-    namespaces = {rdf.namespace(iri) for iri in described}
-    assumed = {(model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed}
-    for subject, predicate, value in triples:
-        used: tuple[str, str, Collection[str]] | None = (
-            None  # words, what is used, what it should be
+    names = _Described(material)
+    for triple in material.content.triples:
+        used = names.undefined_in(triple)
+        if used is None or rdf.namespace(used.iri) not in names.namespaces:
+            continue
+        subject, predicate, _ = triple
+        problem = f"{local_name(subject)}: {used.words} {local_name(used.iri)} is not defined"
+        remedy = names.nearest(used, subject)
+        if remedy is None and predicate == rdf.IS_QA_TYPE and used.kinds == ("individual",):
+            remedy = "declare a QualityAttributeType of this name"
+        yield material.about(
+            Level.ERROR, local_name(subject), problem, remedy or "declare it, or correct the name"
         )
-        is_term = isinstance(value, str) and not value.startswith(rdf.LANGUAGE_NAMESPACES)
+
+
+class _Used(NamedTuple):
+    """A name that is used: in words what for, its IRI, and the kinds of names that it may be."""
+
+    words: str
+    iri: str
+    kinds: tuple[str, ...]
+
+
+class _Described:
+    """The names that the ontologies describe."""
+
+    def __init__(self, material: Material) -> None:
+        model = material.base.model
+        self._in_states = model.in_states
+        self._kinds = material.base.vocabulary.kinds
+        self._described = {subject for subject, _, _ in material.content.triples} | self._in_states
+        self._assumed = {
+            (model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed
+        }
+        self.namespaces = {rdf.namespace(iri) for iri in self._described}
+
+    def undefined_in(self, triple: rdf.Triple) -> _Used | None:
+        """The name in a triple that is not defined, its property before its value; None: none."""
+        subject, predicate, value = triple
         if predicate == rdf.RDF_TYPE or predicate in _ABOUT_CLASSES:
-            wanted = ("class", "datatype") if predicate == rdf.RDFS + "range" else ("class",)
-            if is_term and kinds.get(str(value), frozenset()).isdisjoint(wanted):
-                used = (
-                    "class" if predicate == rdf.RDF_TYPE else local_name(predicate),
-                    str(value),
-                    ("class",),
-                )
-        elif (
-            not predicate.startswith(rdf.LANGUAGE_NAMESPACES)
-            and (subject, predicate) not in assumed
-        ):
-            if predicate not in described:
-                used = "property", predicate, _PROPERTIES
-            elif (
-                is_term and value not in described and "object property" in kinds.get(predicate, ())
-            ):
-                used = local_name(predicate), str(value), ("individual",)
-        if used is not None and rdf.namespace(used[1]) in namespaces:
-            words, name, meant = used
-            known = [
-                iri
-                for iri in described - model.in_states - {subject}
-                if kinds.get(iri, frozenset()) & {*meant}
-            ]
-            same = sorted(iri for iri in known if local_name(iri) == local_name(name))
-            remedy = (
-                f"did you mean {' or '.join(same)}?"
-                if same
-                else nearest(local_name(name), map(local_name, known))
-            )
-            problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
-            is_attribute = predicate == rdf.IS_QA_TYPE and meant == ("individual",)
-            declare = (
-                "a QualityAttributeType of this name" if is_attribute else "it, or correct the name"
-            )
-            yield material.about(
-                Level.ERROR, local_name(subject), problem, remedy or f"declare {declare}"
-            )
+            return self._undefined_class(predicate, value)
+        if predicate.startswith(rdf.LANGUAGE_NAMESPACES) or (subject, predicate) in self._assumed:
+            return None
+        if predicate not in self._described:
+            return _Used("property", predicate, _PROPERTIES)
+        if value in self._described or "object property" not in self._kinds.get(predicate, ()):
+            return None
+        if _is_of_language(value):
+            return None
+        return _Used(local_name(predicate), str(value), ("individual",))
+
+    def _undefined_class(self, predicate: str, value: str | Lit) -> _Used | None:
+        wanted = {"class", "datatype"} if predicate == rdf.RDFS + "range" else {"class"}
+        if _is_of_language(value) or wanted & self._kinds.get(str(value), frozenset()):
+            return None
+        words = "class" if predicate == rdf.RDF_TYPE else local_name(predicate)
+        return _Used(words, str(value), ("class",))
+
+    def nearest(self, used: _Used, subject: str) -> str | None:
+        """Ask whether another name was meant: of the same last part, else the most similar one."""
+        known = [
+            iri
+            for iri in self._described - self._in_states - {subject}
+            if not self._kinds.get(iri, frozenset()).isdisjoint(used.kinds)
+        ]
+        same = sorted(iri for iri in known if local_name(iri) == local_name(used.iri))
+        if same:
+            return f"did you mean {' or '.join(same)}?"
+        return nearest(local_name(used.iri), map(local_name, known))
+
+
+def _is_of_language(value: str | Lit) -> bool:
+    """Whether a value is a literal, or a term of OWL, RDF, SWRL or the like."""
+    return isinstance(value, Lit) or value.startswith(rdf.LANGUAGE_NAMESPACES)
 
 
 def functions_without_design(material: Material) -> Iterator[Finding]:
@@ -354,28 +384,33 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
     """Find quality attributes that missions measure and ontologies lack, or compare with
     nothing.
     """
-    model, measured = material.base.model, material.subject.measured
-    for name in sorted({*(measured or ())} - model.attributes.keys()):
+    model = material.base.model
+    measured = material.subject.measured or ()
+    for name in sorted({*measured} - model.attributes.keys()):
         problem = (
             f"missions measure {name}, but no ontology has a quality attribute type of this name"
         )
         remedy = nearest(name, model.attributes) or "declare a QualityAttributeType of this name"
         yield material.about(Level.WARN, name, problem, remedy)
-    for name in (
-        () if rules_of_2023(material.base) else without_operator(material.base, measured or ())
-    ):
-        designs = ", ".join(
-            sorted(design for design, names in model.estimated.items() if name in names)
-        )
-        problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
-        yield material.about(
-            Level.WARN, name, problem, f"give it one of {' '.join(OPERATORS)}, usually <"
-        )
-    valued = {
-        subject for subject, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE
-    }
-    for name, iri in model.measurements.items():
-        if measured is not None and iri in valued and name not in measured:
+    if not rules_of_2023(material.base):
+        for name in without_operator(material.base, measured):
+            expecting = (design for design, names in model.estimated.items() if name in names)
+            problem = (
+                f"{name} has no qa_comparison_operator, so what is measured never rules out a "
+                f"design: {', '.join(sorted(expecting))}"
+            )
+            remedy = f"give it one of {' '.join(OPERATORS)}, usually <"
+            yield material.about(Level.WARN, name, problem, remedy)
+
+
+def values_that_are_not_used(material: Material) -> Iterator[Finding]:
+    """Find values that ontologies give of measurements, in whose place missions have others."""
+    measured = material.subject.measured
+    if measured is None:
+        return
+    valued = {s for s, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE}
+    for name, iri in material.base.model.measurements.items():
+        if iri in valued and name not in measured:
             problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
             yield material.about(Level.WARN, local_name(iri), problem, "measure it in the scenario")
 
@@ -397,7 +432,8 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
     """Note the components whose status nothing reports, and the attributes that designs expect and
     nothing measures.
     """
-    content, subject = material.content, material.subject
+    content = material.content
+    subject = material.subject
     asserted = {each for each, predicate, _ in content.triples if predicate == rdf.C_STATUS}
     if subject.reported is not None and rdf.C_STATUS not in content.concluded:
         for name, iri in sorted(material.base.model.components.items()):
@@ -517,29 +553,29 @@ _TEXTS: Final = rdf.terms(rdf.XSD, "string boolean")
 
 def never_comparable(material: Material) -> Iterator[Finding]:
     """Find comparisons of a number with a text or a truth value, which hold for no values."""
-    ranges = material.base.vocabulary.ranges
     for rule in material.rules:
         datatypes: dict[Term, frozenset[str]] = {}
         for atom in rule.body:
             if atom.kind == "data" and len(atom.arguments) == 2:
-                datatypes[atom.arguments[1]] = ranges.get(atom.predicate, frozenset())
+                ranges = material.base.vocabulary.ranges.get(atom.predicate, frozenset())
+                datatypes[atom.arguments[1]] = ranges
         for atom in rule.body:
             if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
                 continue
-            sides = [
-                frozenset({term.datatype})
-                if isinstance(term, Lit)
-                else datatypes.get(term, frozenset())
-                for term in atom.arguments
-            ]
-            numbers = [bool(side) and side <= rdf.NUMERIC for side in sides]
-            texts = [bool(side) and side <= _TEXTS for side in sides]
-            if any(numbers) and any(texts):
-                term = atom.arguments[texts.index(True)]
+            kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
+            numbers = [bool(kind) and kind <= rdf.NUMERIC for kind in kinds]
+            texts = [bool(kind) and kind <= _TEXTS for kind in kinds]
+            if True in texts and True in numbers:
+                place = texts.index(True)
+                term = atom.arguments[place]
                 problem = f"{swrl.write_term(term)} is no number, and never compares with one"
                 remedy = "write numbers without quotes" if isinstance(term, Lit) else None
-                place = atom.place(texts.index(True))
-                yield material.suspicious(rule, place, problem, remedy)
+                yield material.suspicious(rule, atom.place(place), problem, remedy)
+
+
+def _datatypes_of(term: Term, known: Mapping[Term, frozenset[str]]) -> frozenset[str]:
+    """The datatypes that the value of a term can have; none where nothing is known."""
+    return frozenset({term.datatype}) if isinstance(term, Lit) else known.get(term, frozenset())
 
 
 def literals_of_expressions(material: Material) -> Iterator[Finding]:
@@ -571,7 +607,8 @@ def undeclared_terms(material: Material) -> Iterator[Finding]:
                 and atom.predicate not in vocabulary.kinds
                 and (number >= len(rule.body) or atom.predicate in vocabulary.used)
             ):
-                name, noun = local_name(atom.predicate), _NOUNS[atom.kind]
+                name = local_name(atom.predicate)
+                noun = _NOUNS[atom.kind]
                 remedy = vocabulary.guess(atom.predicate, (noun,))
                 yield material.suspicious(
                     rule,
@@ -629,45 +666,41 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
     Yields:
         each rule with the atom that names the attribute, what is wrong, and what would be right.
     """
-    content, model, measured = material.content, material.base.model, material.subject.measured
-    stated = {predicate for _, predicate, _ in content.triples}
-    elsewhere = rdf.HAS_QA_VALUE in content.concluded | stated
+    content = material.content
+    if rdf.IS_QA_TYPE in content.concluded:
+        return
+    model = material.base.model
+    measured = material.subject.measured
     estimated = frozenset().union(*model.estimated.values())
     valued = {
-        local_name(str(value))
-        for _, predicate, value in content.triples
-        if predicate == rdf.IS_QA_TYPE
+        local_name(str(o)) for _, predicate, o in content.triples if predicate == rdf.IS_QA_TYPE
     }
-    for rule in content.enabled_rules if rdf.IS_QA_TYPE not in content.concluded else ():
+    stated = {predicate for _, predicate, _ in content.triples}
+    has_own_values = rdf.HAS_QA_VALUE in content.concluded | stated
+    for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
-        for atom in rule.body:
-            if (
-                atom.predicate != rdf.IS_QA_TYPE
-                or len(atom.arguments) != 2
-                or not isinstance(atom.arguments[1], Named)
-            ):
-                continue
-            name = local_name(atom.arguments[1].iri)
+        for atom, name in _attributes_asked(rule):
+            unmeasured = f"missions do not measure {name}"
             is_measured = measured is None or name in measured
             if atom.arguments[0] not in held:
                 if not is_measured and name not in valued:
-                    yield (
-                        rule,
-                        atom,
-                        f"missions do not measure {name}, and no ontology has a value of it",
-                        None,
-                    )
-            elif name in model.attributes and not elsewhere:
-                if name not in estimated:
-                    problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
-                    yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
-                elif not is_measured:
-                    yield (
-                        rule,
-                        atom,
-                        f"missions do not measure {name}, so no grounding has a value of it",
-                        None,
-                    )
+                    yield rule, atom, f"{unmeasured}, and no ontology has a value of it", None
+            elif has_own_values or name not in model.attributes:
+                continue
+            elif name not in estimated:
+                problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
+                yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
+            elif not is_measured:
+                yield rule, atom, f"{unmeasured}, so no grounding has a value of it", None
+
+
+def _attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
+    """The atoms of a rule that name the quality attribute of a value, with its name."""
+    for atom in rule.body:
+        if atom.predicate == rdf.IS_QA_TYPE and len(atom.arguments) == 2:
+            attribute = atom.arguments[1]
+            if isinstance(attribute, Named):
+                yield atom, local_name(attribute.iri)
 
 
 def never_fires(material: Material) -> Iterator[Finding]:
@@ -718,22 +751,27 @@ _MAKE_SAME: Final = re.compile(rdf.OWL + "(sameAs|.*Functional|.*ardinality|oneO
 
 def same_individuals(material: Material) -> Iterator[Finding]:
     """Find rules that ask for the same individuals (sameAs), where nothing makes any the same."""
-    terms = (
-        *(str(term) for triple in material.content.triples for term in triple[1:]),
-        *material.content.structure,
-    )
-    heads = (atom.kind for rule in material.rules for atom in rule.head)
-    kinds = (kind for kind in terms if not kind.endswith("#FunctionalProperty"))
-    links = material.base.vocabulary.kinds
-    functional = {s for s, _, o in material.content.triples if o == _FUNCTIONAL}
-    merges = any("object property" in links.get(name, ()) for name in functional)
-    if merges or any(map(_MAKE_SAME.search, kinds)) or "same" in heads:
+    if _can_be_the_same(material):
         return
     for rule in material.rules:
         for atom in rule.body:
             if atom.kind == "same":
                 problem = f"{write_atom(atom)} holds of an individual and itself only: nothing says that two names mean one"
                 yield material.suspicious(rule, atom.place(), problem)
+
+
+def _can_be_the_same(material: Material) -> bool:
+    """Whether axioms or rules can make two individuals one."""
+    triples = material.content.triples
+    terms = (*(str(o) for _, _, o in triples), *(p for _, p, _ in triples))
+    of_properties = (each for each in terms if each != _FUNCTIONAL)
+    if any(map(_MAKE_SAME.search, (*of_properties, *material.content.structure))):
+        return True
+    kinds = material.base.vocabulary.kinds
+    functional = {s for s, _, o in triples if o == _FUNCTIONAL}
+    if any("object property" in kinds.get(name, ()) for name in functional):
+        return True
+    return any(atom.kind == "same" for rule in material.rules for atom in rule.head)
 
 
 _FUNCTIONAL: Final = rdf.OWL + "FunctionalProperty"
@@ -751,20 +789,16 @@ def misspelt_variables(material: Material) -> Iterator[Finding]:
                 if isinstance(term, Variable):
                     values[term.name].add(atom.takes_value(number))
                     places[term.name].append(atom.place(number))
-        names = list(places)
-        for name in (each for each in names if len(places[each]) == 1):
-            near = [
-                other for other in names if values[other] & values[name] and are_near(name, other)
-            ]
-            before = names[: names.index(name)]
-            meant = [other for other in near if len(places[other]) > 1] or [
-                other for other in near if other in before
-            ]
-            if meant:
+        earlier: list[str] = []
+        for name, where in places.items():
+            near = [each for each in places if values[each] & values[name] and are_near(name, each)]
+            # One that occurs more often, else one that occurs before.
+            often = [each for each in near if len(places[each]) > 1]
+            meant = often or [each for each in near if each in earlier]
+            if len(where) == 1 and meant:
                 problem = f"?{name} occurs only here, and is another variable than ?{meant[0]}"
-                yield material.suspicious(
-                    rule, places[name][0], problem, f"did you mean ?{meant[0]}?"
-                )
+                yield material.suspicious(rule, where[0], problem, f"did you mean ?{meant[0]}?")
+            earlier.append(name)
 
 
 def are_near(one: str, other: str) -> bool:
@@ -783,44 +817,47 @@ def are_near(one: str, other: str) -> bool:
 
 def two_values(material: Material) -> Iterator[Finding]:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
-    kind = (rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty")
-    functional = {
-        subject for subject, name, value in material.content.triples if (name, value) == kind
-    }
+    triples = material.content.triples
+    functional = {s for s, name, o in triples if (name, o) == (rdf.RDF_TYPE, _FUNCTIONAL)}
     for rule in material.rules:
-        values: dict[tuple[str, Term], Term] = {}
-        equated = {
-            term
-            for atom in rule.body
-            if swrl.COMPARISONS.get(atom.predicate) == "="
-            for term in atom.arguments
-        }
-        for atom in rule.atoms:
-            if atom.predicate not in functional or len(atom.arguments) != 2:
-                continue
-            (subject, value), is_asked = atom.arguments, atom in rule.body
-            key = atom.predicate, subject
-            before = values.setdefault(key, value) if is_asked else values.get(key)
-            name, words = local_name(atom.predicate), write_atom(atom)
-            if before is None or _same(before, value):
-                continue
-            if is_asked and not isinstance(before, Variable) and not isinstance(value, Variable):
-                problem = f"{words}: nothing has two values of {name}, so the rule never fires"
-                yield material.suspicious(
-                    rule, atom.place(), problem, "write a rule for each value"
-                )
-            elif not is_asked and before not in equated and atom.kind == "data":
-                problem = f"{words} contradicts {name} in the body, which holds as well"
-                yield material.suspicious(
-                    rule, atom.place(), problem, "rules add facts, and change none"
-                )
+        asked: dict[tuple[str, Term], Term] = {}
+        for atom in rule.body:
+            if atom.predicate in functional and len(atom.arguments) == 2:
+                subject, value = atom.arguments
+                before = asked.setdefault((atom.predicate, subject), value)
+                is_known = not isinstance(before, Variable) and not isinstance(value, Variable)
+                if is_known and not _same(before, value):
+                    name = local_name(atom.predicate)
+                    problem = f"{write_atom(atom)}: nothing has two values of {name}, so the rule never fires"
+                    yield material.suspicious(
+                        rule, atom.place(), problem, "write a rule for each value"
+                    )
+        yield from _changed_values(material, rule, asked)
+
+
+def _changed_values(
+    material: Material, rule: Rule, asked: Mapping[tuple[str, Term], Term]
+) -> Iterator[Finding]:
+    """Find the conclusions of a rule that give another value to what its body asks for."""
+    comparing = [atom for atom in rule.body if swrl.COMPARISONS.get(atom.predicate) == "="]
+    equated = {term for atom in comparing for term in atom.arguments}
+    for atom in rule.head:
+        before = asked.get((atom.predicate, atom.arguments[0]))
+        if atom.kind != "data" or before is None or before in equated:
+            continue
+        if not _same(before, atom.arguments[-1]):
+            name = local_name(atom.predicate)
+            problem = f"{write_atom(atom)} contradicts {name} in the body, which holds as well"
+            yield material.suspicious(
+                rule, atom.place(), problem, "rules add facts, and change none"
+            )
 
 
 def _same(one: Term, other: Term) -> bool:
-    first, second = (
-        rdf.canonical(each) if isinstance(each, Lit) else each for each in (one, other)
-    )
-    return first == second
+    """Whether two terms are the same variable, individual or value."""
+    if isinstance(one, Lit) and isinstance(other, Lit):
+        return rdf.canonical(one) == rdf.canonical(other)
+    return one == other
 
 
 _FD_REALISABILITY: Final = rdf.TOMASYS + "fd_realisability"
@@ -847,36 +884,34 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
     """
     reported = {*chain.from_iterable((material.subject.reported or {}).values())}
     by_capitals = {each.upper(): each for each in sorted(reported)}
-    asserted = [
-        value for _, predicate, value in material.content.triples if predicate == rdf.C_STATUS
-    ]
-    heads = [
-        atom.arguments[-1]
-        for rule in material.rules
-        for atom in rule.head
-        if atom.predicate == rdf.C_STATUS
-    ]
-    known = {*reported, *(value.text for value in (*asserted, *heads) if isinstance(value, Lit))}
+    known = reported | _other_statuses(material)
     for rule in filter(material.is_own, material.rules):
-        asked = [(atom, atom.arguments[-1]) for atom in rule.body if atom.predicate == rdf.C_STATUS]
-        statuses = {status for _, status in asked if isinstance(status, Variable)}
-        for atom in rule.body:  # and in a comparison
-            if swrl.COMPARISONS.get(atom.predicate) in ("=", "!=") and not statuses.isdisjoint(
-                atom.arguments
-            ):
-                asked += [(atom, term) for term in atom.arguments]
-        for atom, status in asked:
-            if (
-                isinstance(status, Lit)
-                and status.datatype == rdf.XSD + "string"
-                and status.text not in known
-            ):
+        for atom, status in _statuses_asked(rule):
+            if isinstance(status, Lit) and status.datatype == rdf.XSD + "string":
                 meant = similar(status.text.upper(), by_capitals)
-                if meant is not None:
+                if status.text not in known and meant is not None:
                     problem = f'nothing in the simulation reports c_status "{status.text}"'
-                    yield material.suspicious(
-                        rule, atom.place(1), problem, f'did you mean "{by_capitals[meant]}"?'
-                    )
+                    remedy = f'did you mean "{by_capitals[meant]}"?'
+                    yield material.suspicious(rule, atom.place(1), problem, remedy)
+
+
+def _other_statuses(material: Material) -> set[str]:
+    """The statuses of components that an ontology asserts or a rule concludes."""
+    found: list[Term | str] = [o for _, p, o in material.content.triples if p == rdf.C_STATUS]
+    for rule in material.rules:
+        found += [atom.arguments[-1] for atom in rule.head if atom.predicate == rdf.C_STATUS]
+    return {value.text for value in found if isinstance(value, Lit)}
+
+
+def _statuses_asked(rule: Rule) -> Iterator[tuple[Atom, Term]]:
+    """What the body of a rule asks as the status of a component, in a comparison, too."""
+    asking = [atom for atom in rule.body if atom.predicate == rdf.C_STATUS]
+    yield from ((atom, atom.arguments[-1]) for atom in asking)
+    statuses = {atom.arguments[-1] for atom in asking if isinstance(atom.arguments[-1], Variable)}
+    for atom in rule.body:
+        is_equation = swrl.COMPARISONS.get(atom.predicate) in ("=", "!=")
+        if is_equation and not statuses.isdisjoint(atom.arguments):
+            yield from ((atom, term) for term in atom.arguments)
 
 
 CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
@@ -885,6 +920,7 @@ CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
     functions_without_design,
     designs_and_modes,
     attributes_that_do_not_fit,
+    values_that_are_not_used,
     attributes_declared_twice,
     unknown_to_missions,
     thresholds_without_reaction,

@@ -135,33 +135,51 @@ class Content:
         """The same with rules in place of axioms that join values, from which Pellet concludes all
         that holds of named individuals, and at once.
         """
-        after = {line.split(" ", 1)[0]: line for line in self.structure if f"<{_REST}>" in line}
-        firsts = [line.split(" ", 2) for line in self.structure if f"<{_FIRST}>" in line]
-        link = {subject: term.removesuffix(" .\n") for subject, _, term in firsts}
-        rules, kept = list[Rule](), list[str]()
+        rules: list[Rule] = []
+        kept: list[str] = []
         for line in self.structure:
             subject, predicate, node = line.removesuffix(" .\n").split(" ", 2)
-            links = list[str]()
-            while predicate == f"<{_CHAIN}>" and node in link and len(links) < len(firsts):
-                links.append(link[node])
-                node = after[node].removesuffix(" .\n").split(" ", 2)[2] if node in after else ""
+            links = self._items(node) if predicate == f"<{_CHAIN}>" else []
             if links and all(each.startswith("<") for each in links):
                 names = [each.strip("<>") for each in links]
                 rules.append(_joining_rule(names, subject.strip("<>")))
             else:
                 kept.append(line)
-        transitive = [s for s, _, o in self.triples if o == _TRANSITIVE]
-        rules += [_joining_rule([name, name], name) for name in transitive]
-        triples = [
-            (s, p, rdf.OWL + "ObjectProperty" if o == _TRANSITIVE else o)
-            for s, p, o in self.triples
-        ]
+        triples: list[rdf.Triple] = []
+        for subject, predicate, value in self.triples:
+            if value == _TRANSITIVE:
+                rules.append(_joining_rule([subject, subject], subject))
+                triples.append((subject, predicate, rdf.OWL + "ObjectProperty"))
+            else:
+                triples.append((subject, predicate, value))
         return replace(
             self,
             triples=tuple(triples),
             structure=tuple(kept),
             rules=(*self.rules, *rules),
         )
+
+    def _items(self, node: str) -> list[str]:
+        """The items of a list in the structure, as N-Triples has them."""
+        firsts, rests = self._lists
+        found: list[str] = []
+        while node in firsts and len(found) < len(firsts):
+            found.append(firsts[node])
+            node = rests.get(node, "")
+        return found
+
+    @cached_property
+    def _lists(self) -> tuple[dict[str, str], dict[str, str]]:
+        """The first item and the rest of each list in the structure, as N-Triples has them."""
+        firsts: dict[str, str] = {}
+        rests: dict[str, str] = {}
+        for line in self.structure:
+            subject, predicate, value = line.removesuffix(" .\n").split(" ", 2)
+            if predicate == f"<{_FIRST}>":
+                firsts[subject] = value
+            elif predicate == f"<{_REST}>":
+                rests[subject] = value
+        return firsts, rests
 
     def _related_properties(self) -> list[tuple[str, str]]:
         """Each property with those to which its values lead: super-properties and inverses."""
@@ -190,24 +208,16 @@ class Content:
             if predicate == rdf.RDF_TYPE and isinstance(value, str):
                 kinds.setdefault(value, set()).add(subject)
         decisions = self.decision_terms()
-        properties = {
-            *decisions.properties,
-            *(name for _, name, _ in filter(rdf.is_fact, self.triples)),
-        }
-        properties = properties.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
-        classes = {*decisions.classes, *(name for _, name in rdf.memberships(self.triples))}
-        classes = classes.union(*(kinds.get(kind, ()) for kind in _CLASSES))
-        asked = [
-            atom
-            for rule in self.enabled_rules
-            for atom in rule.body
-            if atom.predicate and not atom.expression
-        ]
-        properties |= {atom.predicate for atom in asked if atom.kind in ("object", "data")}
-        classes |= {atom.predicate for atom in asked if atom.kind == "class"}
-        return Terms(
-            _named(properties - kinds.get(rdf.OWL + "AnnotationProperty", set())), _named(classes)
-        )
+        properties = {*decisions.properties}.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
+        properties.update(name for _, name, _ in filter(rdf.is_fact, self.triples))
+        classes = {*decisions.classes}.union(*(kinds.get(kind, ()) for kind in _CLASSES))
+        classes.update(name for _, name in rdf.memberships(self.triples))
+        asked = [atom for rule in self.enabled_rules for atom in rule.body if not atom.expression]
+        properties.update(atom.predicate for atom in asked if atom.kind in ("object", "data"))
+        classes.update(atom.predicate for atom in asked if atom.kind == "class")
+        annotations = kinds.get(rdf.OWL + "AnnotationProperty", set())
+        # What has no name is an atom that SWRL does not know.
+        return Terms(_named(properties - annotations - {""}), _named(classes - {""}))
 
     def n_triples(self, rules: Sequence[Rule] | None = None) -> str:
         """Write all of it for a reasoner, with the enabled rules or those given."""
@@ -242,21 +252,10 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
     structure: list[str] = []
     rules: dict[tuple[str, str], Rule] = {}  # of two that say the same in several files, the first
     for source in sorted(sources, key=lambda source: source.content):
-        found = rules_of(source)
-        for rule in found:
+        for rule in rules_of(source):
             rules.setdefault((rule.name, rule.text), rule)
-        # Triples about the ontology itself (imports, versions) are no part of its content.
-        ontologies = {
-            s for s, p, o in source.triples if p == rdf.RDF_TYPE and o == rdf.OWL + "Ontology"
-        }
-        inside = {triple for rule in found for triple in rule.triples}
-        for subject, predicate, value in (
-            triple for triple in source.triples if triple not in inside
-        ):
-            # Protégé declares the built-ins, about which Pellet logs a warning.
-            if predicate in _ANNOTATIONS or subject in ontologies or value == rdf.SWRL + "Builtin":
-                continue
-            if subject.startswith("_:") or (isinstance(value, str) and value.startswith("_:")):
+        for subject, predicate, value in _meaningful(source):
+            if any(term.startswith("_:") for term in (subject, value) if isinstance(term, str)):
                 structure.append(rdf.n_triple((subject, predicate, value)))
                 continue
             if predicate == rdf.HAS_VALUE and local_name(subject) in values:
@@ -265,6 +264,21 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
             if predicate == rdf.RDF_TYPE and value in _OF_OBJECT_PROPERTIES:
                 triples[subject, rdf.RDF_TYPE, rdf.OWL + "ObjectProperty"] = None
     return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules.values()))
+
+
+def _meaningful(source: OntologyFile) -> Iterator[rdf.Triple]:
+    """The triples of a file without those of rules, annotations, and those about the ontology
+    itself, such as imports and versions.
+    """
+    kind = (rdf.RDF_TYPE, rdf.OWL + "Ontology")
+    ontologies = {s for s, p, o in source.triples if (p, o) == kind}
+    of_rules = {triple for rule in rules_of(source) for triple in rule.triples}
+    for triple in source.triples:
+        subject, predicate, value = triple
+        is_left_out = predicate in _ANNOTATIONS or subject in ontologies or triple in of_rules
+        # Protégé declares the built-ins, about which Pellet logs a warning.
+        if not is_left_out and value != rdf.SWRL + "Builtin":
+            yield triple
 
 
 def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:

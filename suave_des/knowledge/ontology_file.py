@@ -46,7 +46,6 @@ _OTHER_NOTATIONS: Final = {
     "N-Triples": r"(<[^<>\s]+>|_:\w+)\s+<[^<>\s]+>\s",
     "OWL in Functional Syntax": r"(Prefix|Ontology)\s*\(",
     "OWL in Manchester Syntax": r"(Prefix|Ontology):",
-    "OWL/XML": r"(<!.*?>\s*)*<(\w+:)?Ontology\b",
     "JSON-LD": r"[\[{]",
 }
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a
@@ -176,9 +175,7 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
         raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
     for notation, start in _OTHER_NOTATIONS.items():
         if re.match(rf"\s*(#.*\s+)*({start})", text, re.IGNORECASE):
-            raise KnowledgeError(
-                f"this is {notation}", file=path, remedy="save it as RDF/XML, in Protégé by Save as"
-            )
+            raise _another_notation(path, notation)
     root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, text)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
@@ -231,10 +228,17 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
         ) from error
     if root.tag != f"{{{RDF}}}RDF":
         name = etree.QName(root).localname
+        if name == "Ontology":
+            raise _another_notation(path, "OWL/XML")
         raise KnowledgeError(
             f"not RDF/XML: the root element is <{name}>", file=path, remedy=_SAVE_AS
         )
     return root
+
+
+def _another_notation(path: Path, notation: str) -> KnowledgeError:
+    remedy = "save it as RDF/XML, in Protégé by Save as"
+    return KnowledgeError(f"this is {notation}", file=path, remedy=remedy)
 
 
 def _parse_rdf(path: Path, text: str) -> Graph:

@@ -45,7 +45,7 @@ from suave_des.knowledge.rdf import (
     local_name,
     reached,
 )
-from suave_des.knowledge.rules import COMPARISONS, Variable
+from suave_des.knowledge.rules import COMPARISONS, Rule, Variable
 from suave_des.knowledge.state import (
     MAX_EXPONENT,
     NO_GROUNDING,
@@ -162,30 +162,15 @@ def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
 
 def _reasons(ontology: Ontology) -> Iterator[str]:
     """Why rules may distinguish values within a region, whatever the numbers."""
-    pairs = [
-        (s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)
-    ]
+    triples = ontology.content.triples
+    pairs = [(s, o) for s, p, o in triples if p in _SAME_VALUES and isinstance(o, str)]
     # properties with a measured value
     carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])
     for rule in ontology.content.enabled_rules:
-        for atom in rule.atoms:
-            if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
-                yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
-            if atom.kind == "range" or atom.expression:
-                yield f"rule {rule.name} asks for a datatype or a class expression"
-        read = [
-            atom.arguments[1]
-            for atom in rule.body
-            if atom.predicate in carriers and len(atom.arguments) == 2
-        ]
-        measured = {term.name for term in read if isinstance(term, Variable)}
-        for name in sorted(
-            measured.intersection(name for atom in rule.head for name in atom.variables())
-        ):
-            yield f"rule {rule.name} copies the value ?{name} to its head"
+        yield from _reasons_of(rule, carriers)
     for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
-    for subject, predicate, value in ontology.content.triples:
+    for subject, predicate, value in triples:
         if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
             yield f"{local_name(subject)} has a range other than decimal"
         if predicate == RDF_TYPE and value == RDFS + "Datatype":
@@ -193,6 +178,22 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
     for term in _XSD_TERM.findall("".join(ontology.content.structure)):
         if term not in _SIZELESS | _SIZES:
             yield f"a class expression speaks of {local_name(term)}"
+
+
+def _reasons_of(rule: Rule, carriers: Collection[str]) -> Iterator[str]:
+    """Why a rule may distinguish values within a region."""
+    measured = set[str]()
+    for atom in rule.atoms:
+        if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
+            yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
+        if atom.kind == "range" or atom.expression:
+            yield f"rule {rule.name} asks for a datatype or a class expression"
+    for atom in rule.body:
+        if atom.predicate in carriers:
+            measured.update(term.name for term in atom.arguments[1:2] if isinstance(term, Variable))
+    concluded = {name for atom in rule.head for name in atom.variables()}
+    for name in sorted(measured & concluded):
+        yield f"rule {rule.name} copies the value ?{name} to its head"
 
 
 # Plan: choose a function design for each objective that needs one (the third step of the MAPE-K

@@ -6,13 +6,14 @@ Nothing here imports a reasoner, so that the rest of the simulation may use thes
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
 from typing import Final, NamedTuple
 
-from suave_des.errors import KnowledgeError
+from suave_des.errors import KnowledgeError, shown
 
 Value = str | bool | Decimal
 Number = Decimal | float | int | str
@@ -26,6 +27,8 @@ NONE_LEFT: Final = "none left"
 #: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the
 # memory.
 MAX_EXPONENT: Final = 400
+#: Halves of surrogate pairs: also what Python reads bytes as that are not UTF-8.
+_SURROGATE: Final = re.compile("[\ud800-\udfff]")
 
 
 class ContradictionError(KnowledgeError):
@@ -49,6 +52,25 @@ def exact(number: Number) -> Decimal:
         raise KnowledgeError(f"{number!r} is not a finite number of ordinary size")
     text = format(value, "f")
     return Decimal(text.rstrip("0").rstrip(".") if "." in text else text)
+
+
+def _text(name: str, value: object) -> str:
+    """Return a value that is text.
+
+    Raises:
+        KnowledgeError: it is something else, or no file can hold it.
+    """
+    if not isinstance(value, str):
+        raise KnowledgeError(f"{name}: {shown(value)} is not text", remedy="write it in quotes")
+    if _SURROGATE.search(value):
+        problem = f"{name}: {shown(value)} has a character that no file can hold"
+        raise KnowledgeError(problem, remedy="write it in UTF-8")
+    return value
+
+
+def _texts(parts: Mapping[str, str] | None) -> tuple[tuple[str, str], ...]:
+    """Sort texts by name; errors as `_text`."""
+    return tuple(sorted((name, _text(name, value)) for name, value in (parts or {}).items()))
 
 
 class ObjectiveState(NamedTuple):
@@ -96,10 +118,13 @@ class KnowledgeState:
         """Make a state from unsorted parts; floats become exact short decimals.
 
         Raises:
-            KnowledgeError: a measured value is not a finite number, or a function has two
-                objectives.
+            KnowledgeError: a measured value is not a finite number, a design or a status is not
+                text, or a function has two objectives.
         """
         known = sorted(objectives, key=lambda objective: objective.function)
+        for each in known:
+            if each.status is not None:
+                _text(each.function, each.status)
         for one, other in itertools.pairwise(known):
             if one.function == other.function:
                 raise KnowledgeError(
@@ -107,8 +132,8 @@ class KnowledgeState:
                 )
         return cls(
             objectives=tuple(known),
-            groundings=tuple(sorted((groundings or {}).items())),
-            components=tuple(sorted((components or {}).items())),
+            groundings=_texts(groundings),
+            components=_texts(components),
             measurements=tuple(
                 sorted((name, exact(value)) for name, value in (measurements or {}).items())
             ),

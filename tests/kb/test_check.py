@@ -3,11 +3,12 @@
 import itertools
 import json
 import re
+import time
 from decimal import Decimal
 
 import pytest
 
-from suave_des.errors import KnowledgeError, Level
+from suave_des.errors import KnowledgeError, Level, has_level
 from suave_des.kb.check import check, states_to_ask
 from suave_des.knowledge.checks import Subject
 from suave_des.knowledge.ontology import Ontology
@@ -182,3 +183,17 @@ def test_contradictions_are_not_looked_for_in_values_that_missions_do_not_measur
     rule = 'A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> fg_status(?g, "IN_ERROR_FR")'
     assert errors(found_by_pellet(tmp_path, rule))
     assert not errors(found_by_pellet(tmp_path, rule, measured={"water_visibility"}))
+
+
+@pytest.mark.slow
+def test_the_check_of_500_rules_takes_seconds(tmp_path):
+    body = "hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v)"
+    rules = (
+        f'r{n}: {body} ^ lessThan(?v, {1 + n / 1000}) -> fg_status(?fg, "IN_ERROR_NFR")'
+        for n in range(500)
+    )
+    path = tmp_path / "many.swrl"
+    path.write_text("\n".join(rules), encoding="utf-8")
+    before_s = time.process_time()  # of Java, too, which runs in this process
+    assert not has_level(check(Subject(rules=[path])), Level.ERROR)
+    assert time.process_time() - before_s < 15.0

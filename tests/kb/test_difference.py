@@ -19,7 +19,8 @@ from suave_des.kb.difference import (
     paired,
 )
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.space import Outcome, PolicySpace, Situation, States
+from suave_des.kb.situations import Outcome, Situation
+from suave_des.kb.space import PolicySpace, States
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.state import Decision, Fact, Plan

@@ -3,14 +3,17 @@ file as it was.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import get_type_hints
 
 import pytest
 
 from suave_des.errors import InputError
+from suave_des.kb.rule_editor import _rule_xml
 from suave_des.kb.states import ManagingSettings, StateBuilder, recorded_state
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord, MissionMetrics
 from suave_des.records.mission_folder import KNOWLEDGE_FILE, knowledge_text
@@ -103,6 +106,10 @@ def refused(command, name, arguments, said):
         (
             ("infer", "--at", "f_maintain_motion=ungrounded"),
             "--at: f_maintain_motion has no function design 'ungrou",
+        ),
+        (
+            ("infer", "--at", "f_maintain_motion=IN_ERROR_\udcff"),  # as the shell's $'\xff' comes
+            "--at: f_maintain_motion: 'IN_ERROR_\\udcff' has a character that no file can hold",
         ),
         (("infer", "--at", "nowhere@3"), "nowhere: no such folder"),
         (("infer", "--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
@@ -232,3 +239,34 @@ def test_a_state_is_there_from_the_very_time_of_its_record(folder):
     assert recorded_state(folder / "flown", "1").grounded(SEARCH) == "fd_spiral_low"
     with pytest.raises(InputError, match=r"has no state until 0\.999 s"):
         recorded_state(folder / "flown", "0.999")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("Nowhere(?x) -> Wine(?x)", id="a class that is not there"),
+        pytest.param("Wine(?x) -> Wine(?y)", id="a variable without a value"),
+    ],
+)
+def test_rules_are_printed_as_rules_as_text_can_have_them(folder, command, text):
+    ontology = '<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Wine"/>'
+    xml = _rule_xml(looked_up_in_wine(text))
+    Path("wine.owl").write_text(document(ontology + xml))
+    printed = command("rules", "--ontology", "wine.owl")[1]
+    assert "# Rules as text cannot have this rule: rule odd: " in printed
+    Path("wine.swrl").write_text(printed)
+    status, _, error = command("rules", "--ontology", "wine.owl", "--rules", "wine.swrl")
+    assert (status, error) == (0, "")
+
+
+def looked_up_in_wine(text):
+    """A rule with all names in one namespace, whether or not they are there."""
+    parsed = parse_rule(f"odd: {text}")
+    body, head = (
+        tuple(
+            replace(atom, kind="class", predicate=f"http://x.org/wine#{atom.predicate}")
+            for atom in side
+        )
+        for side in (parsed.body, parsed.head)
+    )
+    return replace(parsed, body=body, head=head)

@@ -11,7 +11,7 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.kb.rule_tests import TestFile, mission_states, run_test, shipped_tests
-from suave_des.kb.space import Scale, is_in, measurements_in, parse_region
+from suave_des.kb.scale import Scale, is_in, measurements_in, parse_region
 from tests.helpers.owl_text import individual, iri
 
 SPARE = """\

@@ -20,15 +20,11 @@ from suave_des.kb.adequacy import (
     mutate,
     sample,
 )
+from suave_des.kb.effects import interchangeable_components
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
-from suave_des.kb.space import (
-    PolicySpace,
-    Situation,
-    States,
-    difference,
-    interchangeable_components,
-)
+from suave_des.kb.situations import Situation, difference
+from suave_des.kb.space import PolicySpace, States
 from suave_des.knowledge.ontology import Ontology
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, individual

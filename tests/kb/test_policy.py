@@ -15,7 +15,9 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.policy import Policy, _spans, function_table
-from suave_des.kb.space import PolicySpace, Scale, Situation, States, component_reports, kind_of
+from suave_des.kb.scale import Scale
+from suave_des.kb.situations import Situation
+from suave_des.kb.space import PolicySpace, States, component_reports, kind_of
 from suave_des.kb.states import ManagingSettings
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, TOMASYS, individual

@@ -12,6 +12,7 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.knowledge.checks import Subject
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology_file import read_ontology
 from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.checks import findings_of, only
 from tests.helpers.knowledge_states import searching
@@ -259,3 +260,11 @@ def test_a_datatype_as_owlready2_saves_it_is_that_of_xml_schema(shipped, tmp_pat
         encoding="utf-8",
     )
     assert Ontology.load([path]).facts == Ontology.load().facts
+
+
+def test_an_ontology_in_one_line_with_entities_is_read(tmp_path):
+    content = '<owl:Ontology rdf:about="http://x.org/y"/><owl:Class rdf:about="&y;A"/>'
+    doctype = '<!DOCTYPE rdf:RDF [<!ENTITY y "http://x.org/y#">]>'
+    path = tmp_path / "line.owl"
+    path.write_text(f"<?xml version='1.0'?>{doctype}{HEAD.strip()}{content}</rdf:RDF>")
+    assert read_ontology(path).kinds("http://x.org/y#A") == ["http://www.w3.org/2002/07/owl#Class"]

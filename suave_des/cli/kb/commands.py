@@ -20,6 +20,7 @@ from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet,
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
+    from suave_des.knowledge.rules import Rule
 
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
@@ -88,11 +89,28 @@ def rules_text(base: Ontology) -> str:
         for rule in base.rules:
             if rule.file == file:
                 text = write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled)
-                if any(atom.expression or not atom.predicate for atom in rule.atoms):
+                if (reason := _why_unreadable(rule, text, base)) is not None:
                     lines = "".join(f"# {line}\n" for line in text.splitlines())
-                    text = f"# This rule has an atom without a name, which rules as text cannot have:\n{lines}"
+                    text = f"# {reason}:\n{lines}"
                 blocks.append(text)
     return "\n".join(blocks) or "# no rules\n"
+
+
+def _why_unreadable(rule: Rule, text: str, base: Ontology) -> str | None:
+    """Say why --rules cannot take a rule of an ontology; None: it can."""
+    from suave_des.knowledge.rules import RuleError
+    from suave_des.knowledge.rules.files import check_rule, looked_up
+    from suave_des.knowledge.rules.parser import parse_rule
+
+    if any(atom.expression or not atom.predicate for atom in rule.atoms):
+        return "This rule has an atom without a name, which rules as text cannot have"
+    try:
+        read = looked_up(parse_rule(text), base.vocabulary)
+        if rule.enabled:
+            check_rule(read, base.vocabulary)
+    except RuleError as error:
+        return f"Rules as text cannot have this rule: {error.problem}"
+    return None
 
 
 def add_rule(

@@ -217,14 +217,16 @@ def computed(atom: Atom, bound: Collection[str]) -> frozenset[str]:
     if not atom.computes or not atom.arguments:
         return frozenset()
     first, *others = atom.arguments
-    known = all(term.name in bound for term in others if isinstance(term, Variable))
+    open_others = {term.name for term in others if isinstance(term, Variable)} - set(bound)
     is_both_ways = atom.predicate in _BOTH_WAYS
-    found = frozenset[str]()
-    if known and not (is_both_ways and any(isinstance(term, Lit) for term in others)):
-        found |= {term.name for term in (first,) if isinstance(term, Variable)}
-    if is_both_ways and isinstance(first, Variable) and first.name in bound:
-        found |= {term.name for term in others if isinstance(term, Variable)}
-    return found - set(bound)
+    if not isinstance(first, Variable):
+        return frozenset()
+    if first.name in bound:
+        return frozenset(open_others) if is_both_ways else frozenset()
+    has_literal = any(isinstance(term, Lit) for term in others)
+    if open_others or (is_both_ways and has_literal):
+        return frozenset()
+    return frozenset({first.name})
 
 
 def mirrored(sign: str) -> str:

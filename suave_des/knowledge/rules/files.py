@@ -71,40 +71,15 @@ class Vocabulary:
         """Collect the names in triples of ontologies; the individuals are further ones, that exist
         only in states.
         """
-        kinds: dict[str, set[str]] = defaultdict(
-            set, {rdf.OWL + "Thing": {"class"}, rdf.OWL + "Nothing": {"class"}}
-        )
-        ranges: dict[str, set[str]] = defaultdict(set)
-        used, whole = set[str](), set[str]()
-        for subject, predicate, value in triples:
-            used |= {term for term in (subject, predicate, value) if isinstance(term, str)}
-            if isinstance(value, Lit) and value.datatype in rdf.WHOLE:
-                whole.add(predicate)
-            if predicate == rdf.RDF_TYPE and isinstance(value, str):
-                if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
-                    kinds[subject].add(_DECLARED.get(value, "individual"))
-            elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
-                kinds[subject].add("individual")
-                if isinstance(value, str):
-                    kinds[value].add("individual")
-            elif (
-                predicate == rdf.RDFS + "range"
-                and isinstance(value, str)
-                and value.startswith(rdf.XSD)
-            ):
-                ranges[subject].add(value)
-        for iri in individuals:
-            kinds[iri].add("individual")
-        # All ranges of a property hold at once; which values several of them leave is not worked
-        # out.
-        single = {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
+        triples = tuple(triples)
         texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
+        literals = [(p, o) for _, p, o in triples if isinstance(o, Lit)]
         return cls(
-            {iri: frozenset(found) for iri, found in kinds.items()},
-            single | texts,
-            enumerations,
-            frozenset(used),
-            frozenset(whole),
+            kinds=_kinds(triples, individuals),
+            ranges=_ranges(triples) | texts,
+            enumerations=enumerations,
+            used=frozenset(term for each in triples for term in each if isinstance(term, str)),
+            whole=frozenset(p for p, literal in literals if literal.datatype in rdf.WHOLE),
         )
 
     def with_rules(self, rules: Iterable[Rule]) -> Vocabulary:
@@ -148,6 +123,36 @@ class Vocabulary:
         if bare in known and bare != name:
             return f"did you mean {' or '.join(self.candidates(bare))}?"
         return nearest(bare, known)
+
+
+def _kinds(triples: Iterable[rdf.Triple], individuals: Iterable[str]) -> dict[str, frozenset[str]]:
+    """What each name is declared as or used as; further individuals are given."""
+    kinds: dict[str, set[str]] = defaultdict(set)
+    kinds[rdf.OWL + "Thing"].add("class")
+    kinds[rdf.OWL + "Nothing"].add("class")
+    for subject, predicate, value in triples:
+        if predicate == rdf.RDF_TYPE and isinstance(value, str):
+            if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
+                kinds[subject].add(_DECLARED.get(value, "individual"))
+        elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
+            kinds[subject].add("individual")
+            if isinstance(value, str):
+                kinds[value].add("individual")
+    for iri in individuals:
+        kinds[iri].add("individual")
+    return {iri: frozenset(found) for iri, found in kinds.items()}
+
+
+def _ranges(triples: Iterable[rdf.Triple]) -> dict[str, frozenset[str]]:
+    """The datatype of each property that has one range.
+
+    All ranges of a property hold at once; which values several of them leave is not worked out.
+    """
+    ranges: dict[str, set[str]] = defaultdict(set)
+    for subject, predicate, value in triples:
+        if predicate == rdf.RDFS + "range" and str(value).startswith(rdf.XSD):
+            ranges[subject].add(str(value))
+    return {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
 
 
 class Problem(NamedTuple):
@@ -326,7 +331,8 @@ def _argument_problems(
             and atom.kind in _DECLARED_AS
             and atom.predicate != rdf.OWL + "Thing"
             and not atom.expression
-            and term.iri not in vocabulary.used.union(vocabulary.kinds)
+            and term.iri not in vocabulary.used
+            and term.iri not in vocabulary.kinds
         ):
             words = f"individual {thing} is not defined"
             yield Problem(place, words, vocabulary.guess(term.iri, ("individual",)))
@@ -394,16 +400,13 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
     individuals: dict[str, Place | None] = {}
     values: dict[str, Place | None] = {}
     for atom, number, name in _uses(rule.atoms):
-        (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number))
+        places = values if atom.takes_value(number) else individuals
+        places.setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(filter(None, (individuals[name], values[name])), default=None)
         yield Problem(place, f"?{name} stands for an individual and for a value", None)
-    bound = {
-        name for atom in rule.body if atom.kind in swrl.FACT_KINDS for name in atom.variables()
-    }
-    builtins = [atom for atom in rule.body if atom.kind == "builtin" and atom.arguments]
-    while more := {name for atom in builtins for name in swrl.computed(atom, bound)} - bound:
-        bound |= more
+    bound = _bound_in(rule)
+    builtins = [atom for atom in rule.body if atom.kind == "builtin"]
     ranges = [atom for atom in rule.body if atom.kind == "range"]
     for atom, number, name in _uses([*builtins, *ranges]):
         if name not in bound:
@@ -413,6 +416,15 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         if name not in bound:
             words = f"?{name} occurs in the head, but the body does not bind it"
             yield Problem(atom.place(number), words, nearest(name, bound))
+
+
+def _bound_in(rule: Rule) -> set[str]:
+    """The variables of a rule that facts give a value, or built-ins compute from these."""
+    facts = (atom for atom in rule.body if atom.kind in swrl.FACT_KINDS)
+    bound = {name for atom in facts for name in atom.variables()}
+    while more := {name for atom in rule.body for name in swrl.computed(atom, bound)} - bound:
+        bound |= more
+    return bound
 
 
 # Rules as text.
