@@ -7,11 +7,8 @@ from __future__ import annotations
 import itertools
 import random
 import re
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -199,24 +196,6 @@ def test_a_generated_rule_that_is_said_not_to_fire_changes_nothing(small, count)
         assert found == [], number
         firing += fires
     assert firing > count / 10
-
-
-def why_not_of_one_of_two(path: Path) -> None:
-    """Print what is said where i and j are different, so that nobody differs from one of them."""
-    nobody = Named(NS + "nobody")
-    differs = Atom("different", DIFFERENT, (Variable("x"), nobody))
-    rule = Rule("r", (differs,), (Atom("class", NS + "C", (nobody,)),))
-    print(RuleQuestions(with_rules(Ontology.load([path]), [rule])).why_not("r", KnowledgeState()))
-
-
-def test_a_rule_fires_where_an_individual_differs_from_one_of_two(small):
-    # In a process of its own: what Pellet infers by cases depends on what it was asked before.
-    code = "import sys; from pathlib import Path; from tests.kb.test_pellet_judges_rules import *; "
-    code += "why_not_of_one_of_two(Path(sys.argv[1]))"
-    asked = [sys.executable, "-c", code, str(small.files[0])]
-    root = Path(__file__).parents[2]
-    answer = subprocess.run(asked, cwd=root, capture_output=True, text=True, check=True).stdout
-    assert answer == "r: it fires, and concludes C(nobody)\n"
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "extended"])
