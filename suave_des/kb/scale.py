@@ -133,24 +133,26 @@ def parse_region(text: str) -> Region | None:
         return ()
     if not {"<", ">"} & {*text}:
         return None
-    region = tuple(_bounds(text))
+    region = _bounds(text)
     scale = Scale(tuple(sorted({number for _, number in region})))
     if not any(is_in(region, scale.value(at)) for at in range(1, len(scale))):
         raise InputError(f"no number is in the region {shown(text)}", remedy=_REGIONS)
     return region
 
 
-def _bounds(text: str) -> Iterator[tuple[str, Decimal]]:
+def _bounds(text: str) -> Region:
     """Read the comparisons of a region, in which a point stands for the measured value."""
     parts = [part.strip() for part in _SIGN.split(f". {text}" if text[0] in "<>" else text)]
-    for left, sign, right in zip(parts[::2], parts[1::2], parts[2::2], strict=False):
+    sides = list(zip(parts[::2], parts[1::2], parts[2::2], strict=False))
+    bounds: list[tuple[str, Decimal]] = []
+    for left, sign, right in sides:
         try:
-            bound = (sign, exact(right)) if left == "." else (mirrored(sign), exact(left))
+            bounds.append((sign, exact(right)) if left == "." else (mirrored(sign), exact(left)))
         except KnowledgeError:
             raise InputError(f"{shown(text)} is not a region", remedy=_REGIONS) from None
-        if (left == ".") == (right == "."):
-            raise InputError(f"no number is in the region {shown(text)}", remedy=_REGIONS)
-        yield bound
+    if any((left == ".") == (right == ".") for left, _, right in sides):
+        raise InputError(f"no number is in the region {shown(text)}", remedy=_REGIONS)
+    return tuple(bounds)
 
 
 def measurements_in(

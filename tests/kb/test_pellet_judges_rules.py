@@ -198,15 +198,6 @@ def test_a_generated_rule_that_is_said_not_to_fire_changes_nothing(small, count)
     assert firing > count / 10
 
 
-def test_a_rule_fires_where_an_individual_differs_from_one_of_two(small):
-    # i and j are different, so that nobody differs from one of them; from which is not known.
-    nobody = Named(NS + "nobody")
-    differs = Atom("different", DIFFERENT, (Variable("x"), nobody))
-    rule = Rule("r", (differs,), (Atom("class", NS + "C", (nobody,)),))
-    answer = RuleQuestions(with_rules(small, [rule])).why_not("r", KnowledgeState())
-    assert str(answer) == "r: it fires, and concludes C(nobody)"
-
-
 @pytest.mark.parametrize("scenario", ["seams2023", "extended"])
 def test_a_shipped_rule_that_is_said_not_to_fire_changes_nothing(scenario):
     knowledge = KnowledgeBase.load(scenario=scenario)
