@@ -85,6 +85,8 @@ def read_missions(paths: Sequence[Path]) -> Missions:
     folders = {
         name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()
     }
+    for folder in folders.values():
+        read_note(folder / STORE_FILE, "request")  # which refuses a store that is not ours
     return Missions(pandas.concat(frames, ignore_index=True), swept, notes, folders)
 
 
@@ -93,8 +95,6 @@ def _read_source(path: Path) -> Missions:
 
     Of the exemplar's folder, files that are no results, such as its statistics, are left out.
     """
-    if (path / STORE_FILE).is_file():
-        read_note(path / STORE_FILE, "request")  # which refuses a store that is not ours
     is_campaign, is_file = (path / RUNS_FILE).exists(), not path.is_dir()
     is_exemplars = not (is_campaign or is_file)
     folder = path.parent if is_file else path
