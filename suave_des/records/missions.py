@@ -23,7 +23,7 @@ from suave_des.records.runs import (
     is_foreign,
     runs_in,
 )
-from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest, read_note
+from suave_des.records.store import RUNS_FILE, STORE_FILE, check_store, read_manifest
 
 Source = pandas.DataFrame | str | Path | Sequence[str | Path]
 """Missions: a data frame with the columns of runs.csv, or folders and files."""
@@ -86,7 +86,7 @@ def read_missions(paths: Sequence[Path]) -> Missions:
         name: path for name, path in zip(names, paths, strict=True) if (path / STORE_FILE).is_file()
     }
     for folder in folders.values():
-        read_note(folder / STORE_FILE, "request")  # which refuses a store that is not ours
+        check_store(folder / STORE_FILE)
     return Missions(pandas.concat(frames, ignore_index=True), swept, notes, folders)
 
 
