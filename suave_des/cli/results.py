@@ -251,8 +251,7 @@ def validate(
     validation = compare(
         real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed
     )
-    word = "published" if all(map(_is_shipped, real.files)) else "real"
-    _print_validation(validation, word, real.notes)
+    _print_validation(validation, real)
     sources = {
         "data": [_provenance(path, digest) for path, digest in real.files.items()],
         "targets": list(map(_shown, targets_paths)),
@@ -290,16 +289,15 @@ def _simulated(
         return run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
 
 
-def _print_validation(validation: Validation, real: str, notes: Sequence[str]) -> None:
+def _print_validation(validation: Validation, real: Runs) -> None:
     console = output()
-    for note in notes:
-        console.print(note)
-    if notes:
-        console.print()
-    for table in validation.tables(real):
+    for line in [*real.notes, ""] if real.notes else ():
+        console.print(line)
+    word = "published" if all(map(_is_shipped, real.files)) else "real"
+    for table in validation.tables(word):
         print_table(console, table)
         console.print()
-    console.print("\n".join(validation.remarks(real)))
+    console.print("\n".join(validation.remarks(word)))
 
 
 def _keep_validation(
@@ -389,9 +387,7 @@ def replay(
             "--manager",
         ),
     ] = None,
-    run_number: Annotated[
-        int | None, typer.Option("--run", metavar="K", help="Run number.", show_default="1")
-    ] = None,
+    run: Annotated[int, typer.Option(metavar="K", help="Run number.")] = 1,
     seed: Annotated[int | None, typer.Option(help="Random seed.", show_default="1")] = None,
     point: Annotated[
         int | None,
@@ -419,9 +415,9 @@ def replay(
     from suave_des.pages.replay import missions_in, missions_run, replay_page
     from suave_des.scenario.loader import load_scenario
 
-    _check_one_source(folders or [], scenario)
+    folders = folders or []
+    _check_one_source(folders, scenario)
     names = comma_separated(managers)
-    run = 1 if run_number is None else run_number
     page_file = out or (folders[0] if folders else Path()) / "replay.html"
     if folders:
         check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
@@ -433,7 +429,7 @@ def replay(
         loaded = load_scenario(scenario, **files.replacements)
         missions = missions_run(loaded, names or ("metacontrol",), run, 1 if seed is None else seed)
     else:
-        missions = missions_in(folders or [], names, run, point or 0, confirmed=yes)
+        missions = missions_in(folders, names, run, point or 0, confirmed=yes)
     write_page(page_file, replay_page(missions), show=show)
     print(f"{' and '.join(each.name for each in missions)}: {page_file}")
 

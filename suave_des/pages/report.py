@@ -147,8 +147,9 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
         "seed": seeds[:1] if len(set(seeds)) == 1 else seeds,
         "found": _plain(frame["pipeline_found"].astype(float)),
     }
-    charted = [name for name in _CHARTED if name in frame and frame[name].notna().any()]
-    titles = {name: METRICS[name].heading for name in charted}
+    charted = frame.columns.intersection(list(_CHARTED))
+    known = frame[charted].notna().any()
+    titles = {name: METRICS[name].heading for name in _CHARTED if known.get(name, False)}
     columns |= {name: _plain(frame[name]) for name in (*titles, *missions.swept)}
     names = [each.name for each in groups]
     return {

@@ -25,7 +25,7 @@ from suave_des.records.runs import (
     is_foreign,
     runs_in,
 )
-from suave_des.records.store import RUNS_FILE, STORE_FILE, read_manifest, read_note
+from suave_des.records.store import RUNS_FILE, STORE_FILE, check_store, read_manifest
 
 Source = pandas.DataFrame | str | Path | Sequence[str | Path]
 """Missions: a data frame with the columns of runs.csv, or folders and files."""
@@ -83,18 +83,19 @@ def read_missions(paths: Sequence[Path]) -> Missions:
     named = dict(zip(_short_names(paths), paths, strict=True))
     sources = {name: _read_source(path) for name, path in named.items()}
     frames = [each.frame.assign(source=name) for name, each in sources.items()]
+    folders = {name: path for name, path in named.items() if (path / STORE_FILE).is_file()}
+    for folder in folders.values():
+        check_store(folder / STORE_FILE)
     return Missions(
         pandas.concat(frames, ignore_index=True),
         tuple(dict.fromkeys(chain.from_iterable(each.swept for each in sources.values()))),
         _notes(sources.values()),
-        {name: path for name, path in named.items() if (path / STORE_FILE).is_file()},
+        folders,
     )
 
 
 def _read_source(path: Path) -> Missions:
     """Read the folder of a campaign, a folder of the exemplar's files, or a single file."""
-    if (path / STORE_FILE).is_file():
-        read_note(path / STORE_FILE, "request")  # which refuses a store that is not ours
     if (path / RUNS_FILE).exists():
         return _read_file(path / RUNS_FILE, is_of_folder=True)
     if path.is_dir():

@@ -380,6 +380,12 @@ def read_note(path: Path, name: str) -> Any:
         return _about(db, path, name, None)
 
 
+def check_store(path: Path) -> None:
+    """Raise an InputError if a store, which may come from elsewhere, is not a campaign's."""
+    with store_read(path), closing(_connected(path, "immutable")) as db:
+        _check_schema(db, path)
+
+
 def _about(db: sqlite3.Connection, path: Path | None, name: str, default: Any) -> Any:
     found = db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
     if found is None and default is not None:

@@ -128,29 +128,27 @@ class Comparison(Written):
         """Yield the tables of each metric, the numbers of runs that intervals need, and the runs
         that differ most.
         """
-        needed = []
+        needed: list[tuple[str, ...]] = []
         for metric in self.metrics:
-            groups = [each for each in self.of_groups if each["metric"] == metric.name]
-            pairs = [each for each in self.of_pairs if each["metric"] == metric.name]
-            tables = (
-                _summary_table(metric, groups),
-                _search_table(groups),
-                _difference_table(metric, pairs),
-            )
-            sentences = [each["conclusion"] for each in pairs]
+            pairs = _of_metric(self.of_pairs, metric)
             needed += [_runs_row(each, metric) for each in pairs if each["half_width"] is not None]
-            yield Section(metric.heading, [each for each in tables if each.rows], sentences)
+            yield Section(
+                metric.heading, self._tables(metric), [each["conclusion"] for each in pairs]
+            )
         if needed:
             headings = ("difference", "for ±", "paired", "not paired", "variance ratio")
-            yield Section(
-                "runs of each manager that an interval of the difference needs",
-                [Table(headings, needed)],
-            )
+            title = "runs of each manager that an interval of the difference needs"
+            yield Section(title, [Table(headings, needed)])
         if self.largest.rows:
             below = f"To see both missions: {self.replay}" if self.replay else ""
-            yield Section(
-                self.largest.title, [Table(self.largest.headings, self.largest.rows)], below=below
-            )
+            table = Table(self.largest.headings, self.largest.rows)
+            yield Section(self.largest.title, [table], below=below)
+
+    def _tables(self, metric: Metric) -> list[Table]:
+        groups = _of_metric(self.of_groups, metric)
+        differences = _difference_table(metric, _of_metric(self.of_pairs, metric))
+        tables = (_summary_table(metric, groups), _search_table(groups), differences)
+        return [table for table in tables if table.rows]
 
     def remarks(self) -> list[str]:
         """Describe how missions were compared and why, and what to know about the data."""
@@ -191,9 +189,7 @@ class Comparison(Written):
         metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or self.metrics
         by_group: dict[str, list[str]] = {}
         for metric in metrics:
-            for each in self.of_groups:
-                if each["metric"] != metric.name:
-                    continue
+            for each in _of_metric(self.of_groups, metric):
                 cells = metric.number(each["mean"].value), metric.number(each["std"])
                 by_group.setdefault(each["group"], [each["group"]]).extend(cells)
         shown = [row for row in by_group.values() if any(row[1:])]
@@ -206,7 +202,7 @@ class Comparison(Written):
         rows: list[tuple[str, ...]] = []
         tested = [each for each in self.of_pairs if each["test"]]
         for metric in self.metrics:
-            own = [each for each in tested if each["metric"] == metric.name]
+            own = _of_metric(tested, metric)
             if own:
                 rows.append((capital(metric.heading),))
             for each in own:
@@ -228,6 +224,10 @@ class Comparison(Written):
             **super()._content(),
             "largest_differences": {"rows": self.largest.rows, "replay": self.replay},
         }
+
+
+def _of_metric(rows: Sequence[Row], metric: Metric) -> list[Row]:
+    return [each for each in rows if each["metric"] == metric.name]
 
 
 def _over_all(tests: int) -> str:

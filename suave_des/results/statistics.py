@@ -12,6 +12,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from importlib import import_module
 from typing import Any, Literal
 
@@ -394,12 +395,15 @@ def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> T
     """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the
     two differ.
     """
-    both = [
-        [int(np.sum((first == row) & (second == column))) for column in (True, False)]
-        for row in (True, False)
-    ]
-    found = library(".stats.contingency_tables").mcnemar(both, exact=True)
-    return {"test": MCNEMAR, "p": min(1.0, float(found.pvalue)), "effect_name": "", "effect": None}
+    p = _mcnemar_p(int(np.sum(first & ~second)), int(np.sum(second & ~first)))
+    return {"test": MCNEMAR, "p": p, "effect_name": "", "effect": None}
+
+
+@lru_cache(maxsize=1000)
+def _mcnemar_p(first_alone: int, second_alone: int) -> float:
+    tables = library(".stats.contingency_tables")
+    found = tables.mcnemar([[0, first_alone], [second_alone, 0]], exact=True)
+    return min(1.0, float(found.pvalue))
 
 
 def holm(ps: Sequence[float]) -> list[float]:

@@ -20,9 +20,10 @@ from suave_des.errors import InputError
 from suave_des.records.missions import missions_in
 from suave_des.resources import find
 from suave_des.results import statistics
-from suave_des.results.compare import Choices, compare_folders
+from suave_des.results.compare import Choices, compare_folders, compare_groups
 from suave_des.results.comparison import Comparison
 from suave_des.results.figures import draw_missions
+from suave_des.results.groups import grouped
 from tests.helpers.compared import compare_frame, difference, interval, row, rows
 
 PUBLISHED = find("seams2023_runs.csv", "scenarios/published")
@@ -75,6 +76,13 @@ def test_a_folder_whose_store_is_not_a_campaigns_is_refused(campaign, tmp_path, 
         store.execute("CREATE VIEW endless AS SELECT * FROM outcomes")
     with pytest.raises(InputError, match="does not have the tables of a campaign's store"):
         use([folder])
+
+
+def test_progress_is_told_of_each_difference():
+    told = []
+    groups = grouped(missions_in([PUBLISHED]), metrics=["search_time_s"])
+    compare_groups(groups, on_progress=lambda done, total: told.append((done, total)))
+    assert told == [(0, 3), (1, 3), (2, 3)]
 
 
 class TestPublishedRuns:
