@@ -426,6 +426,7 @@ def test_what_the_process_was_started_to_ignore_does_not_end_a_query():
 
 def test_settings_of_matplotlib_that_are_no_utf_8_are_named(tmp_path):
     (tmp_path / "matplotlibrc").write_bytes(b"axes.grid: \xff\n")
-    done = command_here("figure", "out", "--out", "a.png", cwd=tmp_path)
+    command = [*COMMAND, "figure", "out", "--out", "a.png"]  # a process that has no matplotlib yet
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert "suave-des: matplotlibrc: cannot be read: 'utf-8' codec" in done.stderr
