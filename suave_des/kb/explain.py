@@ -578,16 +578,20 @@ class RuleQuestions:
         rules = self._usable.content.enabled_rules
         try:
             tracer = Tracer(self._usable, state, self._pellet)
-            facts = Facts(tracer.known)
+            known = tracer.known
+            facts = Facts(known)
             firing = {rules[number] for number in tracer.holding}
         except ContradictionError:
             raise
         except KnowledgeError:
             # Where rules ask what is different Pellet can fail on what it is asked besides.
-            facts = Facts(self._followed(rules, state))
+            known = self._followed(rules, state)
+            facts = Facts(known)
             firing = {rule for rule in rules if matching.matches(rule, facts)}
-        if any(atom.predicate in IDENTITIES for rule in rules for atom in rule.body):
-            firing |= {rule for rule in rules if rule not in firing and self._adds(rule, state)}
+        for rule in rules:
+            asks = any(atom.predicate in IDENTITIES for atom in rule.body)
+            if asks and rule not in firing and self._adds(rule, state, known):
+                firing.add(rule)
         return facts, frozenset(firing)
 
     def _followed(self, rules: Iterable[Rule], state: KnowledgeState) -> tuple[Triple, ...]:
@@ -595,15 +599,15 @@ class RuleQuestions:
         base = self._usable.with_rules(rules)
         return Tracer(base, state, matching.tracing_pellet(base)).known
 
-    def _adds(self, rule: Rule, state: KnowledgeState) -> bool:
-        """Whether something that a rule concludes follows with it alone.
+    def _adds(self, rule: Rule, state: KnowledgeState, known: Iterable[Triple]) -> bool:
+        """Whether something that a rule concludes follows with it alone, of all that is known.
 
         It may fire with no match that is known: where an individual differs from one of two, but
         from which does not follow.
         """
         rules = self._usable.content.enabled_rules
         fewer = self._followed((each for each in rules if each is not rule), state)
-        more = set(self._followed(rules, state)).difference(fewer)
+        more = set(known).difference(fewer)
         return any(matching.matched(atom, each, {}) for atom in rule.head for each in more)
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:

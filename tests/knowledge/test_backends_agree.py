@@ -192,7 +192,7 @@ def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
         return str(error)
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(120, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, pytest.param(120, marks=pytest.mark.slow)])
 def test_both_backends_infer_the_same_on_random_states(kb, pellet, count):
     draw = random.Random(20230515)
     states = [random_state(draw) for _ in range(count)]
