@@ -25,6 +25,8 @@ NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 LIMIT_BYTES = 1_000_000_000
 """Of a file that has no smaller limit."""
 _PIECE_ROWS = 1000
+_FEW_BRACKETS = 500
+"""So many that are nested do not fill the stack."""
 _PART = ".part"
 
 DERIVED = (
@@ -144,11 +146,32 @@ def parse_json(text: str, path: Path, place: str | None = None) -> Any:
         InputError: it is not JSON, or has a number that is not finite.
     """
     try:
-        return json.loads(text, parse_constant=_finite, parse_float=_finite)
-    except (ValueError, RecursionError) as error:
+        return json_value(text, _finite)
+    except ValueError as error:
         raise InputError(
             f"is not JSON: {error}", file=path, place=place, remedy="restore it, or make it anew"
         ) from None
+
+
+def json_value(text: str | bytes, real: Callable[[str], float] = float) -> Any:
+    """Parse JSON from elsewhere as `json.loads` does.
+
+    Python's parser goes as deep as the stack allows, and Python 3.14 ends there where Java has
+    marked the end of the stack as its own. So what has many brackets is parsed by another one
+    first, which goes 200 deep.
+
+    Args:
+        real: converts numbers with a point or an exponent, NaN and Infinity.
+
+    Raises:
+        ValueError: it is not JSON, or nested deeper than that.
+    """
+    opened = (b"[", b"{") if isinstance(text, bytes) else ("[", "{")
+    if sum(map(text.count, opened)) > _FEW_BRACKETS:  # type: ignore[arg-type]
+        from pydantic_core import from_json
+
+        from_json(text)
+    return json.loads(text, parse_constant=real, parse_float=real)
 
 
 def _finite(text: str) -> float:

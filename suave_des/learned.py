@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, SkipValidation
 from pydantic.dataclasses import dataclass
 
 from suave_des.errors import InputError
-from suave_des.files import read_bytes
+from suave_des.files import json_value, read_bytes
 
 FORMAT = 1
 _KEY = "suave_des_learned"
@@ -57,8 +57,8 @@ def read_file(path: Path) -> Learned:
     """Read the file that training wrote; an InputError if it cannot be read, or is something
     else.
     """
-    with suppress(AttributeError, TypeError, ValueError, RecursionError):
-        content = json.loads(read_bytes(path, _LIMIT_BYTES))
+    with suppress(AttributeError, TypeError, ValueError):
+        content = json_value(read_bytes(path, _LIMIT_BYTES))
         if content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
             return Learned(**content)
     raise InputError(

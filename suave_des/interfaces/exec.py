@@ -28,6 +28,7 @@ from weakref import WeakSet, finalize
 
 from suave_des.domain import Task
 from suave_des.errors import InputError, PassingError, did_you_mean, shown
+from suave_des.files import json_value
 from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
@@ -109,8 +110,8 @@ class _Program:
             raise self._ended() from None
         answer = self._line(time_out_s)
         try:
-            found = json.loads(answer)
-        except (ValueError, RecursionError):
+            found = json_value(answer)
+        except ValueError:
             raise ProgramError(
                 f"answered {shown(answer[:80].decode(errors='replace'))}, which is not JSON"
             ) from None

@@ -22,6 +22,7 @@ from urllib.parse import urlsplit
 
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
+from suave_des.files import json_value
 from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
@@ -302,8 +303,8 @@ class _Handler(BaseHTTPRequestHandler):
             )
         body = self.rfile.read(int(length))
         try:
-            return json.loads(body or b"{}")
-        except (ValueError, RecursionError):
+            return json_value(body or b"{}")
+        except ValueError:
             raise InputError(
                 f"the body is not JSON: {shown(body[:60].decode(errors='replace'))}"
             ) from None

@@ -27,6 +27,7 @@ from suave_des.files import (
     Listing,
     check_own,
     json_text,
+    json_value,
     make_output_folder,
     own_files,
     remove_results,
@@ -393,7 +394,7 @@ def _about(db: sqlite3.Connection, path: Path | None, name: str, default: Any) -
     if found is None or _crc(name, found[0]) != found[1]:
         what = "missing" if found is None else "not what was written"
         raise _damaged(path, f"its {name} is {what}")
-    return json.loads(found[0])
+    return json_value(found[0])
 
 
 def _own(path: Path) -> list[Path]:
@@ -471,7 +472,7 @@ def _outcome(record: tuple[int, int, int, int, str, int], path: Path | None) -> 
     key = MissionKey(*map(int, numbers))
     if _crc(*key, kind, content) != crc:
         raise _damaged(path, f"the outcome of run {key.run} is not what was written")
-    cells = json.loads(content)
+    cells = json_value(content)
     if kind == _ROW:
         return key, contents.row_of(cells)
     return key, MissionFailure(*contents.failure_of(cells))
