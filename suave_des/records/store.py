@@ -365,7 +365,7 @@ def has_campaign(folder: Path) -> bool:
     try:
         with closing(_connected(path, "ro")) as db:
             return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
-    except (SuaveDesError, sqlite3.Error):
+    except (SuaveDesError, sqlite3.Error, UnicodeDecodeError):  # SQLite quotes what is damaged
         return True
 
 

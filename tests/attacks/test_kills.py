@@ -64,5 +64,6 @@ def test_an_overwriting_campaign_that_is_killed_leaves_no_results_of_the_old_one
         if runs.is_file() and (tmp_path / "out" / "campaign.sqlite").is_file():
             managers = {line.split(",")[1] for line in runs.read_text().splitlines()[1:]}
             resumed = chaos.start(["--resume", "out"], tmp_path)
-            assert chaos.ended(resumed)[0] == 0
+            status, error = chaos.ended(resumed)
+            assert status == 0, error
             assert managers == {line.split(",")[1] for line in runs.read_text().splitlines()[1:]}

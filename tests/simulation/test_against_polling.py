@@ -5,7 +5,7 @@
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
 from suave_des.managing.simple import RandomManager
@@ -166,10 +166,11 @@ def test_missions_are_those_in_which_all_is_polled_whatever_the_scenario(**scena
 
 
 @pytest.mark.slow
-@given(**SCENARIOS)
-@settings(max_examples=2000)
-def test_missions_of_many_scenarios_are_those_in_which_all_is_polled(**scenario):
-    assert_polled(**scenario)
+@pytest.mark.parametrize("part", range(4))
+def test_missions_of_many_scenarios_are_those_in_which_all_is_polled(part):
+    """Two thousand, in four tests, which several processes share."""
+    polled = given(**SCENARIOS)(assert_polled)
+    seed(part)(settings(max_examples=500)(polled))()
 
 
 def test_set_points_may_be_sent_more_often_than_there_are_way_points_left():
