@@ -69,7 +69,9 @@ class CallTimes:
             self._next_s += self.period_s
         if changed:
             self._known.clear()
-        if self._depends_on is not None and may_sleep:
+        # In its first period it may wait for a value that comes from no other region.
+        is_settled = now_s >= self.period_s
+        if self._depends_on is not None and may_sleep and is_settled:
             self._sleep(self._depends_on, now_s)
         else:
             self._alarm.set(self._next_s)

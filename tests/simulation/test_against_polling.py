@@ -5,7 +5,7 @@
 from functools import cache
 
 import pytest
-from hypothesis import given, seed, settings
+from hypothesis import example, given, seed, settings
 from hypothesis import strategies as st
 
 from suave_des.managing.simple import RandomManager
@@ -160,6 +160,18 @@ def assert_polled(
 
 
 @given(**SCENARIOS)
+@example(  # a manager that sleeps in its first period, before it has all values
+    name="release15",
+    manager="metacontrol",
+    run=100001,
+    loss=0.1,
+    period_s=18.404351864644486,
+    latency_s=0.7025,
+    failures=[(0.0, "frozen")],
+    poll_s=2.0,
+    error_m=0.04516056795008638,
+    slower=0.8517633100236173,
+)
 @settings(max_examples=12)
 def test_missions_are_those_in_which_all_is_polled_whatever_the_scenario(**scenario):
     assert_polled(**scenario)
