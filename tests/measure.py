@@ -104,8 +104,22 @@ def said_in(text: str) -> list[tokenize.TokenInfo]:
         if is_prose(node)
         for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
     }
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    tokens = whole_texts(tokenize.generate_tokens(io.StringIO(text).readline))
     return [each for each in tokens if each.type not in LAYOUT and each.start[0] not in prose]
+
+
+def whole_texts(tokens: Iterator[tokenize.TokenInfo]) -> Iterator[tokenize.TokenInfo]:
+    """Yield tokens with each formatted text as one, of which Python makes several from 3.12 on."""
+    depth = 0
+    for each in tokens:
+        kind = tokenize.tok_name[each.type]
+        is_end = kind.endswith("STRING_END")
+        if is_end:
+            depth -= 1
+        if depth == 0 and not is_end:
+            yield each
+        if kind.endswith("STRING_START"):
+            depth += 1
 
 
 def is_prose(node: ast.AST) -> bool:

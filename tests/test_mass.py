@@ -101,3 +101,7 @@ def test_comments_docstrings_and_layout_have_no_mass(tmp_path):
 def test_scripts_and_styles_have_mass(tmp_path, name, text, tokens):
     (tmp_path / name).write_text(text, encoding="utf-8")
     assert measure.tokens_of(tmp_path / name) == tokens
+
+
+def test_a_formatted_text_is_one_token_in_each_python():
+    assert len(measure.said_in("x = f'{a} and {f\"{b!r:>{c}}\"}' + 'd'\n")) == 5
