@@ -11,10 +11,11 @@ import io
 import json
 import math
 import os
+import re
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from itertools import islice
+from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
@@ -25,8 +26,9 @@ NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 LIMIT_BYTES = 1_000_000_000
 """Of a file that has no smaller limit."""
 _PIECE_ROWS = 1000
-_FEW_BRACKETS = 500
-"""So many that are nested do not fill the stack."""
+_DEEPEST = 200
+"""Of JSON: how deep it may be nested."""
+_JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _PART = ".part"
 
 DERIVED = (
@@ -157,21 +159,21 @@ def json_value(text: str | bytes, real: Callable[[str], float] = float) -> Any:
     """Parse JSON from elsewhere as `json.loads` does.
 
     Python's parser goes as deep as the stack allows, and Python 3.14 ends there where Java has
-    marked the end of the stack as its own. So what has many brackets is parsed by another one
-    first, which goes 200 deep.
+    marked the end of the stack as its own.
 
     Args:
         real: converts numbers with a point or an exponent, NaN and Infinity.
 
     Raises:
-        ValueError: it is not JSON, or nested deeper than that.
+        ValueError: it is not JSON, or nested more than 200 deep.
     """
-    opened = (b"[", b"{") if isinstance(text, bytes) else ("[", "{")
-    if sum(map(text.count, opened)) > _FEW_BRACKETS:  # type: ignore[arg-type]
-        from pydantic_core import from_json
-
-        from_json(text)
-    return json.loads(text, parse_constant=real, parse_float=real)
+    decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
+    if decoded.count("[") + decoded.count("{") > _DEEPEST:
+        brackets = re.findall(r"[\[\]{}]", _JSON_TEXT.sub("", decoded))
+        depths = accumulate(1 if each in "[{" else -1 for each in brackets)
+        if max(depths, default=0) > _DEEPEST:
+            raise ValueError(f"nested more than {_DEEPEST} deep")
+    return json.loads(decoded, parse_constant=real, parse_float=real)
 
 
 def _finite(text: str) -> float:

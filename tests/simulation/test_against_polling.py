@@ -160,7 +160,7 @@ def assert_polled(
 
 
 @given(**SCENARIOS)
-@example(  # a manager that sleeps in its first period, before it has all values
+@example(  # a call in the first period that is set anew would miss its time by rounding
     name="release15",
     manager="metacontrol",
     run=100001,
