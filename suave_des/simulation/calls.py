@@ -69,8 +69,9 @@ class CallTimes:
             self._next_s += self.period_s
         if changed:
             self._known.clear()
-        # In the first period now + (t - now) may miss the next time t by rounding, by another amount
-        # if a call is set anew when the manager wakes. Later t is at most 2 now, and nothing is lost.
+        # In the first period now + (t - now) may miss the next time t by rounding, and by another
+        # amount if the call is set anew when the manager wakes. Later t is at most 2 now, so that
+        # nothing is lost.
         is_exact = now_s >= self.period_s
         if self._depends_on is not None and may_sleep and is_exact:
             self._sleep(self._depends_on, now_s)
