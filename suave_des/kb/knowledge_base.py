@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import rdflib
 from rdflib.namespace import RDFS
@@ -39,6 +39,9 @@ from suave_des.knowledge.state import (
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
+
+if TYPE_CHECKING:  # or every command of kb would load the parser
+    from rdflib.plugins.sparql.sparql import Query
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
 _MODEL_NAME: Final = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
@@ -372,6 +375,29 @@ def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) ->
 
 def answer(graph: rdflib.Graph, text: str) -> QueryResult:
     """Answer a query from a graph of graph_of; see KnowledgeBase.query."""
+    query = _parsed(text)
+    unknown = tuple(_unknown(graph, text))
+    try:
+        result = graph.query(query)
+        if result.type == "ASK":
+            return QueryResult(("answer",), ((str(result.askAnswer).lower(),),), unknown)
+        if result.type == "SELECT":
+            columns = list(map(str, result.vars or ()))
+            if "*" in text.partition("{")[0]:  # all variables, which rdflib returns in any order
+                columns.sort()
+            rows = [_texts(graph, (row[name] for name in columns)) for row in result]  # type: ignore
+        else:
+            columns = ["subject", "predicate", "object"]
+            rows = [_texts(graph, triple) for triple in result.graph or ()]
+    except Exception as error:  # evaluation raises whatever the functions of the query raise
+        raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
+    if result.type != "SELECT" or "OrderBy" not in str(query.algebra):
+        rows.sort(key=_sortable)
+    return QueryResult(tuple(columns), tuple(rows), unknown)
+
+
+def _parsed(text: str) -> Query:
+    """Parse a query that reads the knowledge base only."""
     from rdflib.plugins.sparql import prepareQuery
 
     try:
@@ -383,27 +409,7 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
     if "ServiceGraphPattern" in str(query.algebra) or query.algebra.get("datasetClause"):
         remedy = "remove them: only the knowledge base can be queried"
         raise InputError("SERVICE and FROM read from other sources", remedy=remedy)
-    unknown = tuple(_unknown(graph, text))
-    try:
-        result = graph.query(query)
-        if result.type == "ASK":
-            return QueryResult(("answer",), ((str(result.askAnswer).lower(),),), unknown)
-        if result.type == "SELECT":
-            columns = list(map(str, result.vars or ()))
-            if "*" in text.partition("{")[0]:  # all variables, which rdflib returns in any order
-                columns.sort()
-            rows = [_texts(graph, (row[name] for name in columns)) for row in result]  # type: ignore
-            if "OrderBy" not in str(query.algebra):
-                rows.sort(key=_sortable)
-            return QueryResult(tuple(columns), tuple(rows), unknown)
-        triples = [_texts(graph, triple) for triple in result.graph or ()]
-        return QueryResult(
-            ("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)), unknown
-        )
-    except InputError:
-        raise
-    except Exception as error:  # evaluation raises whatever the functions of the query raise
-        raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
+    return query
 
 
 def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:

@@ -210,20 +210,22 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
     others = [name for name in down if name not in (own, "reports")]
     found = _outcomes(cases, kept, len(down))
     ranges = [_ranges(number, policy, found.values()) for number in range(len(attributes))]
+    merged = _merged(found, down, [own, *others], ranges)
     headings = ["now", *(name.removesuffix("_now") for name in others)]
     if "reports" in kept:
         headings.append("components")
+        rows = [[*now, ", ".join(said), *at, *then] for (now, at, then), said in merged.items()]
+    else:
+        rows = [[*now, *at, *then] for now, at, then in merged]
     headings += attributes[:-1]
-    rows = []
-    for (before, places, cells), reports in _merged(found, down, [own, *others], ranges).items():
-        reported = [", ".join(reports)] if "reports" in kept else []
-        rows.append([*before, *reported, *places, *cells])
-    outcomes = [words for _, words in ranges[-1]] if ranges else ["then"]
-    what = f", by measured {', '.join(attributes)}" if attributes else ""
-    table = Table(
-        [*headings, *outcomes], rows, f"{function}{what}", "l" * (len(headings) + len(outcomes))
-    )
-    return table, len(headings), attributes[-1] if attributes else ""
+    if attributes:
+        across = attributes[-1]
+        outcomes = [words for _, words in ranges[-1]]
+        title = f"{function}, by measured {', '.join(attributes)}"
+    else:
+        across, outcomes, title = "", ["then"], function
+    columns = [*headings, *outcomes]
+    return Table(columns, rows, title, "l" * len(columns)), len(headings), across
 
 
 def _merged(

@@ -553,24 +553,32 @@ _TEXTS: Final = rdf.terms(rdf.XSD, "string boolean")
 
 def never_comparable(material: Material) -> Iterator[Finding]:
     """Find comparisons of a number with a text or a truth value, which hold for no values."""
+    ranges = material.base.vocabulary.ranges
     for rule in material.rules:
-        datatypes: dict[Term, frozenset[str]] = {}
+        datatypes: dict[Term, frozenset[str]] = {
+            atom.arguments[1]: ranges.get(atom.predicate, frozenset())
+            for atom in rule.body
+            if atom.kind == "data" and len(atom.arguments) == 2
+        }
         for atom in rule.body:
-            if atom.kind == "data" and len(atom.arguments) == 2:
-                ranges = material.base.vocabulary.ranges.get(atom.predicate, frozenset())
-                datatypes[atom.arguments[1]] = ranges
-        for atom in rule.body:
-            if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
-                continue
-            kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
-            numbers = [bool(kind) and kind <= rdf.NUMERIC for kind in kinds]
-            texts = [bool(kind) and kind <= _TEXTS for kind in kinds]
-            if True in texts and True in numbers:
-                place = texts.index(True)
+            place = _compared_text(atom, datatypes)
+            if place is not None:
                 term = atom.arguments[place]
                 problem = f"{swrl.write_term(term)} is no number, and never compares with one"
                 remedy = "write numbers without quotes" if isinstance(term, Lit) else None
                 yield material.suspicious(rule, atom.place(place), problem, remedy)
+
+
+def _compared_text(atom: Atom, datatypes: Mapping[Term, frozenset[str]]) -> int | None:
+    """The place of a text or truth value that an atom compares with a number; None: there is
+    none.
+    """
+    if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
+        return None
+    kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
+    numbers = [bool(kind) and kind <= rdf.NUMERIC for kind in kinds]
+    texts = [bool(kind) and kind <= _TEXTS for kind in kinds]
+    return texts.index(True) if True in texts and True in numbers else None
 
 
 def _datatypes_of(term: Term, known: Mapping[Term, frozenset[str]]) -> frozenset[str]:
@@ -669,38 +677,50 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
     content = material.content
     if rdf.IS_QA_TYPE in content.concluded:
         return
-    model = material.base.model
+    of_groundings = _without_value_in_groundings(material)
+    stated = {str(o) for _, predicate, o in content.triples if predicate == rdf.IS_QA_TYPE}
     measured = material.subject.measured
-    estimated = frozenset().union(*model.estimated.values())
-    valued = {
-        local_name(str(o)) for _, predicate, o in content.triples if predicate == rdf.IS_QA_TYPE
-    }
-    stated = {predicate for _, predicate, _ in content.triples}
-    has_own_values = rdf.HAS_QA_VALUE in content.concluded | stated
     for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
-        for atom, name in _attributes_asked(rule):
-            unmeasured = f"missions do not measure {name}"
-            is_measured = measured is None or name in measured
-            if atom.arguments[0] not in held:
-                if not is_measured and name not in valued:
-                    yield rule, atom, f"{unmeasured}, and no ontology has a value of it", None
-            elif has_own_values or name not in model.attributes:
-                continue
-            elif name not in estimated:
-                problem = f"no function design has an estimate of {name}, so no grounding has a value of it"
-                yield rule, atom, problem, f"add a hasQAestimation of type {name} to a design"
-            elif not is_measured:
-                yield rule, atom, f"{unmeasured}, so no grounding has a value of it", None
+        for atom, attribute in _attributes_asked(rule):
+            name = local_name(attribute)
+            if atom.arguments[0] in held:
+                if name in of_groundings:
+                    yield rule, atom, *of_groundings[name]
+            elif measured is not None and name not in measured and attribute not in stated:
+                problem = f"missions do not measure {name}, and no ontology has a value of it"
+                yield rule, atom, problem, None
+
+
+def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str | None]]:
+    """The quality attributes of which no grounding ever has a value, each with the reason, and what
+    would be right.
+    """
+    content, model = material.content, material.base.model
+    if rdf.HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
+        return {}
+    estimated = frozenset().union(*model.estimated.values())
+    measured = model.attributes if material.subject.measured is None else material.subject.measured
+    found: dict[str, tuple[str, str | None]] = {}
+    for name in model.attributes:
+        if name not in estimated:
+            problem = (
+                f"no function design has an estimate of {name}, so no grounding has a value of it"
+            )
+            found[name] = problem, f"add a hasQAestimation of type {name} to a design"
+        elif name not in measured:
+            problem = f"missions do not measure {name}, so no grounding has a value of it"
+            found[name] = problem, None
+    return found
 
 
 def _attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
-    """The atoms of a rule that name the quality attribute of a value, with its name."""
+    """The atoms of a rule that name the quality attribute of a value, with its IRI."""
     for atom in rule.body:
         if atom.predicate == rdf.IS_QA_TYPE and len(atom.arguments) == 2:
             attribute = atom.arguments[1]
             if isinstance(attribute, Named):
-                yield atom, local_name(attribute.iri)
+                yield atom, attribute.iri
 
 
 def never_fires(material: Material) -> Iterator[Finding]:
@@ -791,14 +811,23 @@ def misspelt_variables(material: Material) -> Iterator[Finding]:
                     places[term.name].append(atom.place(number))
         earlier: list[str] = []
         for name, where in places.items():
-            near = [each for each in places if values[each] & values[name] and are_near(name, each)]
-            # One that occurs more often, else one that occurs before.
-            often = [each for each in near if len(places[each]) > 1]
-            meant = often or [each for each in near if each in earlier]
-            if len(where) == 1 and meant:
-                problem = f"?{name} occurs only here, and is another variable than ?{meant[0]}"
-                yield material.suspicious(rule, where[0], problem, f"did you mean ?{meant[0]}?")
+            if len(where) == 1:
+                near = [each for each in places if values[each] & values[name]]
+                often = [each for each in near if len(places[each]) > 1]
+                # One that occurs more often, else one that occurs before.
+                meant = _near(name, often) or _near(
+                    name, (each for each in earlier if each in near)
+                )
+                if meant is not None:
+                    problem = f"?{name} occurs only here, and is another variable than ?{meant}"
+                    remedy = f"did you mean ?{meant}?"
+                    yield material.suspicious(rule, where[0], problem, remedy)
             earlier.append(name)
+
+
+def _near(name: str, names: Iterable[str]) -> str | None:
+    """The first of some names that one is probably a misspelling of."""
+    return next((each for each in names if are_near(name, each)), None)
 
 
 def are_near(one: str, other: str) -> bool:

@@ -164,6 +164,29 @@ def begin_leg(vehicle: VehicleRecord) -> None:
 
 
 @compiled
+def along_leg(
+    time: float, length: float, quarter: float, jerk: float, top_speed: float
+) -> tuple[float, float]:
+    """Find how far the autopilot's target has moved along a leg since it began, and how fast it is:
+    jerk +, -, -, + for a quarter of the leg's time each.
+    """
+    left = min(time, 4.0 * quarter - time)  # time to the nearer end
+    if left <= 0.0:
+        return length, 0.0
+    if left < quarter:
+        speed = 0.5 * jerk * left * left
+        distance = speed * left / 3.0
+    else:
+        left = 2.0 * quarter - left  # time to the middle
+        slower = 0.5 * (left * left * jerk)
+        speed = top_speed - slower
+        distance = 0.5 * length - left * (top_speed - slower / 3.0)
+    if time > 2.0 * quarter:
+        distance = length - distance
+    return distance, speed
+
+
+@compiled
 def advance(vehicles: Records, track: Array, last: int) -> None:
     """Fly a vehicle up to a row, with one set-point, and no thruster failing.
 
@@ -216,27 +239,14 @@ def advance(vehicles: Records, track: Array, last: int) -> None:
         r21 = 2.0 * (qy * qz + qx * qw)
         r22 = 1.0 - 2.0 * (qx * qx + qy * qy)
 
-        # Guided autopilot. Its target moves along the leg: jerk +, -, -, + for a quarter of the
-        # leg's time each.
+        # Guided autopilot. Its target moves along the leg.
         wx, wy, wz = (
             r00 * u + r01 * v + r02 * w,
             r10 * u + r11 * v + r12 * w,
             r20 * u + r21 * v + r22 * w,
         )
         leg_time += h
-        distance, speed = length, 0.0
-        left = min(leg_time, 4.0 * quarter - leg_time)  # time to the nearer end
-        if left > 0.0:
-            if left < quarter:
-                speed = 0.5 * jerk * left * left
-                distance = speed * left / 3.0
-            else:
-                left = 2.0 * quarter - left  # time to the middle
-                slower = 0.5 * (left * left * jerk)
-                speed = top_speed - slower
-                distance = 0.5 * length - left * (top_speed - slower / 3.0)
-            if leg_time > 2.0 * quarter:
-                distance = length - distance
+        distance, speed = along_leg(leg_time, length, quarter, jerk, top_speed)
         ex, ey, ez = (
             from_x + distance * along_x - x,
             from_y + distance * along_y - y,
