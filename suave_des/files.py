@@ -63,7 +63,7 @@ DECIMALS = 6
 """Digits after the point in result files."""
 LISTED = "files_sha256"
 """Key of a listing of files that the project has written, with their SHA-256, in hex."""
-Content = str | bytes | Iterable[str]
+FileContent = str | bytes | Iterable[str]
 Listing = Callable[[Mapping[str, str]], str]
 _Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None", object)
 
@@ -428,7 +428,7 @@ def _utf8(text: str) -> bytes:
 
 
 def write_files(
-    folder: Path, files: Mapping[str, Content | Listing], *, stale: Collection[str] = ()
+    folder: Path, files: Mapping[str, FileContent | Listing], *, stale: Collection[str] = ()
 ) -> None:
     """Write files under temporary names, and rename them when all are complete.
 
@@ -466,7 +466,7 @@ def write_files(
                 part.unlink(missing_ok=True)
 
 
-def _write(path: Path, content: Content) -> str:
+def _write(path: Path, content: FileContent) -> str:
     """Write a new file, and return its SHA-256, in hex."""
     total = hashlib.sha256()
     path.unlink(missing_ok=True)

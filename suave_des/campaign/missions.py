@@ -31,7 +31,7 @@ from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
 from suave_des.records.metrics import COLUMNS, Row, further_of, row_of
 from suave_des.records.mission_folder import mission_line
-from suave_des.records.store import MissionFailure, MissionKey, Outcome
+from suave_des.records.store import MissionFailure, MissionKey, MissionOutcome
 from suave_des.registry import is_built_in, is_installed
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.tracebacks import place_of
@@ -109,7 +109,7 @@ class Campaign:
         """Columns of runs.csv."""
         return (*COLUMNS, *self.variation.columns, *self.loaded.scenario.further_columns)
 
-    def problem_of(self, outcome: Outcome) -> str:
+    def problem_of(self, outcome: MissionOutcome) -> str:
         """Say why an outcome, which may come from elsewhere, cannot be one of this campaign; empty
         if it can.
         """

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
 from suave_des.estimates import known, mean_of, std_of
-from suave_des.files import Content, csv_pieces, csv_text
+from suave_des.files import FileContent, csv_pieces, csv_text
 from suave_des.records import store
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
-from suave_des.records.store import MissionFailure, MissionKey, Outcome
+from suave_des.records.store import MissionFailure, MissionKey, MissionOutcome
 
 if TYPE_CHECKING:
     import pandas
@@ -53,7 +53,7 @@ class CampaignResult:
     done: int
     failures: tuple[MissionFailure, ...]
     summary: tuple[dict[str, Any], ...]
-    outcomes: Callable[[], Iterator[Outcome]]
+    outcomes: Callable[[], Iterator[MissionOutcome]]
     remarks: tuple[str, ...]
 
     @property
@@ -150,7 +150,7 @@ class CampaignResult:
         about = {"scenario": self.campaign.loaded.scenario.name}
         about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
         columns = (*SUMMARY_COLUMNS, *sweep.parameters)
-        files: dict[str, Content] = {
+        files: dict[str, FileContent] = {
             store.RUNS_FILE: csv_pieces(self.columns, self.stream()),
             store.SUMMARY_FILE: csv_text(columns, [(*row.values(),) for row in self.summary]),
         }
@@ -190,7 +190,7 @@ class CampaignResult:
             if line := row[len(self.columns)]:
                 yield str(line)
 
-    def _suave_files(self) -> Iterator[tuple[str, Content]]:
+    def _suave_files(self) -> Iterator[tuple[str, FileContent]]:
         """Yield name and content of the exemplar's own files, one for each manager, named as its
         runner does.
         """
@@ -215,7 +215,7 @@ class CampaignResult:
 
 
 def gather(
-    campaign: Campaign, outcomes: Callable[[], Iterator[Outcome]], remarks: Iterable[str]
+    campaign: Campaign, outcomes: Callable[[], Iterator[MissionOutcome]], remarks: Iterable[str]
 ) -> CampaignResult:
     """Summarise the outcomes of a campaign's missions, with remarks about managers for users."""
     spec = campaign.spec
@@ -223,7 +223,7 @@ def gather(
     failures: list[MissionFailure] = []
     found: dict[tuple[int, ...], Row] = {}
 
-    def kept(group: Iterable[Outcome]) -> Iterator[tuple[int, Row]]:
+    def kept(group: Iterable[MissionOutcome]) -> Iterator[tuple[int, Row]]:
         for key, outcome in group:
             if isinstance(outcome, MissionFailure):
                 failures.append(outcome)

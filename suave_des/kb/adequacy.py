@@ -273,7 +273,7 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
     offered = _Offered.of(base)
     found = [
         Mutant(operator, rule, new)
-        for operator, changed in OPERATORS.items()
+        for operator, changed in MUTATION_OPERATORS.items()
         for rule in base.content.enabled_rules
         for new in changed(rule, offered)
         if new is None or _is_usable(new, rule, base)
@@ -434,7 +434,7 @@ def _others(value: Lit, known: Iterable[Lit]) -> list[Lit]:
 
 
 #: What each kind of change makes of a rule; None: the rule is removed.
-OPERATORS: Final[Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None]]]] = {
+MUTATION_OPERATORS: Final[Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None]]]] = {
     "comparison turned": _comparison_turned,
     "comparison shifted": _comparison_shifted,
     "atom dropped": _atom_dropped,

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
 
 #: Metrics of missions that are always compared; others are where they differ.
-METRICS: Final = (SEARCH_TIME, DISTANCE)
+COMPARED_METRICS: Final = (SEARCH_TIME, DISTANCE)
 _MANAGER: Final = "metacontrol"
 #: Numbers of missions that are listed.
 _MOST_RUNS: Final = 10
@@ -317,7 +317,7 @@ def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifferen
     others = [str(name) for name in before.select_dtypes("number") if differs[name].any()]
     metrics = []
     for name in dict.fromkeys(
-        (*METRICS, *(each for each in others if not each.startswith(_PLACES)))
+        (*COMPARED_METRICS, *(each for each in others if not each.startswith(_PLACES)))
     ):
         pairs = pandas.DataFrame({"a": before[name], "b": after[name]}, dtype=float).dropna()
         metric = metric_of(name) or Metric(name, name.replace("_", " "))

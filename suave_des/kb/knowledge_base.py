@@ -33,7 +33,7 @@ from suave_des.knowledge.state import (
     ContradictionError,
     Fact,
     KnowledgeState,
-    Number,
+    NumberLike,
     Reasoning,
 )
 from suave_des.resources import DEFAULT_SCENARIO
@@ -193,7 +193,7 @@ class KnowledgeBase:
         self,
         file: str | Path | None = None,
         *,
-        measurements: Mapping[str, Number] | None = None,
+        measurements: Mapping[str, NumberLike] | None = None,
         components: Mapping[str, str] | None = None,
         groundings: Mapping[str, str] | None = None,
         objectives: str | Iterable[str] | Mapping[str, str | None] = (),

@@ -20,7 +20,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.scale import Region, measurements_in, parse_region
+from suave_des.kb.scale import TestedRegion, measurements_in, parse_region
 from suave_des.kb.situations import Decide, Outcome, Situation
 from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_state, state_dict
 from suave_des.knowledge.ontology import Ontology
@@ -28,7 +28,7 @@ from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import Triple, fact_of
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
-from suave_des.records.mission_folder import RecordedMission
+from suave_des.records.mission_folder import RecordedKnowledge
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 from suave_des.scenario.yamlfile import Layer, read_yaml, validated
 
@@ -205,7 +205,7 @@ def _states(
         raise InputError(
             "mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7"
         )
-    regions: dict[str, Region] = {}
+    regions: dict[str, TestedRegion] = {}
     for kind, name, value, _ in given.parts():
         region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
         builder.add(kind, name, value if region is None else 0)
@@ -418,7 +418,7 @@ def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, Any]:
 
 
 def mission_states(
-    mission: RecordedMission, base: Ontology
+    mission: RecordedKnowledge, base: Ontology
 ) -> Iterator[tuple[float, KnowledgeState]]:
     """The states of a recorded mission, each with its time in s, one for each kind that the rules
     can tell apart.
@@ -431,7 +431,7 @@ def mission_states(
     )
 
 
-def mission_knowledge(mission: RecordedMission) -> Tested:
+def mission_knowledge(mission: RecordedKnowledge) -> Tested:
     """The knowledge base of a recorded mission, as a file of tests names it."""
     scenario, knowledge = mission.scenario, mission.scenario.knowledge
     try:

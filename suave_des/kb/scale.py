@@ -111,17 +111,17 @@ def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
 
 #: Measured values that a test is about: all that compare as given with numbers; empty: no
 # measurement.
-Region = tuple[tuple[str, Decimal], ...]
+TestedRegion = tuple[tuple[str, Decimal], ...]
 
 
-def is_in(region: Region, value: Decimal | None) -> bool:
+def is_in(region: TestedRegion, value: Decimal | None) -> bool:
     """Whether a measured value, None for none, is in a region."""
     if value is None or not region:
         return value is None and not region
     return all(OPERATORS[sign](value, number) for sign, number in region)
 
 
-def parse_region(text: str) -> Region | None:
+def parse_region(text: str) -> TestedRegion | None:
     """Read a region as `kb policy` writes it, such as "1.25 <= . < 2.25"; None for what is none,
     such as a number.
 
@@ -140,7 +140,7 @@ def parse_region(text: str) -> Region | None:
     return region
 
 
-def _bounds(text: str) -> Region:
+def _bounds(text: str) -> TestedRegion:
     """Read the comparisons of a region, in which a point stands for the measured value."""
     parts = [part.strip() for part in _SIGN.split(f". {text}" if text[0] in "<>" else text)]
     sides = list(zip(parts[::2], parts[1::2], parts[2::2], strict=False))
@@ -156,7 +156,7 @@ def _bounds(text: str) -> Region:
 
 
 def measurements_in(
-    base: Ontology, regions: Mapping[str, Region]
+    base: Ontology, regions: Mapping[str, TestedRegion]
 ) -> Iterator[tuple[dict[str, Decimal | None], str]]:
     """Measured values in the regions of attributes, one for each kind that comparing rules tell
     apart, with words.

@@ -49,7 +49,7 @@ from suave_des.knowledge.state import UNGROUNDED, Fact, KnowledgeState, Objectiv
 from suave_des.records.mission_folder import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
-    RecordedMission,
+    RecordedKnowledge,
     read_missions,
     read_states,
 )
@@ -444,7 +444,7 @@ def state_dict(state: KnowledgeState) -> dict[str, Any]:
     }
 
 
-def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
+def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedKnowledge]]:
     """Read the missions that recorded their states, with their folders; the run of a mission of its
     own is 0.
 
@@ -461,7 +461,7 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedMission]]:
     for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
         if (each / KNOWLEDGE_FILE).is_file():
             is_any_found = True
-            yield each, RecordedMission("", 0, 0, *read_states(each))
+            yield each, RecordedKnowledge("", 0, 0, *read_states(each))
         if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
             is_any_found = True
             yield from (

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 from suave_des.errors import KnowledgeError, shown
 
 Value = str | bool | Decimal
-Number = Decimal | float | int | str
+NumberLike = Decimal | float | int | str
 #: Status of an objective whose function has no function design in use.
 UNGROUNDED: Final = "UNGROUNDED"
 #: What a record or a table shows in place of a function design where a function has none.
@@ -35,7 +35,7 @@ class ContradictionError(KnowledgeError):
     """A state that contradicts the ontologies, or ontologies that contradict themselves."""
 
 
-def exact(number: Number) -> Decimal:
+def exact(number: NumberLike) -> Decimal:
     """Convert a number to the decimal that the shortest text of a float denotes: 0.1, not
     0.1000000000000000055.
 
@@ -113,7 +113,7 @@ class KnowledgeState:
         *,
         groundings: Mapping[str, str] | None = None,
         components: Mapping[str, str] | None = None,
-        measurements: Mapping[str, Number] | None = None,
+        measurements: Mapping[str, NumberLike] | None = None,
     ) -> KnowledgeState:
         """Make a state from unsorted parts; floats become exact short decimals.
 

@@ -23,7 +23,7 @@ from suave_des.managed.search import GenerateSearchPath, Search
 from suave_des.managed.waypoints import Does, next_tick_s
 from suave_des.vehicle.kernel import VehicleRecord, advance
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
-from suave_des.world.pipeline import Camera, first_detection
+from suave_des.world.pipeline import CameraRecord, first_detection
 
 
 class Ends(IntEnum):
@@ -41,7 +41,7 @@ class FlightRecord(Record):
 
     search: Search
     follow: Follow
-    camera: Camera
+    camera: CameraRecord
     next_tick_s: float  # mission time of the next tick of a function; inf: none ticks
     loses_search: bool  # whether the message that was lost is the search's
 
@@ -124,7 +124,7 @@ class Flight:
     """
 
     def __init__(
-        self, vehicle: Vehicle, camera: Camera, points: Array, visibility: Array, path: Array
+        self, vehicle: Vehicle, camera: CameraRecord, points: Array, visibility: Array, path: Array
     ) -> None:
         self.vehicle = vehicle
         records = _OneRecord()

@@ -31,10 +31,10 @@ GREATEST: Final = 1e12
 """Of numbers, as in scenarios."""
 _Model = TypeVar("_Model", bound=BaseModel)
 
-Number = Annotated[float, Field(ge=-GREATEST, le=GREATEST)]
-Whole = Annotated[int, Field(ge=-GREATEST, le=GREATEST)]
-Count = Annotated[int, Field(ge=0, le=GREATEST)]
-Cell = str | bool | Whole | Number | None
+BoundedNumber = Annotated[float, Field(ge=-GREATEST, le=GREATEST)]
+BoundedWhole = Annotated[int, Field(ge=-GREATEST, le=GREATEST)]
+BoundedCount = Annotated[int, Field(ge=0, le=GREATEST)]
+Cell = str | bool | BoundedWhole | BoundedNumber | None
 """Of a file of results."""
 FileName = InstanceOf[str]
 """Any text, as a name's bytes may be no UTF-8."""
@@ -48,7 +48,7 @@ class Recorded(BaseModel):
 
 # Metrics
 
-_BOUNDED = {float: Number, float | None: Number | None, int: Whole}
+_BOUNDED = {float: BoundedNumber, float | None: BoundedNumber | None, int: BoundedWhole}
 _METRICS: dict[str, Any] = {
     name: _BOUNDED.get(kind, kind) for name, kind in get_type_hints(MissionMetrics).items()
 }
@@ -76,7 +76,8 @@ _OWN_CELLS: TypeAdapter[tuple[Cell, ...]] = TypeAdapter(
 )
 _FURTHER_CELLS: TypeAdapter[list[Cell]] = TypeAdapter(list[Cell], config=Recorded.model_config)
 _FAILURE: TypeAdapter[tuple[str, int, float | None, str, bool, int]] = TypeAdapter(
-    tuple[str, Whole, Number | None, str, bool, Whole], config=Recorded.model_config
+    tuple[str, BoundedWhole, BoundedNumber | None, str, bool, BoundedWhole],
+    config=Recorded.model_config,
 )
 
 
@@ -99,7 +100,7 @@ class MissionFile(Recorded):
     metrics: Metrics
     scenario: Scenario
     inputs_sha256: dict[FileName, str] = {}
-    search_altitudes_m: dict[str, Number] = {}
+    search_altitudes_m: dict[str, BoundedNumber] = {}
     files_sha256: dict[FileName, str] = {}
 
 
@@ -119,7 +120,7 @@ class State(Recorded):
 class Cycle(State):
     """A line of knowledge.jsonl; measured values are text, so that they stay exact."""
 
-    t_s: Number
+    t_s: BoundedNumber
     measurements: dict[str, str]
 
 
@@ -141,11 +142,11 @@ class MissionLine(Recorded):
     """
 
     manager: str
-    point: Count
-    run: Count
+    point: BoundedCount
+    run: BoundedCount
     swept: dict[str, Any]
     states: list[StateOfTable]
-    cycles: list[list[str | int | Number]]
+    cycles: list[list[str | int | BoundedNumber]]
 
     @model_validator(mode="after")
     def _fit(self) -> Self:
@@ -163,15 +164,15 @@ class MissionLine(Recorded):
 # Campaigns
 
 
-class Missions(Recorded):
+class MissionCounts(Recorded):
     """How many missions a campaign has."""
 
-    planned: Count
-    failed: Count
-    left_out: Count
+    planned: BoundedCount
+    failed: BoundedCount
+    left_out: BoundedCount
 
 
-class Sweep(Recorded):
+class RecordedSweep(Recorded):
     """What a sweep varies, by name."""
 
     grid: dict[str, Any] = {}
@@ -186,8 +187,8 @@ class Sweep(Recorded):
 class Manifest(Recorded):
     """manifest.json; all keys may be missing, as in a folder without one."""
 
-    missions: Missions | None = None
-    sweep: Sweep = Sweep()
+    missions: MissionCounts | None = None
+    sweep: RecordedSweep = RecordedSweep()
     perturbations: dict[str, Any] = {}
     runs_per_draw: Annotated[int, Field(ge=1, le=GREATEST)] = 1
     campaign_sha256: str | None = None

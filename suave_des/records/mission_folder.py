@@ -28,7 +28,7 @@ from suave_des.files import (
     FAMILIES,
     LIMIT_BYTES,
     LISTED,
-    Content,
+    FileContent,
     Listing,
     csv_text,
     json_text,
@@ -138,7 +138,7 @@ def provenance(
 
 def mission_files(
     result: MissionResult, loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
-) -> dict[str, Content | Listing]:
+) -> dict[str, FileContent | Listing]:
     """Return the content of each file of a mission's folder by its name, mission.json as a listing
     of the others; `inputs` and `command` as of provenance.
     """
@@ -154,7 +154,7 @@ def mission_files(
         "search_altitudes_m": loaded.modes.search_altitudes_m,
         **provenance(loaded, inputs, command),
     }
-    files: dict[str, Content | Listing] = {
+    files: dict[str, FileContent | Listing] = {
         MISSION_FILE: lambda hashes: json_text({**mission, LISTED: dict(hashes)}),
         EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
         TRAJECTORY_FILE: csv_text((*TRAJECTORY_COLUMNS, *further), points),
@@ -272,7 +272,7 @@ def _numbers_of(path: Path, cells: pandas.Series[str]) -> pandas.Series[float]:
 
 
 @dataclass(frozen=True)
-class RecordedMission:
+class RecordedKnowledge:
     """A mission's knowledge states in order of time, and its scenario, with what is swept as at its
     point.
     """
@@ -358,7 +358,7 @@ def read_knowledge(path: Path) -> tuple[KnowledgeRecord, ...]:
     return tuple(records)
 
 
-def read_missions(path: Path) -> Iterator[RecordedMission]:
+def read_missions(path: Path) -> Iterator[RecordedKnowledge]:
     """Read knowledge_states.jsonl, mission by mission.
 
     Raises:
@@ -374,7 +374,7 @@ def read_missions(path: Path) -> Iterator[RecordedMission]:
         yield mission
 
 
-def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> RecordedMission:
+def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> RecordedKnowledge:
     at_point = json.loads(json.dumps(scenario))
     for key_path, value in recorded.swept.items():
         holder, key = holder_of(at_point, key_path)
@@ -388,7 +388,7 @@ def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> Rec
         state = recorded.states[int(index)]
         measured = dict(zip(state.measured, map(str, values), strict=True))
         records.append(KnowledgeRecord(float(t_s), _state(state, measured)))
-    return RecordedMission(recorded.manager, recorded.point, recorded.run, own, tuple(records))
+    return RecordedKnowledge(recorded.manager, recorded.point, recorded.run, own, tuple(records))
 
 
 class _Line(NamedTuple):

@@ -12,15 +12,14 @@ import pandas
 
 from suave_des.errors import InputError
 from suave_des.files import read_csv, real
-from suave_des.records.contents import Manifest
-from suave_des.records.contents import Missions as ManifestMissions
+from suave_des.records.contents import Manifest, MissionCounts
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
 from suave_des.records.runs import (
     COLUMNS,
     REMEDY,
     SIZE_LIMIT_BYTES,
     TIME_LIMIT,
-    Content,
+    CsvContent,
     check_one_mission,
     is_foreign,
     runs_in,
@@ -148,7 +147,7 @@ def _read_exemplars(folder: Path) -> Missions:
     return Missions(frame, (), (*notes, *_notes(read)))
 
 
-def _checked(file: Path, content: Content, manifest: Manifest) -> Missions:
+def _checked(file: Path, content: CsvContent, manifest: Manifest) -> Missions:
     """Take the missions from the content of a file."""
     runs = runs_in(file, content)
     runs.check_simulated()
@@ -242,7 +241,7 @@ def _sharing_seen(frame: pandas.DataFrame, swept: Sequence[str]) -> int:
     return math.gcd(*(int(run) - 1 for run in changes)) or 1
 
 
-def _unfinished(folder: Path, missions: ManifestMissions | None) -> Iterator[str]:
+def _unfinished(folder: Path, missions: MissionCounts | None) -> Iterator[str]:
     """Say how many missions a campaign lacks."""
     if missions is not None and (missions.left_out or missions.failed):
         yield (

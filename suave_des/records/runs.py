@@ -68,7 +68,7 @@ _GREATEST = 1e12
 REMEDY = "one line for each mission, cells separated by commas"
 """For a file of results that is no CSV."""
 
-Content = tuple[list[str], Iterator[tuple[int, list[str]]], str]
+CsvContent = tuple[list[str], Iterator[tuple[int, list[str]]], str]
 """Of a CSV file: its header, its rows, each with its line, and its SHA-256."""
 _Mission = Mapping[str, Any]
 """A row of runs.csv by column, and with it time_limit_s, stamp, month, position, and the exemplar's
@@ -211,7 +211,7 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     return runs_in(path, read_csv(path, SIZE_LIMIT_BYTES, REMEDY), needed)
 
 
-def runs_in(path: Path, content: Content, needed: Sequence[str] = ()) -> Runs:
+def runs_in(path: Path, content: CsvContent, needed: Sequence[str] = ()) -> Runs:
     """Take the missions from the content of a file; see read_runs."""
     header, numbered, digest = content
     layout = _layout_of(path, header, needed)
@@ -256,7 +256,7 @@ def _layout_of(path: Path, header: Sequence[str], needed: Sequence[str]) -> Mapp
     return layout
 
 
-def is_foreign(content: Content) -> bool:
+def is_foreign(content: CsvContent) -> bool:
     """Return whether a file has none of the columns that name a manager."""
     return not {layout["manager"] for layout in _LAYOUTS} & set(content[0])
 

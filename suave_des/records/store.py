@@ -23,7 +23,7 @@ from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.files import (
     DERIVED,
     LISTED,
-    Content,
+    FileContent,
     Listing,
     check_own,
     json_text,
@@ -101,7 +101,7 @@ class MissionFailure(NamedTuple):
         return str(MissionError(self.manager, self.run, self.time_s, self.cause))
 
 
-Outcome = tuple[MissionKey, Row | MissionFailure]
+MissionOutcome = tuple[MissionKey, Row | MissionFailure]
 
 
 class StoreError(SuaveDesError):
@@ -233,7 +233,7 @@ class Store:
 
     # Outcomes.
 
-    def append(self, outcomes: Iterable[Outcome]) -> None:
+    def append(self, outcomes: Iterable[MissionOutcome]) -> None:
         """Keep outcomes; they are safe after _COMMIT_PERIOD_S at the latest, if more are appended,
         or after commit().
 
@@ -275,7 +275,7 @@ class Store:
         with self.reading():
             return int(self._db.execute("SELECT count(*) FROM outcomes").fetchone()[0])
 
-    def outcomes(self, problem_of: Callable[[Outcome], str]) -> Iterator[Outcome]:
+    def outcomes(self, problem_of: Callable[[MissionOutcome], str]) -> Iterator[MissionOutcome]:
         """Yield all outcomes in the order of their keys, read as they are requested; also of a
         store that is closed.
 
@@ -286,7 +286,7 @@ class Store:
             InputError: the store is damaged.
         """
 
-        def checked(records: Iterable[Any]) -> Iterator[Outcome]:
+        def checked(records: Iterable[Any]) -> Iterator[MissionOutcome]:
             for record in records:
                 outcome = _outcome(record, self.path)
                 if problem := problem_of(outcome):
@@ -458,7 +458,7 @@ def _note(name: str, value: Any) -> tuple[str, str, int]:
     return name, text, _crc(name, text)
 
 
-def _record(outcome: Outcome) -> tuple[int, int, int, int, str, int]:
+def _record(outcome: MissionOutcome) -> tuple[int, int, int, int, str, int]:
     key, found = outcome
     kind = _ROW
     if isinstance(found, MissionFailure):
@@ -467,7 +467,7 @@ def _record(outcome: Outcome) -> tuple[int, int, int, int, str, int]:
     return (*key, kind, content, _crc(*key, kind, content))
 
 
-def _outcome(record: tuple[int, int, int, int, str, int], path: Path | None) -> Outcome:
+def _outcome(record: tuple[int, int, int, int, str, int], path: Path | None) -> MissionOutcome:
     *numbers, kind, content, crc = record
     key = MissionKey(*map(int, numbers))
     if _crc(*key, kind, content) != crc:
@@ -488,8 +488,8 @@ def _crc(*parts: object) -> int:
 def write_campaign(
     folder: Path,
     about: Mapping[str, Any],
-    files: Mapping[str, Content],
-    suave: Mapping[str, Content],
+    files: Mapping[str, FileContent],
+    suave: Mapping[str, FileContent],
 ) -> None:
     """Write a campaign's manifest, which lists all others, and its files, of those in FILES, into
     its folder, replacing those of an earlier campaign.
@@ -509,7 +509,7 @@ def write_campaign(
     def manifest(hashes: Mapping[str, str]) -> str:
         return json_text({**about, LISTED: {**derived, **hashes}})
 
-    all_files: dict[str, Content | Listing] = {
+    all_files: dict[str, FileContent | Listing] = {
         **files,
         **{f"{SUAVE_FOLDER}/{name}": content for name, content in suave.items()},
         MANIFEST_FILE: manifest,

@@ -112,9 +112,9 @@ def import_config(
     values = _values(given.parameters, revision, plain, notes)
     values |= _battery_constraint(experiments, notes)
     if plain.scenario.revision.name != revision:
-        values["revision"] = Value(revision, why)
+        values["revision"] = SourcedValue(revision, why)
     if given.modes is not None:
-        values["modes_file"] = Value(str(given.modes.path.resolve()), "as it is")
+        values["modes_file"] = SourcedValue(str(given.modes.path.resolve()), "as it is")
     loaded = load_scenario(base, over=_layer(values, plain.path))
 
     text = None
@@ -131,7 +131,7 @@ def import_config(
             content |= _campaign(runner, requested, loaded, runner_seed, notes)
             text = _text(given.documents, content, ())
     if given.modes is not None:
-        values["modes_file"] = Value(_relative(given.modes.path, out), "as it is")
+        values["modes_file"] = SourcedValue(_relative(given.modes.path, out), "as it is")
     scenario = _text(given.documents, {("base",): (base, why), **_entries(values)}, notes)
     return Imported(loaded, base, why, scenario, text, tuple(notes))
 
@@ -224,7 +224,7 @@ class Parameter:
 
 
 @dataclass
-class Given:
+class GivenFiles:
     """What is in the files.
 
     Attributes:
@@ -243,10 +243,10 @@ class Given:
         return found | {word for each in experiments for word in each.launch.split()[2:3]}
 
 
-def _given(files: Sequence[Path | Layer], notes: list[str]) -> Given:
+def _given(files: Sequence[Path | Layer], notes: list[str]) -> GivenFiles:
     """Read the files; notes about what is not known in them."""
     documents = [each if isinstance(each, Layer) else read_yaml(each) for each in files]
-    given = Given(documents)
+    given = GivenFiles(documents)
     for document in documents:
         if not _has_modes(document):
             given.parameters += _parameters(document, notes)
@@ -395,7 +395,7 @@ def _from_start(events: Any) -> Any:
 # The scenario's values.
 
 
-class Value(NamedTuple):
+class SourcedValue(NamedTuple):
     """A value of the scenario, where it comes from, and its parameter; None: it is a default."""
 
     value: Any
@@ -464,7 +464,7 @@ class Reading(NamedTuple):
 
 def _values(
     parameters: Sequence[Parameter], revision: str, base: LoadedScenario, notes: list[str]
-) -> dict[str, Value]:
+) -> dict[str, SourcedValue]:
     """Return the values that a mission has, by key path; notes about others.
 
     Raises:
@@ -474,7 +474,7 @@ def _values(
     given = _counted(_needed(parameters, reading, notes), notes)
     given = _with_wave(given, parameters, reading, notes)
     values = {
-        path: Value(
+        path: SourcedValue(
             _from_start(each.value) if path == _EVENTS else each.value,
             f"{each.source}: {each.keys}",
             each,
@@ -583,18 +583,18 @@ def _check_wave(
 
 def _defaults(
     reading: Reading, given: Collection[str], base: LoadedScenario, notes: list[str]
-) -> dict[str, Value]:
+) -> dict[str, SourcedValue]:
     """Return the defaults of the exemplar's nodes that differ from the base's values; a note about
     all that are not given.
     """
     omitted = dict[str, list[str]]()
-    values = dict[str, Value]()
+    values = dict[str, SourcedValue]()
     for key in reading.defaults():
         if key.path in given:
             continue
         omitted.setdefault(key.node, []).append(key.name)
         if at(base, key.path) != key.default:
-            values[key.path] = Value(key.default, f"default of {key.node}.{key.name}")
+            values[key.path] = SourcedValue(key.default, f"default of {key.node}.{key.name}")
     if omitted:
         listed = "; ".join(f"{node}: {', '.join(names)}" for node, names in omitted.items())
         notes.append(f"not in the files, so at the defaults of the exemplar's nodes: {listed}")
@@ -602,15 +602,15 @@ def _defaults(
 
 
 def _with_cosine(
-    values: Mapping[str, Value], reading: Reading, base: LoadedScenario, notes: list[str]
-) -> dict[str, Value]:
+    values: Mapping[str, SourcedValue], reading: Reading, base: LoadedScenario, notes: list[str]
+) -> dict[str, SourcedValue]:
     """Make the visibility the cosine that the exemplar's observer publishes; without a mission, it
     stays the base's, whatever it is.
     """
     if base.scenario.signals[WATER_VISIBILITY].kind == "sinusoid":
         return dict(values)
     if reading.has_mission:
-        kind = Value("sinusoid", "as water_visibility_observer_node has it")
+        kind = SourcedValue("sinusoid", "as water_visibility_observer_node has it")
         return {f"{_VISIBILITY}kind": kind, **values}
     ignored = {path: each for path, each in values.items() if path.startswith(_VISIBILITY)}
     given = [each.parameter for each in ignored.values() if each.parameter is not None]
@@ -626,7 +626,7 @@ def at(loaded: LoadedScenario, path: str) -> Any:
         return None
 
 
-def _layer(values: Mapping[str, Value], base: Path) -> Layer:
+def _layer(values: Mapping[str, SourcedValue], base: Path) -> Layer:
     """The values as the content of a scenario, each with its place in the user's files."""
     data: dict[str, Any] = {}
     places: dict[KeyPath, Location] = {(): Location(0, 1, base)}
@@ -644,7 +644,7 @@ def _layer(values: Mapping[str, Value], base: Path) -> Layer:
     return Layer(data, places)
 
 
-def _entries(values: Mapping[str, Value]) -> Entries:
+def _entries(values: Mapping[str, SourcedValue]) -> Entries:
     """The values as lines of a scenario file, in the order of its keys."""
     order = list(Scenario.model_fields)
     paths = sorted(values, key=lambda path: (order.index(path.split(".")[0]), path.split(".")[:-1]))
@@ -785,7 +785,9 @@ def _level(place: str, arguments: Mapping[str, str], notes: list[str]) -> float 
         return None
 
 
-def _battery_constraint(experiments: Sequence[Experiment], notes: list[str]) -> dict[str, Value]:
+def _battery_constraint(
+    experiments: Sequence[Experiment], notes: list[str]
+) -> dict[str, SourcedValue]:
     """The level below which missions are aborted; a campaign has one for all managers."""
     levels = {each.level for each in experiments}
     if len(levels) > 1:
@@ -799,7 +801,7 @@ def _battery_constraint(experiments: Sequence[Experiment], notes: list[str]) -> 
     level = next(iter(levels), None)
     if level is None or level == 0.0:  # no level is below 0
         return {}
-    return {"battery.mission_ends_at_level": Value(level, "battery_constraint_value")}
+    return {"battery.mission_ends_at_level": SourcedValue(level, "battery_constraint_value")}
 
 
 Entries = dict[tuple[str, ...], tuple[Any, str]]

@@ -1089,7 +1089,7 @@ FurtherMetric = Literal[
     "surfacing_time_s",
 ]
 FURTHER_METRICS: tuple[str, ...] = get_args(FurtherMetric)
-Metric = (
+MetricName = (
     FurtherMetric
     | Literal[
         "mission_duration_s",
@@ -1110,7 +1110,7 @@ class Requirement(Strict):
     Where it is off by d, it is 1 - d / tolerance, at least 0, or exp(-d / tolerance).
     """
 
-    metric: Metric | None = None
+    metric: MetricName | None = None
     """A metric."""
     attribute: str | None = None
     """Instead, a measured quality attribute; satisfaction is the mean over time."""

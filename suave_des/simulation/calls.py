@@ -108,7 +108,7 @@ def _regions_at(
     return tuple(regions), until_s
 
 
-class Adaptation:
+class AdaptationCall:
     """A call of `adapt` that takes mission time: it goes on at each event that it yields.
 
     A SimPy process would do the same with two events more.

@@ -13,7 +13,7 @@ from suave_des.hooks import dependencies_of, measured_somewhere, names_in, times
 from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.simulation.calls import RAISED, Adaptation, CallTimes
+from suave_des.simulation.calls import RAISED, AdaptationCall, CallTimes
 
 _T = TypeVar("_T")
 _MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
@@ -129,7 +129,7 @@ class ManagerHost:
             times.go_on(modes.requests > requests, True)
         elif isinstance(adaptation, Generator):
             over = partial(self._adapted, times, self.system.env.now)
-            Adaptation(self.system.env, adaptation, over, self.error_of).resume()
+            AdaptationCall(self.system.env, adaptation, over, self.error_of).resume()
         else:
             raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
 

@@ -21,10 +21,10 @@ from suave_des.managed.follow import there_and_back
 from suave_des.registry import custom_functions, declared_files, manager_class
 from suave_des.scenario.loader import LoadedScenario, value_at
 from suave_des.scenario.models import Calibration, CurrentWaveDescription, VehicleDescription
-from suave_des.vehicle.kernel import COLUMNS
+from suave_des.vehicle.kernel import TRACK_COLUMNS
 from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
 from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle, track_rows
-from suave_des.world.pipeline import Camera, sample_points
+from suave_des.world.pipeline import CameraRecord, sample_points
 
 if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
     from suave_des.knowledge.reasoner import Reasoner
@@ -65,7 +65,9 @@ class PreparedScenario:
             [0.0, 0.0, scenario.revision.monitors.detected_point_height_m]
         )
         self.detected_points, self.view_tangent = detected, scenario.vehicle.camera.tangent
-        self.camera = Camera(True, self.view_tangent, *detected.min(axis=0), *detected.max(axis=0))
+        self.camera = CameraRecord(
+            True, self.view_tangent, *detected.min(axis=0), *detected.max(axis=0)
+        )
         self.duration_s = (
             scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         )
@@ -141,7 +143,7 @@ class PreparedScenario:
         return (
             self._spare_tracks.pop()
             if self._spare_tracks
-            else np.empty((track_rows(self.duration_s), COLUMNS))
+            else np.empty((track_rows(self.duration_s), TRACK_COLUMNS))
         )
 
     def give_back(self, track: Array) -> None:

@@ -14,7 +14,7 @@ from suave_des.compiling import Array, Record, Records, compiled, record
 # Columns of the track: the pose at each row; the world frame has x east, y north, z up.
 POSITION = slice(0, 3)  # p, world frame, m
 
-COLUMNS = 7
+TRACK_COLUMNS = 7
 
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to

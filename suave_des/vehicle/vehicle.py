@@ -77,7 +77,7 @@ class Vehicle:
     def __post_init__(self, memory: Array | None) -> None:
         start, rows = self.start, track_rows(self.duration_s)
         self.last_row = rows - 1
-        self.track: Array = np.empty((rows, kernel.COLUMNS)) if memory is None else memory
+        self.track: Array = np.empty((rows, kernel.TRACK_COLUMNS)) if memory is None else memory
         self.thrusters = ["works"] * len(self.model.thrusters)
         both = _TwoRecords()
         self.records, self.state = shared(both), both[0]
@@ -173,7 +173,7 @@ class Vehicle:
 
 
 def track_rows(duration_s: float) -> int:
-    """Count the rows of a mission's track; each has `kernel.COLUMNS` columns."""
+    """Count the rows of a mission's track; each has `kernel.TRACK_COLUMNS` columns."""
     return row_at(duration_s) + 2
 
 

@@ -49,7 +49,7 @@ def first_point_in_view(
 
 
 @record
-class Camera(Record):
+class CameraRecord(Record):
     """What the camera looks for, and how far it has looked.
 
     The bounds are the least and the greatest coordinates of the points as the detection places
@@ -71,7 +71,7 @@ class Camera(Record):
 
 @compiled
 def first_detection(
-    camera: Camera, track: Array, last: int, row_s: float, visibility: Array, points: Array
+    camera: CameraRecord, track: Array, last: int, row_s: float, visibility: Array, points: Array
 ) -> bool:
     """Look from the rows of a track up to `last` for a point; stop at the first row from which one
     is seen.

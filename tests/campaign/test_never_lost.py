@@ -13,7 +13,7 @@ from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.errors import InputError
 from suave_des.records import store as stores
-from suave_des.records.store import STORE_FILE, Outcome, Store, StoreError
+from suave_des.records.store import STORE_FILE, MissionOutcome, Store, StoreError
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD
 from tests.helpers.command import has_size, python, wait_until
@@ -80,7 +80,9 @@ def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(
 
     outcomes = Store.outcomes
 
-    def ctrl_c(store: Store, problem_of: Callable[[Outcome], str]) -> Iterator[Outcome]:
+    def ctrl_c(
+        store: Store, problem_of: Callable[[MissionOutcome], str]
+    ) -> Iterator[MissionOutcome]:
         monkeypatch.undo()
         yield next(outcomes(store, problem_of))
         raise KeyboardInterrupt

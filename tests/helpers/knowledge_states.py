@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from suave_des.knowledge.state import KnowledgeState, Number, ObjectiveState
+from suave_des.knowledge.state import KnowledgeState, NumberLike, ObjectiveState
 
 MOTION = "f_maintain_motion"
 SEARCH = "f_generate_search_path"
@@ -13,7 +13,7 @@ FOLLOW = "f_follow_pipeline"
 
 def searching(
     design: str | None = None,
-    visibility: Number | None = None,
+    visibility: NumberLike | None = None,
     *,
     status: str | None = None,
     motion: str | None = None,

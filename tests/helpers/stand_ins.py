@@ -18,11 +18,11 @@ from suave_des.scenario.modes import Mode
 from suave_des.simulation.prepared import vehicle_model
 from suave_des.vehicle.model import GRAVITY_M_PER_S2, Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
-from suave_des.world.pipeline import Camera
+from suave_des.world.pipeline import CameraRecord
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
-NOTHING_TO_SEE = Camera(), np.empty((0, 3)), np.empty((2, 0))
+NOTHING_TO_SEE = CameraRecord(), np.empty((0, 3)), np.empty((2, 0))
 
 
 class PlacedVehicle:

@@ -10,7 +10,7 @@ import pandas
 import pytest
 
 from suave_des.kb.difference import (
-    METRICS,
+    COMPARED_METRICS,
     PolicyDifference,
     compare_axioms,
     compare_decisions,
@@ -109,8 +109,12 @@ def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):
 
 
 def test_the_difference_of_missions_is_the_second_less_the_first():
-    before = pandas.DataFrame({name: [100.0, 120.0, 90.0] for name in METRICS}, index=[1, 2, 3])
-    after = pandas.DataFrame({name: [104.0, 126.0, 90.0] for name in METRICS}, index=[1, 2, 3])
+    before = pandas.DataFrame(
+        {name: [100.0, 120.0, 90.0] for name in COMPARED_METRICS}, index=[1, 2, 3]
+    )
+    after = pandas.DataFrame(
+        {name: [104.0, 126.0, 90.0] for name in COMPARED_METRICS}, index=[1, 2, 3]
+    )
     found = paired(before, after)
     assert found.missions == 3 and found.changed == (1, 2)
     for _, pairs, difference, changed in found.metrics:
@@ -124,7 +128,7 @@ def test_the_difference_of_missions_is_the_second_less_the_first():
 def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_missions():
     before = pandas.DataFrame(
         {
-            **{name: [1.0, 1.0] for name in METRICS},
+            **{name: [1.0, 1.0] for name in COMPARED_METRICS},
             "mean_reaction_time_s": [2.0, nan],
             "adaptations": [3, 4],
         },
@@ -132,13 +136,19 @@ def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_mis
     )
     after = before.assign(mean_reaction_time_s=[2.5, 3.0])
     found = paired(before, after)
-    assert [metric.name for metric, *_ in found.metrics] == [*METRICS, "mean_reaction_time_s"]
+    assert [metric.name for metric, *_ in found.metrics] == [
+        *COMPARED_METRICS,
+        "mean_reaction_time_s",
+    ]
     assert (found.metrics[2][2].value, found.metrics[2][3]) == (0.5, 2)
 
 
 def test_what_is_unknown_with_both_knowledge_bases_does_not_differ():
     before = pandas.DataFrame(
-        {**{name: [1.0] * 4 for name in METRICS}, "mean_reaction_time_s": [nan, 2.0, nan, 2.0]},
+        {
+            **{name: [1.0] * 4 for name in COMPARED_METRICS},
+            "mean_reaction_time_s": [nan, 2.0, nan, 2.0],
+        },
         index=[1, 2, 3, 4],
     )
     after = before.assign(mean_reaction_time_s=[nan, nan, 2.0, 2.0])

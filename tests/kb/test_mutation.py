@@ -271,7 +271,9 @@ def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_p
 def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge):
     found = mutants_of(knowledge.base)
     # They have no numbers.
-    assert {mutant.operator for mutant in found} == set(adequacy.OPERATORS) - {"threshold moved"}
+    assert {mutant.operator for mutant in found} == set(adequacy.MUTATION_OPERATORS) - {
+        "threshold moved"
+    }
     assert len(sample(found, 10)) == 10
     assert [str(each) for each in mutants_of(Ontology.load())] == [str(each) for each in found]
 
@@ -282,7 +284,7 @@ def test_a_sample_is_spread_over_all_mutants():
 
 
 @pytest.mark.parametrize(
-    "operator", [each for each in adequacy.OPERATORS if each != "threshold moved"]
+    "operator", [each for each in adequacy.MUTATION_OPERATORS if each != "threshold moved"]
 )
 def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge, operator):
     mutant = next(each for each in mutants_of(knowledge.base) if each.operator == operator)

@@ -15,7 +15,7 @@ from suave_des.managed.flight import Flight
 from suave_des.scenario.models import Pipeline
 from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
-from suave_des.world.pipeline import Camera, first_point_in_view, sample_points
+from suave_des.world.pipeline import CameraRecord, first_point_in_view, sample_points
 from tests.helpers.stand_ins import BLUEROV2, VIEW_TANGENT
 
 POINTS = sample_points(Pipeline().vertices_m)
@@ -40,7 +40,7 @@ class Sight:
         self.detector = PipelineDetector(
             self.env, lambda source, event, detail: self.logged.append((self.env.now, event))
         )
-        camera = Camera(True, VIEW_TANGENT, *POINTS.min(axis=0), *POINTS.max(axis=0))
+        camera = CameraRecord(True, VIEW_TANGENT, *POINTS.min(axis=0), *POINTS.max(axis=0))
         always = np.array([[0.0], [visibility_m]])
         flight = Flight(self.vehicle, camera, POINTS, always, np.empty((0, 3)))
         self.env.fly_to = flight.fly_to

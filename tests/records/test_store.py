@@ -22,7 +22,7 @@ from suave_des.records.store import (
     SUAVE_FOLDER,
     MissionFailure,
     MissionKey,
-    Outcome,
+    MissionOutcome,
     Store,
     StoreError,
     has_campaign,
@@ -48,7 +48,7 @@ def store(tmp_path: Path):
         yield opened
 
 
-def kept(store: Store) -> list[Outcome]:
+def kept(store: Store) -> list[MissionOutcome]:
     """All outcomes of a store, whatever campaign they are of."""
     return list(store.outcomes(lambda outcome: ""))
 

@@ -7,7 +7,12 @@ import pytest
 
 from suave_des.compiling import shared
 from suave_des.scenario.models import Pipeline
-from suave_des.world.pipeline import Camera, first_detection, first_point_in_view, sample_points
+from suave_des.world.pipeline import (
+    CameraRecord,
+    first_detection,
+    first_point_in_view,
+    sample_points,
+)
 from suave_des.world.signals import sinusoid, step, table
 
 POINTS = sample_points(Pipeline().vertices_m)
@@ -75,8 +80,8 @@ def line_of_positions(y_m: float) -> np.ndarray:
 
 def detected(track: np.ndarray, times_s: list[float], visibility_m: list[float]) -> tuple[int, int]:
     """The first row with a point in view, and the point."""
-    camera = Camera(True, HALF_WIDTH_AT_1_M, *POINTS.min(axis=0), *POINTS.max(axis=0))
-    cameras = shared((Camera * 1)(camera))
+    camera = CameraRecord(True, HALF_WIDTH_AT_1_M, *POINTS.min(axis=0), *POINTS.max(axis=0))
+    cameras = shared((CameraRecord * 1)(camera))
     visibility = np.array([times_s, visibility_m])
     last = len(track) - 1
     assert first_detection(cameras[0], track, last, 1.0, visibility, POINTS)
