@@ -105,7 +105,7 @@ def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
 
 
 def until(env: simpy.Environment, t_s: float) -> simpy.Event:
-    """An event at mission time t, or now if t has passed: `env.timeout` in half its time."""
+    """An event at mission time t, or now if t has passed: as `env.timeout` makes it, twice as fast."""
     now_s = env._now
     delay_s = t_s - now_s
     return exactly_at(env, now_s if delay_s <= 0.0 else now_s + delay_s)

@@ -145,11 +145,11 @@ class MissionCoordinator:
         self._finish("time limit")
 
     def watch_battery(self, battery: BatteryMeasurements, least_level: float) -> Process:
-        """End the mission at the first measurement of the battery that is at or below a level."""
+        """End the mission at the first published level of the battery that is at or below one."""
         yield until(self.env, battery.timing.phase_s)
-        while battery.level(self.env.now) > least_level:
+        while (level := battery.value(self.env.now)) is None or level > least_level:
             yield self.env.timeout(battery.timing.period_s)
-        self._finish(f"the battery is down to {battery.level(self.env.now):.2f}")
+        self._finish(f"the battery is down to {level:.2f}")
 
     def _next_poll(self) -> simpy.Event:
         return until(

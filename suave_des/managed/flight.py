@@ -47,6 +47,8 @@ class FlightRecord(Record):
 
 
 _OneRecord = FlightRecord * 1
+_BEFORE = 1
+"""Place of the vehicle's copy among the records: as it was before the last rows."""
 
 
 @compiled
@@ -80,11 +82,13 @@ def fly(
         row = min(int(np.rint(min(flight.next_tick_s, until_s) / STEP_S)), last_row)
         if row > vehicle.row:
             if camera.is_open:
-                vehicles[1] = vehicle
+                vehicles[_BEFORE] = vehicle
             advance(vehicles, track, row)
         if first_detection(camera, track, vehicle.row, STEP_S, visibility, points):
-            if camera.next_row < vehicle.row:  # control may change at the first sight
-                vehicles[0] = vehicles[1]
+            if (
+                camera.next_row < vehicle.row
+            ):  # control may change at the first sight: it is flown to
+                vehicles[0] = vehicles[_BEFORE]
             return Ends.SIGHT.value
         if flight.next_tick_s > until_s:
             return Ends.THERE.value
@@ -142,7 +146,7 @@ class Flight:
 
     def fly_to(self, t_s: float) -> None:
         """Fly to mission time t; what ends the flight earlier becomes an event."""
-        while ends := self._fly(t_s):
+        while (ends := self._fly(t_s)) != Ends.THERE:
             if ends == Ends.SIGHT:
                 camera = self.state.camera
                 seen_s = camera.next_row * STEP_S

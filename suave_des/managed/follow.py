@@ -55,7 +55,8 @@ class Follow(Record):
 def tick(follow: Follow, track: Array, row: int, path: Array) -> int:
     """Look whether the next point is reached, or has to be sent again; return what the node does.
 
-    A point that has been sent is looked for at the same poll: several may be reached at once.
+    A point that has been sent is looked for at the same poll: several may be reached at once. So
+    the timer goes on only where the next point is not reached.
     """
     timer: Timer = follow.timer
     to, acceptance_m = follow.next_point, follow.acceptance_m

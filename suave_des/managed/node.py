@@ -82,7 +82,8 @@ class ProcessNode(FunctionNode):
 
 @dataclass(eq=False)
 class SetPointSender:
-    """A node's connection to the autopilot.
+    """A node's connection to the autopilot. The functions that fly along way-points send theirs
+    while the vehicle is flown: `waypoints.send`.
 
     Attributes:
         vehicle: the vehicle whose autopilot receives the set-points.
@@ -110,18 +111,12 @@ class SetPointSender:
         """
         if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
             raise ValueError(f"the set-point ({x_m}, {y_m}, {z_m}) is not finite")
-        if not self.is_lost():
-            x_error_m, y_error_m, z_error_m = self.frame_error_m
-            self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
-
-    def is_lost(self) -> bool:
-        """Say whether the next message is lost, which counts as sent then."""
-        is_lost = self.messages_before_loss == 0
-        if is_lost:
+        if self.messages_before_loss == 0:
             self.messages_before_loss = self.draw_messages_before_loss()
         else:
             self.messages_before_loss -= 1
-        return is_lost
+            x_error_m, y_error_m, z_error_m = self.frame_error_m
+            self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
 
     def draw_messages_before_loss(self) -> float:
         """Draw the number of messages that arrive before one is lost, from the geometric

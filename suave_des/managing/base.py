@@ -176,12 +176,13 @@ class ManagingSubsystem:
             of them takes time. Pose and distance come once a second, to those who name their kinds.
 
     A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends only on what
-    its hooks were called with, and on how measured values compare with fixed thresholds, is
-    event-triggered, and declares it by `depends_on`. After a call of `adapt` that returned None, or
-    a generator that returned True (a call right then would change nothing), the next call is at the
-    first of its times after a hook was called, or a measured value has crossed a threshold: fewer
-    calls, the same mission (but for an event at the very time of a call, which may come before it;
-    and if a call that changes nothing takes time, in which something happens).
+    its hooks were called with, and on how measured values compare with fixed thresholds, may be
+    event-triggered, and declares it by `depends_on`. It is not called at all of its times: after a
+    call of `adapt` that returned None, or a generator that returned True (another call right then
+    would change nothing), the next one is at the first of its times after a hook was called, or a
+    measured value has crossed a threshold. The mission is the same, with two exceptions: an event
+    at the very time of a call may come before it; and something may happen during a call that
+    changes nothing but takes time.
 
     Example:
         >>> class HighInClearWater(ManagingSubsystem):

@@ -131,7 +131,9 @@ class Metacontrol(ManagingSubsystem):
                     self.measurements[attribute] = value
 
     def analyze(self) -> Inference:
-        """Infer what the rules say about the current state."""
+        """Infer what the rules say about the current state: which function designs cannot be
+        realised (`c_status` FALSE), which groundings are in error, which objectives may change.
+        """
         improves = self._revision.always_improve
         objectives = [
             ObjectiveState(name, status, name in improves)
@@ -165,7 +167,7 @@ class Metacontrol(ManagingSubsystem):
         if not grounded.items() <= self.groundings.items():
             self.reasoning_time_s += latency_s
         self.groundings |= grounded
-        self.objectives |= dict.fromkeys(grounded)
+        self.objectives |= dict.fromkeys(grounded, None)  # they are met
         # From now on a recovered component counts as never failed. Otherwise its status would make
         # every objective updatable for ever, and in the exemplar's oldest files contradict the
         # status UNGROUNDED of later objectives.
@@ -260,7 +262,8 @@ class Metacontrol(ManagingSubsystem):
         functions.
 
         So a search goes on although its task is over, and disturbs what follows. Cycles that change
-        nothing are left out (see `depends_on`), so the plan is made here.
+        nothing are left out (see `depends_on`), so the plan is made here; what has changed
+        since the cycle began counts as well.
         """
         env, passed_s = self.system.env, self.system.now_s - self.starts_s
         began_s = self.starts_s + passed_s // self.period_s * self.period_s
@@ -335,8 +338,9 @@ class Metacontrol(ManagingSubsystem):
         current_mode = self.system.modes.current_mode
         for decision in reasoning.plan.decisions:
             function, design = decision.function, decision.design
-            now = self.groundings.get(function), self.objectives[function], current_mode(function)
-            if design is not None and now != (design, None, design):
+            is_met = self.objectives[function] is None
+            in_use = self.groundings.get(function), current_mode(function)
+            if design is not None and not (is_met and in_use == (design, design)):
                 return False
         return reasoning.plan.without_design == self._without_design
 

@@ -118,7 +118,6 @@ class FurtherMetrics:
     def _area_covered_m2(self, now_s: float) -> float:
         vehicle = self.thrusters.vehicle
         visibility = self.measurements[WATER_VISIBILITY]
-        vehicle.position(now_s)  # fills the track until now
         visibility_m = measured_at_rows(visibility.times_s, visibility.values, len(vehicle.track))
         tangent = self.scenario.vehicle.camera.tangent
         return covered_area_m2(vehicle.track, row_at(now_s), visibility_m, SEA_BED_Z_M, tangent)

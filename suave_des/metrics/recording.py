@@ -102,7 +102,6 @@ class Recorder:
         """
         if not self.enabled:
             return ()
-        vehicle.position(self.env.now)  # fills the track until now
         rows = int(self.env.now / STEP_S) + 1
         return Trajectory(
             poses=vehicle.track[:rows:TRAJECTORY_PERIOD_ROWS],

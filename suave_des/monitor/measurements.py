@@ -184,7 +184,9 @@ class Measurements:
 
     def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
         """Publish the values at their times, from now on."""
-        t_s = env.now or -math.inf
+        t_s = env.now
+        if t_s == 0.0:
+            t_s = -math.inf  # the value of the mission's start is still to be published
         while (published := self.count_until(t_s)) < len(self.times_s):
             t_s = self.times_s[published]
             yield exactly_at(env, t_s)

@@ -638,7 +638,7 @@ class Battery(Monitor):
     approach_altitude_m: Length = 1.25
     """Altitude at which the station is approached."""
     mission_ends_at_level: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    """Level at which the mission ends."""
+    """Published level at which the mission ends."""
     docking_check_period_s: Period = 5.0
     """Period at which the station is sent again."""
 

@@ -1,4 +1,8 @@
-"""A vehicle in mission time: it is commanded and disturbed, and flown up to the time that is read."""
+"""A vehicle in mission time: it is commanded and disturbed, and flown.
+
+In a mission `managed.flight` flies it to each event. One that stands alone is flown up to the time
+that is read.
+"""
 
 import ctypes
 import math
@@ -22,7 +26,7 @@ from suave_des.vehicle.model import (
 STEP_S = 0.05
 Point = tuple[float, float, float]
 ThrusterState = Literal["works", "frozen", "dead"]
-"""A frozen thruster keeps the thrust that it had when it failed; a dead one gives none."""
+"""A frozen thruster keeps the thrust of the step in which it fails; a dead one gives none."""
 
 
 _TwoRecords = VehicleRecord * 2
@@ -132,7 +136,10 @@ class Vehicle:
             raise ValueError(f"control cannot change at {t_s:g} s: it is flown up to {flown_s:g} s")
 
     def _next_thrust_n(self, thruster: int) -> float:
-        """Find what a thruster gives in the next step, or gave in the mission's last one."""
+        """Find what a thruster gives in the next step, or gave in the mission's last one.
+
+        A copy flies that step; the row that it fills is flown anew by the vehicle itself.
+        """
         copy = _TwoRecords()
         copy[0] = self.state  # numpy needs 30 times as long for it
         row = self.state.row

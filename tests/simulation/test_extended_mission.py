@@ -127,6 +127,24 @@ def test_the_mission_ends_at_the_level_that_the_scenario_names(level):
 
 
 @pytest.mark.parametrize(
+    "disturbance",
+    [
+        {"noise": {"distribution": "normal", "mean": 0.0, "std": 0.05}},
+        {"dropout_probability": 0.5},
+    ],
+    ids=["noise", "lost messages"],
+)
+def test_the_mission_ends_at_the_first_published_level_that_is_low_enough(disturbance):
+    disturbed = {f"battery__{name}": value for name, value in disturbance.items()}
+    fly = flown.__wrapped__  # such values cannot be the key of a cache
+    through = fly("none", **disturbed)
+    levels = [(point.t_s, point.further["battery_level"]) for point in through.trajectory]
+    low_s = next(t_s for t_s, level in levels if level is not None and level <= 0.4)
+    ended = fly("none", battery__mission_ends_at_level=0.4, **disturbed)
+    assert ended.metrics.mission_duration_s == pytest.approx(low_s, abs=0.2)
+
+
+@pytest.mark.parametrize(
     ("design", "level"),
     [
         ("fd_recharge", 0.25),
