@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -146,12 +146,11 @@ def grouped(
     if averages:
         frame = frame.assign(**{_CLUSTER: _conditions(frame, missions.swept)})
     groups = []
-    lacking = []
+    lacking: dict[str, list[str]] = defaultdict(list)
     for part, name, point in _parts(frame, managers, by):
         found = independent(part, _same_points(frame, part, by), averaged, alike)
-        if found.left_out:
-            runs = found.left_out + len(found.rows)
-            lacking.append(f"{name} {found.left_out} of {runs}")
+        for what, how_many in found.left_out.items():
+            lacking[what].append(f"{name} {how_many}")
         horizon_s = float(part[HORIZON].iloc[0])
         groups.append(Group(name, _by_run(found.rows), found.counted, point, horizon_s))
     on_points = list(_notes_on_points(groups, averaged, frame, lacking))
@@ -403,12 +402,13 @@ class Independent(NamedTuple):
         rows: missions, or their averages over points of a sweep, runs of a draw, or missions of a
             condition.
         counted: what each row is, as of Group.
-        left_out: number of runs that lack a point.
+        left_out: how many of how many runs lack a point, and how many draws lack a run, where some
+            do.
     """
 
     rows: pandas.DataFrame
     counted: str
-    left_out: int = 0
+    left_out: Mapping[str, str]
 
 
 def independent(
@@ -428,21 +428,30 @@ def independent(
             is not named.
     """
     if _CLUSTER in part and part[_CLUSTER].notna().all():
-        return Independent(_over_conditions(part), CONDITION)
+        return Independent(_over_conditions(part), CONDITION, {})
     points = len(whole[list(averaged)].drop_duplicates()) if averaged else 1
     sharing = alike.get(str(part["source"].iloc[0]), 1)
     rows = part
     counted = "mission"
-    left_out = 0
+    left_out: dict[str, str] = {}
     if points > 1:
         counted = "run"
         rows = _means(part, points)
-        left_out = part.groupby(["seed", "run"], observed=True).ngroups - len(rows)
+        runs = part.groupby(["seed", "run"], observed=True).ngroups
+        if len(rows) < runs:
+            left_out[_LACK_A_POINT] = f"{runs - len(rows)} of {runs}"
     if sharing > 1:
         counted = "draw"
         draws = whole.groupby(["seed", first_alike(whole, sharing)], observed=True)["run"].nunique()
         rows = _means(rows.assign(run=first_alike(rows, sharing)), draws)
+        begun = part.groupby(["seed", first_alike(part, sharing)], observed=True).ngroups
+        if len(rows) < begun:
+            left_out[_LACK_A_RUN] = f"{begun - len(rows)} of {begun}"
     return Independent(rows, counted, left_out)
+
+
+_LACK_A_POINT = "runs that lack a point of the sweep"
+_LACK_A_RUN = "draws that lack a run"
 
 
 def _conditions(frame: pandas.DataFrame, swept: Sequence[str]) -> pandas.Series[float]:
@@ -510,7 +519,7 @@ def _notes(
             "intervals and numbers of runs needed are rough, as one of them has fewer than"
             f" {_FEW} runs ({few})"
         )
-    if any(group.frame[FOUND].isna().all() for group in groups):
+    if any(len(group.frame) and group.frame[FOUND].isna().all() for group in groups):
         yield "some files do not say which missions found the pipeline"
 
 
@@ -575,20 +584,23 @@ def _notes_on_points(
     groups: Sequence[Group],
     averaged: Sequence[str],
     frame: pandas.DataFrame,
-    lacking: Sequence[str],
+    lacking: Mapping[str, Sequence[str]],
 ) -> Iterator[str]:
-    """Say which runs lack a point of the sweep, and whether campaigns have the same points.
+    """Say which runs lack a point of the sweep, which draws a run, and whether campaigns have the
+    same points.
 
     Raises:
-        InputError: no run has all points.
+        InputError: no run has all points, or no draw all runs.
     """
     if lacking and not any(len(group.frame) for group in groups):
-        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
-        raise InputError(
-            "no manager has a run with missions at all points of the sweep", remedy=remedy
-        )
-    if lacking:
-        yield f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out"
+        if _LACK_A_POINT in lacking:
+            problem = "no manager has a run with missions at all points of the sweep"
+            remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
+        else:
+            problem, remedy = "no manager has all runs of a draw", "resume the campaign"
+        raise InputError(problem, remedy=remedy)
+    for what, of_groups in lacking.items():
+        yield f"{what} ({', '.join(of_groups)}) are left out"
     if _are_at_other_points(frame, averaged):
         yield f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
 

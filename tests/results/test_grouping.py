@@ -74,7 +74,37 @@ def test_a_draw_without_one_of_its_missions_is_left_out_unless_no_manager_has_it
     assert compare_frame(frame).differences["n"][0] == 3
     failed = frame[(frame["manager"] == "a") | (frame["run"] != 2)]
     failed.attrs["runs_sharing_draw"] = 4
-    assert compare_frame(failed).differences["n"][0] == 2
+    comparison = compare_frame(failed)
+    assert comparison.differences["n"][0] == 2
+    assert any("draws that lack a run (b 1 of 3) are left out" in note for note in comparison.notes)
+
+
+def test_the_runs_that_lack_a_point_are_counted_as_runs_where_draws_are_compared():
+    frame = two_points()
+    frame = frame[(frame["manager"] == "a") | (frame["run"] != 7) | (frame["start.y_m"] == 0.0)]
+    frame.attrs["runs_sharing_draw"] = 5
+    notes = "\n".join(compare_frame(frame).notes)
+    assert "runs that lack a point of the sweep (b 1 of 40) are left out" in notes
+    assert "draws that lack a run (b 1 of 8) are left out" in notes
+
+
+def test_where_no_draw_of_a_manager_is_whole_nothing_else_is_said_of_its_missions():
+    frame = two_points().query("`start.y_m` == 0.0").drop(columns="start.y_m")
+    frame = frame[(frame["manager"] == "a") | (frame["run"] <= 3)]
+    frame.attrs["runs_sharing_draw"] = 5
+    notes = "\n".join(compare_frame(frame).notes)
+    assert "draws that lack a run (b 1 of 1) are left out" in notes
+    assert "found the pipeline" not in notes
+
+
+def test_without_any_whole_draw_there_is_nothing_to_compare():
+    frame = two_points().query("`start.y_m` == 0.0").drop(columns="start.y_m")
+    frame = frame[frame["run"] <= 10]
+    frame.attrs["runs_sharing_draw"] = 5
+    frame = frame[(frame["manager"] == "a") == (frame["run"] % 5 != 0)]
+    frame.attrs["runs_sharing_draw"] = 5
+    with pytest.raises(InputError, match="no manager has all runs of a draw"):
+        compare_frame(frame)
 
 
 def test_a_manager_that_lacks_a_point_altogether_is_not_compared_at_the_others():
