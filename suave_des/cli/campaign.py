@@ -370,6 +370,10 @@ def serve(
         float,
         typer.Option(metavar="X", help="Mission seconds per second; 0: advance only on request."),
     ] = 0.0,
+    host_name: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A further name by which clients may call this machine."),
+    ] = None,
     *,
     files: Files,
 ) -> None:
@@ -381,6 +385,6 @@ def serve(
     session = Session(
         Simulator(load_scenario(scenario, **files.replacements)), run_number, seed, real_time_factor
     )
-    with Server(session, host, port) as server:
+    with Server(session, host, port, host_name or ()) as server:
         print(f"http://{host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
         server.serve_forever(poll_interval=0.1)

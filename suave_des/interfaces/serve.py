@@ -30,6 +30,7 @@ from suave_des.simulation.simulator import Simulator
 BODY_LIMIT_BYTES: Final = 100_000
 _READ_TIMEOUT_S: Final = 10.0
 _LENGTH_DIGITS: Final = 20
+_MOST_REPORTS: Final = 20
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _JSON: Final = "application/json"
 _ADVANCE: Final = "advance_s"
@@ -111,6 +112,10 @@ class Session:
             if (serve := self._paths.get((method, path))) is None:
                 raise LookupError(path)
             return serve(content)
+
+    def methods(self, path: str) -> list[str]:
+        """List the methods that a path answers."""
+        return [method for method, known in self._paths if known == path]
 
     def _begin(self, run: int, seed: int) -> None:
         self._mission = Mission(self._simulator, run=run, seed=seed)
@@ -246,8 +251,11 @@ class _Handler(BaseHTTPRequestHandler):
         """Answer a request by any of the methods."""
         method = self.command
         path = self.path.partition("?")[0].rstrip("/") or "/"
+        allowed = self.server.session.methods(path)
         try:
             self._check_sender()
+            if method not in allowed:
+                raise LookupError(path)
             content = self._content() if method != "GET" else None
             status = HTTPStatus.OK
             answer = self.server.session.answer(method, path, content)
@@ -255,32 +263,46 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True  # a body would not be read
             status = error.args[0]
             answer = {"error": error.args[1]}
+            self.server.report(error.args[1])
         except LookupError:
-            status = HTTPStatus.NOT_FOUND
-            answer = {"error": f"there is no {method} {path}"}
+            known = f": it answers {' and '.join(allowed)}" if allowed else ""
+            status = HTTPStatus.METHOD_NOT_ALLOWED if allowed else HTTPStatus.NOT_FOUND
+            answer = {"error": f"there is no {method} {path}{known}"}
         except SuaveDesError as error:
             status = HTTPStatus.BAD_REQUEST
             answer = {"error": str(error)}
+        self._answer(status, answer, allowed)
+
+    do_PUT = do_POST = do_DELETE = do_PATCH = do_HEAD = do_OPTIONS = do_GET  # noqa: N815 - names that http.server looks for
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Answer what http.server itself refuses, such as a method of no name, in JSON, too."""
+        self.close_connection = True
+        is_method = code == HTTPStatus.NOT_IMPLEMENTED
+        status = HTTPStatus.METHOD_NOT_ALLOWED if is_method else HTTPStatus(code)
+        self._answer(status, {"error": message or status.phrase})
+
+    def _answer(self, status: HTTPStatus, answer: Json, allowed: Sequence[str] = ()) -> None:
         body = json.dumps(answer).encode()
         self.send_response(status)
+        if status == HTTPStatus.METHOD_NOT_ALLOWED:
+            self.send_header("Allow", ", ".join(allowed))
         self.send_header("Content-Type", _JSON)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
-        self.wfile.write(body)
-
-    do_PUT = do_POST = do_GET  # noqa: N815 - names that http.server looks for
+        if self.command != "HEAD":
+            self.wfile.write(body)
 
     def _check_sender(self) -> None:
         host = self.headers.get("Host", "")
         origin = self.headers.get("Origin")
-        known = {*_LOCAL, self.server.host, self.connection.getsockname()[0]}
+        known = {*_LOCAL, *self.server.names, self.connection.getsockname()[0]}
         is_known = False
         with suppress(ValueError):
             is_known = urlsplit(f"//{host}").hostname in known
         if not is_known:
-            raise _RefusedError(
-                HTTPStatus.MISDIRECTED_REQUEST, f"Host {shown(host)} is not this server's address"
-            )
+            problem = f"Host {shown(host)} is not this server's address (--host-name accepts it)"
+            raise _RefusedError(HTTPStatus.MISDIRECTED_REQUEST, problem)
         if origin is not None and origin != f"http://{host}":
             raise _RefusedError(
                 HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server"
@@ -314,15 +336,25 @@ class Server(ThreadingHTTPServer):
     """Serves a session until it is shut down: at 127.0.0.1 only to this machine, at port 0 on any
     that is free.
 
+    Args:
+        host_names: further names by which clients may call this machine, such as a container's.
+
     Raises:
         InputError: the address cannot be used.
     """
 
     daemon_threads = True
 
-    def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 3000) -> None:
+    def __init__(
+        self,
+        session: Session,
+        host: str = "127.0.0.1",
+        port: int = 3000,
+        host_names: Sequence[str] = (),
+    ) -> None:
         self.session = session
-        self.host = host
+        self.names = {host, *map(str.lower, host_names)}
+        self._reported = set[str]()
         try:
             super().__init__((host, port), _Handler)
         except (OSError, OverflowError) as error:
@@ -330,6 +362,12 @@ class Server(ThreadingHTTPServer):
             raise InputError(
                 f"{host}:{port} cannot be used: {why}", remedy="give another --host or --port"
             ) from None
+
+    def report(self, refusal: str) -> None:
+        """Print why a request was refused, once for each reason, and for few of them."""
+        if refusal not in self._reported and len(self._reported) < _MOST_REPORTS:
+            self._reported.add(refusal)
+            print(f"a request was refused: {refusal}", file=sys.stderr, flush=True)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Let clients leave in the middle of a request or an answer; report anything else."""

@@ -1,6 +1,9 @@
 """What reference pages and README say of files, names and links is so."""
 
 import re
+import shlex
+import subprocess
+import sys
 import tomllib
 
 import make_cli_reference
@@ -198,6 +201,26 @@ def test_what_the_container_copies_exists():
     ]
     assert "suave_des" in sources
     assert all((ROOT / name).exists() for name in sources)
+
+
+def test_what_the_container_runs_is_run_by_this_version(tmp_path):
+    text = (ROOT / "Containerfile").read_text(encoding="utf-8")
+    steps = [
+        shlex.split(step)
+        for line in re.findall(r"^RUN (.*)$", text, flags=re.MULTILINE)
+        for step in line.split(" && ")
+    ]
+    tried = [step for step in steps if step[0] not in ("pip", "chmod")]
+    assert [step[:2] for step in tried] == [["suave-des", "reproduce"]]
+    for step in tried:
+        # help is printed once the options are known
+        done = subprocess.run(
+            [sys.executable, "-m", "suave_des", *step[1:], "--help"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
 
 
 def test_the_change_log_has_this_version():

@@ -7,8 +7,9 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from http.client import HTTPConnection
 
 import jsonschema
@@ -21,13 +22,19 @@ from suave_des.simulation.simulator import Simulator
 SEARCH = "f_generate_search_path"
 
 
-@pytest.fixture
-def port(simulator: Simulator) -> Iterator[int]:
-    with Server(Session(simulator), port=0) as server:
+@contextmanager
+def served(simulator: Simulator, host_names: Sequence[str] = ()) -> Iterator[int]:
+    with Server(Session(simulator), port=0, host_names=host_names) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
         thread.start()
         yield server.server_port
         server.shutdown()
+
+
+@pytest.fixture
+def port(simulator: Simulator) -> Iterator[int]:
+    with served(simulator) as port:
+        yield port
 
 
 def request(
@@ -130,6 +137,10 @@ def test_time_may_pass_by_a_factor_of_real_time(simulator):
     ("method", "path", "body", "status", "words"),
     [
         ("GET", "/nothing", None, 404, "there is no GET /nothing"),
+        ("GET", "/execute", None, 405, "there is no GET /execute: it answers PUT"),
+        ("DELETE", "/monitor", None, 405, "there is no DELETE /monitor: it answers GET"),
+        ("OPTIONS", "/execute", None, 405, "it answers PUT"),
+        ("BREW", "/monitor", None, 405, "Unsupported method ('BREW')"),
         ("PUT", "/execute", b"{", 400, "not JSON"),
         ("PUT", "/execute", b"\xff\xfe", 400, "not JSON"),
         ("PUT", "/execute", b"[" * 50_000, 400, "not JSON"),
@@ -186,6 +197,28 @@ def test_it_may_be_called_by_the_names_of_this_machine(port, host):
         "Content_Type": "application/json; charset=utf-8",
     }
     assert request(port, "POST", "/advance", {"advance_s": 1}, **own)[0] == 200
+
+
+def test_the_user_may_give_this_machine_a_further_name(simulator):
+    with served(simulator, host_names=["suave"]) as port:
+        assert request(port, "GET", "/monitor", Host="suave:3111")[0] == 200
+        assert request(port, "GET", "/monitor", Host="Suave")[0] == 200
+        assert request(port, "GET", "/monitor", Host="suave.example")[0] == 421
+
+
+def test_why_a_request_was_refused_is_printed_once(port, capfd):
+    for _ in range(3):
+        request(port, "GET", "/monitor", Host="suave:3111")
+    for number in range(50):
+        request(port, "GET", "/monitor", Host=f"host{number}")
+    lines = capfd.readouterr().err.splitlines()
+    assert lines[0].startswith("a request was refused: Host 'suave:3111' is not this server's")
+    assert lines.count(lines[0]) == 1 and "--host-name" in lines[0]
+    assert len(lines) == 20  # no client can fill the terminal
+
+
+def test_a_head_request_gets_no_body(port):
+    assert request(port, "HEAD", "/monitor") == (405, b"")
 
 
 def raw(port: int, head: str) -> bytes:
