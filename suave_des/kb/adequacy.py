@@ -30,7 +30,7 @@ from suave_des.errors import KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import Body, Probes, testable_order
 from suave_des.kb.rule_tests import RuleTest, passes
-from suave_des.kb.situations import Decide, Situation, compare, difference
+from suave_des.kb.situations import Decide, OnCount, Situation, compare, difference
 from suave_des.kb.space import PolicySpace, States, spread
 from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import Ontology
@@ -171,10 +171,19 @@ class Coverage(NamedTuple):
 
 
 def measure_coverage(
-    knowledge: KnowledgeBase, situations: Iterable[Situation], max_failed: int
+    knowledge: KnowledgeBase,
+    situations: Iterable[Situation],
+    max_failed: int,
+    on_count: OnCount = lambda done, total: None,
 ) -> Coverage:
-    """Measure what the situations of tests cover; in states that are proposed at most `max_failed`
-    components report.
+    """Measure what the situations of tests cover.
+
+    Args:
+        knowledge: whose rules are to be covered.
+        situations: of the tests.
+        max_failed: in states that are looked through, and proposed, at most so many components
+            report.
+        on_count: called with how many of how many states are looked through, if any has to be.
 
     Raises:
         InputError: there would be too many states.
@@ -187,7 +196,9 @@ def measure_coverage(
     found: dict[frozenset[Goal], KnowledgeState] = {}  # one state for each different set of goals
     if left:
         covering = _covering(knowledge, left)
-        for state in States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space):
+        states = States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space)
+        for number, state in enumerate(states):
+            on_count(number, len(states))
             found.setdefault(covering(Situation(state)), state)
     missing = frozenset[Goal]().union(*found)
     proposed: dict[KnowledgeState, tuple[Goal, ...]] = {}

@@ -108,10 +108,9 @@ def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> 
     except KnowledgeError:  # it is among the findings, and contradictions follow from it
         return
     for reason in regions_of(base).reasons:
-        yield Finding(
-            Level.NOTE,
-            f"inferences are cached for equal measured values only, which is slower: {reason}",
-        )
+        slower = "a mission whose values never repeat takes a second or so, not milliseconds"
+        words = f"inferences are cached for equal measured values only ({slower}): {reason}"
+        yield Finding(Level.NOTE, words)
     try:
         # What is in its cache has been asked with this very knowledge base, without a contradiction
         # or a dropped rule.

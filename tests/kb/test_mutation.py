@@ -327,7 +327,12 @@ def test_coverage_names_what_is_missing_and_states_for_it(tmp_path, knowledge, a
         others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
         knowledge = KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
     situations = [situation for test in tests for situation in test.situations]
-    coverage = measure_coverage(knowledge, situations, max_failed=0)
+    counted: list[tuple[int, int]] = []
+    coverage = measure_coverage(
+        knowledge, situations, max_failed=0, on_count=lambda *count: counted.append(count)
+    )
+    states = len(counted)
+    assert states > 10 and counted == [(number, states) for number in range(states)]
     fired, not_fired = (
         Goal("QAWaterVisibility", -1, outcome) for outcome in (adequacy.FIRES, adequacy.FIRES_NOT)
     )

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.text import Text
 
-from suave_des.cli.console import output
+from suave_des.cli.console import counted, errors, output
 from suave_des.cli.kb.options import MaxFailed, TimeLimitS, shown
 from suave_des.cli.options import KnowledgeFiles
 from suave_des.errors import InputError, did_you_mean, number_of
@@ -280,7 +280,8 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
         )
     for about, knowledge, tests in suites:
         situations = [situation for test in tests for situation in test.situations]
-        found = measure_coverage(knowledge, situations, max_failed)
+        with counted("states", errors()) as on_count:
+            found = measure_coverage(knowledge, situations, max_failed, on_count)
         print("", shown(found.table()).rstrip("\n"), *found.lines(), sep="\n")
         if file is not None and found.proposed:
             states: list[tuple[str, KnowledgeState]] = [
