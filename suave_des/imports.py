@@ -91,13 +91,20 @@ def _importer() -> str:
 
 
 _finders: Final = dict[str, _Beside]()
+_beside: Final = list[str]()
+"""The folder of the campaign file that was read last."""
+
+
+def look_beside(file: Path) -> None:
+    """Look for users' modules beside a file as well, after the current folder."""
+    _beside[:] = [str(file.absolute().parent)]
 
 
 def find_here(name: str) -> ModuleSpec | None:
-    """Find a module that a user has named, on the import path or else in the current folder; None
-    if there is none.
+    """Find a module that a user has named, on the import path or else in the current folder, or
+    beside the campaign file; None if there is none.
 
-    One of the folder can be imported from then on, and so can what it imports and lies beside it.
+    One of a folder can be imported from then on, and so can what it imports and lies beside it.
 
     Raises:
         ValueError: it is loaded, and not from a file.
@@ -106,13 +113,13 @@ def find_here(name: str) -> ModuleSpec | None:
         raise ValueError("empty module name")
     if name in sys.modules:
         return find_spec(name)
-    here = str(Path.cwd())
-    for folder, finder in _finders.items():
-        if folder != here:  # one of this name that was imported from there, and is no longer loaded
-            finder.names.discard(name)
-    if (installed := find_spec(name)) is not None:
-        return installed
-    finder = _finders.setdefault(here, _Beside(here))
-    if finder not in sys.meta_path:
-        sys.meta_path.append(finder)
-    return finder.find(name)
+    for finder in _finders.values():  # which may have had one of this name that is not loaded now
+        finder.names.discard(name)
+    found = find_spec(name)
+    for folder in (str(Path.cwd()), *_beside):
+        if found is None:
+            finder = _finders.setdefault(folder, _Beside(folder))
+            if finder not in sys.meta_path:
+                sys.meta_path.append(finder)
+            found = finder.find(name)
+    return found

@@ -246,7 +246,7 @@ def _imported(what: str, module: str) -> ModuleType:
     try:
         top = module.partition(".")[0]
         if top not in sys.modules:
-            find_here(top)  # in the current folder, too, which is not on the import path
+            find_here(top)  # in folders, too, which are not on the import path
         return importlib.import_module(module)
     except SyntaxError as error:
         raise InputError(
@@ -261,6 +261,7 @@ def _imported(what: str, module: str) -> ModuleType:
         if place is not None:
             raise InputError(problem, file=place.filename, place=f"line {place.lineno}") from error
         remedy = (
-            "module must be importable: installed, or in the current folder or one on PYTHONPATH"
+            "module must be importable: installed, in the current folder or one on PYTHONPATH, or"
+            " beside the campaign file that names it"
         )
         raise InputError(problem, remedy=remedy) from error

@@ -195,9 +195,12 @@ def _stored(
     with store_read(path):
         noted = read_note(path, "request")
         stored = CampaignSpec.model_validate(noted)
+        if "runs" in changed and stored.command:
+            changed = {**changed, "command": _with_runs(stored.command, changed["runs"])}
         request = CampaignSpec.read({**stored.stored(), **changed})
-        file = read_campaign_file(request.scenario)
-        campaign = inputs.read_campaign(request, file)
+        with _begun_in(stored.folder):
+            file = read_campaign_file(request.scenario)
+            campaign = inputs.read_campaign(request, file)
     known = {*campaign.spec.managers, *campaign.code()}
     if unknown := [name for name in named if name not in known]:
         problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
@@ -208,6 +211,28 @@ def _stored(
         if store.about("request") != noted:
             raise InputError("changed while it was read", file=path, remedy="try it again")
         yield store, campaign
+
+
+@contextmanager
+def _begun_in(folder: str) -> Iterator[None]:
+    """Say, of a file that is not there, where the campaign was begun, if that is elsewhere."""
+    try:
+        yield
+    except InputError as error:
+        is_missing = error.file is not None and not Path(error.file).exists()
+        if not is_missing or folder in ("", str(Path.cwd())):
+            raise
+        remedy = f"the campaign was begun in {folder}, where relative paths begin: resume it there"
+        raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+
+
+def _with_runs(command: Sequence[str], runs: int) -> tuple[str, ...]:
+    """The command line that asks for so many runs, in place of those that it asked for."""
+    words = [word for word in command if not word.startswith("--runs=")]
+    if "--runs" in words:
+        place = words.index("--runs")
+        del words[place : place + 2]
+    return (*words, "--runs", str(runs))
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from suave_des.errors import (
     SuaveDesError,
     may_pass,
 )
+from suave_des.imports import look_beside
 from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
 from suave_des.records.metrics import COLUMNS, Row, further_of, row_of
@@ -203,6 +204,8 @@ class MissionRunner:
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
         self._variation = campaign.variation
+        if campaign.file is not None:
+            look_beside(campaign.file.path)  # this may be a worker process
         # Load or compile what missions run, before the first one's time counts: a mission of a
         # second does.
         short_mission(campaign.loaded)

@@ -15,6 +15,7 @@ from pydantic import Field, ValidationError
 
 from suave_des.campaign.variation import plain
 from suave_des.errors import InputError, shown
+from suave_des.imports import look_beside
 from suave_des.registry import is_built_in, manager_class
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.models import Real, Strict
@@ -232,7 +233,8 @@ class CampaignFile:
 
 
 def read_campaign_file(name: str | Path) -> CampaignFile | None:
-    """Read a campaign file; None if the file is something else, such as a scenario.
+    """Read a campaign file; None if the file is something else, such as a scenario. Users' modules
+    are looked for beside it from then on.
 
     Raises:
         InputError: it cannot be read, is of another version, or has an impossible value.
@@ -246,4 +248,6 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
         ensemble = find_named(settings.ensemble, "scenarios/ensembles", layer, ("ensemble",))
         settings = settings.model_copy(update={"ensemble": str(ensemble)})
     scenario = find_named(settings.scenario, "scenarios", layer, ("scenario",))
-    return CampaignFile(settings, scenario, inputs, layer)
+    file = CampaignFile(settings, scenario, inputs, layer)
+    look_beside(file.path)
+    return file
