@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from rdflib import RDF, Graph, Namespace, URIRef
+from rdflib import RDF, BNode, Graph, Namespace, URIRef
 from rdflib.term import Node
 
 from suave_des.caches import SharedEntries, private_cache
@@ -226,7 +226,9 @@ def _is_placeholder(node: Node | None, data: Graph) -> bool:
 def _finding(
     report: Graph, result: Node, thing: Node | None, sources: Sequence[OntologyFile]
 ) -> Finding:
-    name, path = local_name(str(thing)), report.value(result, _SH.resultPath)
+    # the names that rdflib gives are others each time
+    name = "an individual without a name" if isinstance(thing, BNode) else local_name(str(thing))
+    path = report.value(result, _SH.resultPath)
     level = _LEVELS.get(URIRef(str(report.value(result, _SH.resultSeverity))), Level.ERROR)
     words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or ""))
     message = ": ".join(filter(None, words))

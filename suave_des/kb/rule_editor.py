@@ -121,6 +121,9 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
 
 def _read(path: Path) -> OntologyFile:
     file = read_ontology(path)
+    if not file.is_xml:
+        remedy = "save it as RDF/XML, or keep your rules in a file of their own: --rules"
+        raise InputError("rules can be edited in RDF/XML only", file=path, remedy=remedy)
     try:
         file.content.decode()
     except UnicodeDecodeError:

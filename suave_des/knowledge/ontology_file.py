@@ -1,7 +1,8 @@
 """Read ontology files.
 
-Files are in RDF/XML. lxml reads the XML first: it stops at entities that expand too far, and knows
-line numbers. Simple internal entities, as Protégé writes them, are accepted.
+Files are in RDF/XML or Turtle, of which N-Triples is a part. lxml reads the XML first: it stops at
+entities that expand too far, and knows line numbers. Simple internal entities, as Protégé writes
+them, are accepted.
 """
 
 from __future__ import annotations
@@ -39,11 +40,14 @@ from suave_des.knowledge.rdf import (
 
 MAX_BYTES: Final = 64 * 2**20
 _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
-_SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
+_SAVE_AS: Final = "an OWL ontology in RDF/XML or Turtle is expected, as Protégé saves it"
+TURTLE_ENDINGS: Final = (".ttl", ".nt")
+#: How files in Turtle begin, if they have another ending; comments may stand before.
+_TURTLE: Final = r"@prefix|@base|prefix\s+[\w.-]*:\s*<|base\s+<|(<[^<>\s]+>|_:\w+)\s+<[^<>\s]+>\s"
+_XML_LABEL: Final = r"label[^<>]*>\s*([^<]*?)\s*<"
+_TURTLE_LABEL: Final = r'label>?\s+"([^"\n]*)"'
 #: How files in the other notations that ontology editors save begin; comments may stand before.
 _OTHER_NOTATIONS: Final = {
-    "Turtle": r"@prefix|@base|prefix\s+[\w.-]*:\s*<|base\s+<",
-    "N-Triples": r"(<[^<>\s]+>|_:\w+)\s+<[^<>\s]+>\s",
     "OWL in Functional Syntax": r"(Prefix|Ontology)\s*\(",
     "OWL in Manchester Syntax": r"(Prefix|Ontology):",
     "JSON-LD": r"[\[{]",
@@ -62,6 +66,7 @@ class OntologyFile:
 
     Attributes:
         iris: the IRIs of the ontology (empty for an anonymous one), without a trailing '#'.
+        is_xml: whether it is in RDF/XML; else it is in Turtle.
         base: xml:base of the document, if it has one.
         imports: (imported IRI, line) in the order of the file.
         graph: all that it states, for SPARQL and SHACL.
@@ -71,6 +76,7 @@ class OntologyFile:
     path: Path
     content: bytes = field(repr=False)
     iris: tuple[str, ...]
+    is_xml: bool
     base: str | None
     imports: tuple[tuple[str, int], ...]
     graph: Graph = field(repr=False)
@@ -109,9 +115,13 @@ class OntologyFile:
 
     def line_of(self, name: str) -> int | None:
         """The first line that describes the thing of that name."""
-        # about="...#name", about="&suave;name", ID="name", or the label of a rule
         own = re.escape(name)
-        described = rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<"""
+        if self.is_xml:  # about="...#name", about="&suave;name", ID="name", or the label of a rule
+            described = (
+                rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<"""
+            )
+        else:  # a line that begins with prefix:name or <...#name>, or a label
+            described = rf"""^(?:[\w.-]*:|<[^<>\s]*[#/]){own}>?\s|label>?\s+["]{own}["]"""
         return self._line(re.search(described, self._text, re.MULTILINE))
 
     def line_of_rule(self, name: str) -> int | None:
@@ -124,7 +134,8 @@ class OntologyFile:
     @cached_property
     def _labels(self) -> dict[str, re.Match[str]]:
         return {
-            found[1]: found for found in re.finditer(r"label[^<>]*>\s*([^<]*?)\s*<", self._text)
+            found[1]: found
+            for found in re.finditer(_XML_LABEL if self.is_xml else _TURTLE_LABEL, self._text)
         }
 
     @cached_property
@@ -173,29 +184,45 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
         text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text_of(content), count=1)
     except UnicodeDecodeError as error:
         raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
-    for notation, start in _OTHER_NOTATIONS.items():
-        if re.match(rf"\s*(#.*\s+)*({start})", text, re.IGNORECASE):
-            raise _another_notation(path, notation)
-    root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
-    graph = _parse_rdf(path, text)
+    is_turtle = path.suffix in TURTLE_ENDINGS or _begins_with(_TURTLE, text)
+    if is_turtle:
+        graph, base = _parse_graph(path, text, "Turtle"), None
+        lines = {iri: text.count("\n", 0, text.find(iri)) + 1 for iri in _imported(graph)}
+    else:
+        for notation, start in _OTHER_NOTATIONS.items():
+            if _begins_with(start, text):
+                raise _another_notation(path, notation)
+        root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
+        # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
+        text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
+        graph = _parse_graph(path, text, "RDF/XML")
+        base = root.get(_BASE)
+        lines = {}
+        for element in root.iter(f"{{{OWL}}}imports"):
+            iri = urljoin(base or RELATIVE_TO, element.get(f"{{{RDF}}}resource", ""))
+            lines.setdefault(iri, element.sourceline or 0)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
-    base = root.get(_BASE)
-    lines: dict[str, int] = {}
-    for element in root.iter(f"{{{OWL}}}imports"):
-        iri = urljoin(base or RELATIVE_TO, element.get(f"{{{RDF}}}resource", ""))
-        lines.setdefault(iri, element.sourceline or 0)
-    imports = {str(iri): lines.get(str(iri), 0) for iri in graph.objects(None, OWL_TERMS.imports)}
+    imports = {iri: lines.get(iri, 0) for iri in _imported(graph)}
     return OntologyFile(
         path=path,
         content=content,
         iris=tuple(str(iri) for iri in ontologies if isinstance(iri, URIRef)),
+        is_xml=not is_turtle,
         base=None if base is None else str(base),
         imports=tuple(sorted(imports.items(), key=lambda item: (item[1], item[0]))),
         graph=graph,
         triples=tuple(_converted(graph, hashlib.sha256(content).hexdigest()[:8])),
     )
+
+
+def _begins_with(start: str, text: str) -> bool:
+    return re.match(rf"\s*(#.*\s+)*({start})", text, re.IGNORECASE) is not None
+
+
+def _imported(graph: Graph) -> list[str]:
+    return [str(iri) for iri in graph.objects(None, OWL_TERMS.imports)]
 
 
 def _parse_xml(path: Path, text: str) -> etree._Element:
@@ -237,16 +264,18 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
 
 
 def _another_notation(path: Path, notation: str) -> KnowledgeError:
-    remedy = "save it as RDF/XML, in Protégé by Save as"
+    remedy = "save it as RDF/XML or Turtle, in Protégé by Save as"
     return KnowledgeError(f"this is {notation}", file=path, remedy=remedy)
 
 
-def _parse_rdf(path: Path, text: str) -> Graph:
+_FORMATS: Final = {"RDF/XML": "xml", "Turtle": "turtle"}  # as rdflib names them
+_BAD_TURTLE: Final = re.compile(r"at line (\d+) of .*?Bad syntax \((.*?)\) at ", re.DOTALL)
+
+
+def _parse_graph(path: Path, text: str, notation: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be
     changed.
     """
-    # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
-    text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
     # goes through triples in the order of the file, each time the same
     graph = Graph("SimpleMemory")
     # it would write the ill-formed 1e3 as 1000
@@ -256,14 +285,14 @@ def _parse_rdf(path: Path, text: str) -> Graph:
     )
     try:
         with without_log():
-            graph.parse(data=text, format="xml", publicID=RELATIVE_TO + path.stem)
-    except (
-        Exception
-    ) as error:  # the parser raises many kinds; each means that this file is not RDF/XML
+            graph.parse(data=text, format=_FORMATS[notation], publicID=RELATIVE_TO + path.stem)
+    except Exception as error:  # the parsers raise many kinds, each for a file of another notation
         reason, place = str(error), None
         if isinstance(error, SAXParseException):
             reason, place = error.getMessage(), f"line {error.getLineNumber()}"
-        problem = f"not RDF/XML: {' '.join(reason.split())}"
+        elif found := _BAD_TURTLE.search(reason):
+            reason, place = found[2], f"line {found[1]}"
+        problem = f"not {notation}: {' '.join(reason.split())}"
         raise KnowledgeError(problem, file=path, place=place, remedy=_SAVE_AS) from error
     finally:
         rdflib.NORMALIZE_LITERALS = before

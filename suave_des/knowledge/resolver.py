@@ -27,11 +27,17 @@ from lxml import etree
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.files import read_bytes
-from suave_des.knowledge.ontology_file import MAX_BYTES, RELATIVE_TO, OntologyFile, read_ontology
+from suave_des.knowledge.ontology_file import (
+    MAX_BYTES,
+    RELATIVE_TO,
+    TURTLE_ENDINGS,
+    OntologyFile,
+    read_ontology,
+)
 from suave_des.knowledge.rdf import MROS, TOMASYS, local_name
 from suave_des.resources import shipped_folder
 
-_ENDINGS: Final = (".owl", ".rdf", ".xml")
+_ENDINGS: Final = (".owl", ".rdf", ".xml", *TURTLE_ENDINGS)
 _CATALOG: Final = "catalog-v001.xml"
 _CATALOG_ENTRY: Final = "{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"
 _SHIPPED: Final = ("tomasys", "mros", "suave", "suave_extended")
