@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import urljoin
+from urllib.parse import urljoin, urlsplit
 from xml.sax import SAXParseException
 
 import rdflib
@@ -185,32 +185,18 @@ def _parsed(path: Path, content: bytes) -> OntologyFile:
     except UnicodeDecodeError as error:
         raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
     is_turtle = path.suffix in TURTLE_ENDINGS or _begins_with(_TURTLE, text)
-    if is_turtle:
-        graph, base = _parse_graph(path, text, "Turtle"), None
-        lines = {iri: text.count("\n", 0, text.find(iri)) + 1 for iri in _imported(graph)}
-    else:
-        for notation, start in _OTHER_NOTATIONS.items():
-            if _begins_with(start, text):
-                raise _another_notation(path, notation)
-        root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
-        # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
-        text = re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text)
-        graph = _parse_graph(path, text, "RDF/XML")
-        base = root.get(_BASE)
-        lines = {}
-        for element in root.iter(f"{{{OWL}}}imports"):
-            iri = urljoin(base or RELATIVE_TO, element.get(f"{{{RDF}}}resource", ""))
-            lines.setdefault(iri, element.sourceline or 0)
+    graph, base, lines = _turtle(path, text) if is_turtle else _rdf_xml(path, text)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
-    imports = {iri: lines.get(iri, 0) for iri in _imported(graph)}
+    imported = map(str, graph.objects(None, OWL_TERMS.imports))
+    imports = {iri: lines.get(iri, 0) for iri in imported}
     return OntologyFile(
         path=path,
         content=content,
         iris=tuple(str(iri) for iri in ontologies if isinstance(iri, URIRef)),
         is_xml=not is_turtle,
-        base=None if base is None else str(base),
+        base=base,
         imports=tuple(sorted(imports.items(), key=lambda item: (item[1], item[0]))),
         graph=graph,
         triples=tuple(_converted(graph, hashlib.sha256(content).hexdigest()[:8])),
@@ -221,8 +207,30 @@ def _begins_with(start: str, text: str) -> bool:
     return re.match(rf"\s*(#.*\s+)*({start})", text, re.IGNORECASE) is not None
 
 
-def _imported(graph: Graph) -> list[str]:
-    return [str(iri) for iri in graph.objects(None, OWL_TERMS.imports)]
+def _turtle(path: Path, text: str) -> tuple[Graph, None, dict[str, int]]:
+    """Parse a file in Turtle; return the graph, no base, and the lines that have whole IRIs."""
+    lines: dict[str, int] = {}
+    for number, line in enumerate(text.split("\n"), start=1):
+        for iri in re.findall(r"<([^<>\s]*)>", line):
+            lines.setdefault(iri, number)
+            lines.setdefault(RELATIVE_TO + iri, number)
+    return _parse_graph(path, text, "Turtle"), None, lines
+
+
+def _rdf_xml(path: Path, text: str) -> tuple[Graph, str | None, dict[str, int]]:
+    """Parse a file in RDF/XML; return the graph, xml:base, and the lines of imports."""
+    for notation, start in _OTHER_NOTATIONS.items():
+        if _begins_with(start, text):
+            raise _another_notation(path, notation)
+    root: Any = _parse_xml(path, text)  # lxml-stubs lack sourceline
+    # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
+    graph = _parse_graph(path, re.sub(r"""(?<=:datatype=["'])xsd:""", XSD, text), "RDF/XML")
+    base = root.get(_BASE)
+    lines: dict[str, int] = {}
+    for element in root.iter(f"{{{OWL}}}imports"):
+        iri = urljoin(base or RELATIVE_TO, element.get(f"{{{RDF}}}resource", ""))
+        lines.setdefault(iri, element.sourceline or 0)
+    return graph, None if base is None else str(base), lines
 
 
 def _parse_xml(path: Path, text: str) -> etree._Element:
@@ -297,11 +305,20 @@ def _parse_graph(path: Path, text: str, notation: str) -> Graph:
     finally:
         rdflib.NORMALIZE_LITERALS = before
     for term in chain.from_iterable(graph):
-        if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
+        if isinstance(term, URIRef) and not _is_iri(term):
             raise KnowledgeError(
                 f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`'
             )
     return graph
+
+
+def _is_iri(text: str) -> bool:
+    """Whether a text can be an IRI, as far as readers depend on it."""
+    try:
+        urlsplit(text)  # an address in brackets
+    except ValueError:
+        return False
+    return _NOT_IN_IRI.isdisjoint(text)
 
 
 def _converted(graph: Graph, scope: str) -> Iterator[Triple]:

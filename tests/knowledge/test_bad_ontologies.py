@@ -39,6 +39,10 @@ BAD_FILES: dict[str, tuple[str, str]] = {
     ),
     "nested turtle": ("@prefix : <http://x.org/y#> .\n:a :b " + "(" * 100_000, "not Turtle"),
     "n-triples": ("<http://x.org/y> <http://x.org/z> <http://x.org/y> .\n", "no owl:Ontology"),
+    "iri with half an address": (
+        "<http://x.org/y> <http://[x> <http://x.org/y> .\n",
+        "is not an IRI",
+    ),
     "functional": ("Prefix(:=<http://x.org/y#>)\n", "this is OWL in Functional Syntax"),
     "manchester": ("Prefix: : <http://x.org/y#>\n", "this is OWL in Manchester Syntax"),
     "json": ('{"@context": {}}', "this is JSON-LD"),
