@@ -28,6 +28,7 @@ from suave_des.cli.options import (
     managers_option,
 )
 from suave_des.errors import InputError
+from suave_des.errors import shown as quoted
 from suave_des.files import (
     LISTINGS,
     check_output_file,
@@ -54,6 +55,26 @@ FigureKind = Literal["auto", "map", "timeline", "distributions", "differences", 
 """As in results.figures, which is not imported for --help."""
 
 
+Labels = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=TEXT", help="Show this text instead of a manager's name; repeatable."
+    ),
+]
+
+
+def _labels(given: Sequence[str] | None) -> dict[str, str]:
+    """What is to be shown instead of the names of managers."""
+    labels: dict[str, str] = {}
+    for each in given or ():
+        name, equals, text = each.rpartition("=")
+        if not (equals and name and text.strip()):
+            remedy = "such as mine:Mine='Reactive'"
+            raise InputError(f"{quoted(each)} is no NAME=TEXT", place="--label", remedy=remedy)
+        labels[name] = text.strip()
+    return labels
+
+
 def compare(
     results: Results,
     managers: Annotated[str | None, managers_option("Only these, in this order.", "all")] = None,
@@ -65,6 +86,7 @@ def compare(
             show_default="each with each",
         ),
     ] = None,
+    label: Labels = None,
     metrics: Annotated[
         str | None,
         typer.Option(
@@ -112,7 +134,7 @@ def compare(
     Runs that share their random numbers are compared in pairs, which takes fewer missions. A few
     real missions can be assisted by simulated ones.
     """
-    from suave_des.records.missions import read_missions
+    from suave_des.records.missions import read_missions, with_labels
     from suave_des.results.assisted import compare_assisted
     from suave_des.results.compare import compare_groups
     from suave_des.results.groups import grouped
@@ -134,9 +156,12 @@ def compare(
             "--unpaired": unpaired,
         }
         check_no_use(unused, "with --assisted-by")
-    missions = read_missions(results)
+    labels = _labels(label)
+    missions = with_labels(read_missions(results), labels)
     simulated = [
-        read_missions([folder]) for folder in (assisted_by, population) if folder is not None
+        with_labels(read_missions([folder]), labels)
+        for folder in (assisted_by, population)
+        if folder is not None
     ]
     groups = grouped(missions, names, columns, points, simulated=simulated)
     comparison: Written
@@ -347,6 +372,7 @@ def figure(
         str | None,
         typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all"),
     ] = None,
+    label: Labels = None,
 ) -> None:
     """Draw a mission's map or a campaign's results.
 
@@ -360,7 +386,7 @@ def figure(
 
         return adaptation_rules(record)
 
-    draw_results(folders, out, kind, comma_separated(parameters), rules_of)
+    draw_results(folders, out, kind, comma_separated(parameters), rules_of, _labels(label))
     print(f"drawn in {out}")
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
 import pandas
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, shown, unknown
 from suave_des.files import read_csv, real
 from suave_des.records.contents import Manifest, MissionCounts
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
@@ -91,6 +91,28 @@ def read_missions(paths: Sequence[Path]) -> Missions:
         _notes(sources.values()),
         folders,
     )
+
+
+def with_labels(missions: Missions, labels: Mapping[str, str]) -> Missions:
+    """Name managers as readers are to see them.
+
+    Args:
+        labels: what to show instead of the name of a manager.
+
+    Raises:
+        InputError: there is no such manager, or two would be shown alike.
+    """
+    known = list(dict.fromkeys(missions.frame["manager"]))
+    for name in labels:
+        if name not in known:
+            raise unknown(f"there is no mission of {shown(name)}", name, known, "there are")
+    names = [labels.get(name, name) for name in known]
+    for label in names:
+        if names.count(label) > 1:
+            problem = f"several managers would be shown as {shown(label)}"
+            raise InputError(problem, place="labels", remedy="give each its own label")
+    managers = missions.frame["manager"].map(dict(zip(known, names, strict=True)))
+    return replace(missions, frame=missions.frame.assign(manager=managers))
 
 
 def _read_source(path: Path) -> Missions:

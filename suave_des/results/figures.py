@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from textwrap import fill
@@ -32,7 +32,7 @@ from suave_des.estimates import Estimate, mean_of
 from suave_des.files import write_file
 from suave_des.records.metrics import METRICS, PAPER_METRICS, Metric
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
-from suave_des.records.missions import Missions, read_missions
+from suave_des.records.missions import Missions, read_missions, with_labels
 from suave_des.results import style
 from suave_des.results.groups import (
     Group,
@@ -576,6 +576,7 @@ def draw_results(
     kind: str = AUTO,
     parameters: Sequence[str] = (),
     rules_of: Callable[[MissionRecord], Rules] = lambda record: {},
+    labels: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Draw the contents of results folders, and write the picture.
 
@@ -586,6 +587,7 @@ def draw_results(
             sweep the means.
         parameters: of a sweep: those to draw; empty: all.
         rules_of: finds the rules behind the adaptations of a mission, for its timeline.
+        labels: of a campaign: what to show instead of the name of a manager.
 
     Raises:
         InputError: there are no results of that kind in the folders, or the picture cannot be
@@ -593,7 +595,8 @@ def draw_results(
     """
     check_picture(out)
     if not (folders[0] / TRAJECTORY_FILE).is_file():
-        figure = draw_missions(read_missions(folders), kind, parameters)
+        missions = with_labels(read_missions(folders), labels)
+        figure = draw_missions(missions, kind, parameters)
     elif len(folders) > 1:
         raise InputError(
             "has a mission, of which one is drawn at a time",
