@@ -273,7 +273,8 @@ class _Handler(BaseHTTPRequestHandler):
             answer = {"error": str(error)}
         self._answer(status, answer, allowed)
 
-    do_PUT = do_POST = do_DELETE = do_PATCH = do_HEAD = do_OPTIONS = do_GET  # noqa: N815 - names that http.server looks for
+    do_PUT = do_POST = do_GET  # noqa: N815 - names that http.server looks for
+    do_DELETE = do_PATCH = do_HEAD = do_OPTIONS = do_GET  # noqa: N815
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Answer what http.server itself refuses, such as a method of no name, in JSON, too."""
