@@ -278,7 +278,7 @@ def test_the_policy_of_two_attributes_is_that_of_deciding_each_state(tmp_path, r
     assert space.attributes == ("battery_level", "water_visibility")
     few = tuple(number for number in space.numbers if number < 4)[-2:]
     small = PolicySpace(space.attributes, few, space.alike, space.statuses, space.functions)
-    check_like_deciding_each(knowledge, knowledge.policy(0, space=small), 80)
+    check_like_deciding_each(knowledge, knowledge.policy(0, space=small), 40)
 
 
 def test_the_policy_of_one_attribute_is_that_of_deciding_each_state(small):
