@@ -105,12 +105,14 @@ def test_runs_that_are_as_predicted_score_in_full(study):
     real = [
         {
             "manager": manager,
+            "condition": condition,
             **{
                 metric: chosen.loc[(manager, metric), "mean"] + off for metric in module.METRICS[:2]
             },
         }
         for manager in dict.fromkeys(chosen.index.get_level_values(0))
-        for off in (-0.1, 0.1) * 15
+        for condition in range(1, 7)
+        for off in (-0.1, 0.1)
     ]
     said = module.score(own, pandas.DataFrame(real).assign(mean_reaction_time_s=float("nan")))
     assert "8 of 8 predicted means lie in the real 95% intervals." in said
@@ -127,6 +129,73 @@ def test_real_runs_are_scored_from_their_file(study):
     )
     assert re.search(r"\d+ of 11 predicted means lie in the real 95% intervals", said)
     assert "Median search times of single conditions differ by: median " in said
+
+
+PUBLISHED = ROOT / "scenarios" / "published" / "planta_exp1_runs.csv"
+SAYS_CONDITION = ["condition", "nominal_y_m", "failure_time_s"]
+
+
+def written(path: Path, runs: pandas.DataFrame) -> Path:
+    runs.to_csv(path, index=False)
+    return path
+
+
+def test_shuffled_runs_are_scored_by_their_starts_and_failure_times(study, tmp_path):
+    runs = pandas.read_csv(PUBLISHED).drop(columns=["condition", "nominal_y_m"])
+    file = written(tmp_path / "runs.csv", runs.sample(frac=1.0, random_state=1))
+    module = study("predict")
+    assert module.scored("exp1", [file]) == module.scored("exp1", [PUBLISHED])
+
+
+@pytest.mark.parametrize(
+    "missing", [{"condition": [4]}, {"condition": [2], "run": [8]}], ids=["block", "run"]
+)
+def test_runs_after_missing_ones_keep_their_conditions(study, tmp_path, missing):
+    runs = pandas.read_csv(PUBLISHED)
+    left = runs[~np.all([runs[name].isin(values) for name, values in missing.items()], axis=0)]
+    file = written(tmp_path / "runs.csv", left.drop(columns=SAYS_CONDITION))
+    assert list(study("predict").assigned("exp1", [file])["condition"]) == list(left["condition"])
+
+
+def test_means_of_some_conditions_are_scored_against_those_of_the_same(study, tmp_path):
+    runs, module = pandas.read_csv(PUBLISHED), study("predict")
+    said = module.scored("exp1", [written(tmp_path / "runs.csv", runs[runs["condition"] == 4])])
+    rows = predictions()
+    own = rows[(rows["experiment"] == "exp1") & (rows["condition"] == "4")]
+    own = own[(own["manager"] == "bt") & (own["metric"] == "distance_inspected_m")]
+    assert (
+        f"bt, distance_inspected_m: real 57.42 (56.38 to 58.45), predicted {own.iloc[0]['mean']:.2f} ("
+        in said
+    )
+
+
+@pytest.mark.parametrize(
+    "change, line, said",
+    [
+        ({"initial_y_m": 4.0}, 3, "initial_y_m 4.0"),
+        ({"initial_x_m": -10.0}, 3, "initial_x_m -10.0"),
+        ({"failure_time_s": 91.19}, 3, "failure_time_s 91.19"),
+        ({"manager": "planta"}, 3, "nothing is predicted of manager planta in exp1"),
+    ],
+)
+def test_a_foreign_run_is_refused_with_its_line(study, tmp_path, change, line, said):
+    runs = pandas.read_csv(PUBLISHED)
+    runs.loc[line - 2, list(change)] = list(change.values())
+    module = study("predict")
+    with pytest.raises(module.InputError) as found:
+        module.scored("exp1", [written(tmp_path / "runs.csv", runs)])
+    assert f"runs.csv: line {line}: " in str(found.value) and said in str(found.value)
+
+
+def test_runs_whose_order_does_not_tell_their_conditions_are_refused(study, tmp_path):
+    runs = pandas.read_csv(PUBLISHED).drop(columns=SAYS_CONDITION)
+    left = runs.drop(index=[10, *range(15, 20)])  # of none, one of condition 3 and all of 4
+    module = study("predict")
+    with pytest.raises(module.InputError, match=r"line 16: this run may be of condition 3 or 5"):
+        module.scored("exp1", [written(tmp_path / "runs.csv", left)])
+    with pytest.raises(module.InputError, match=r"line \d+: .* the order"):
+        file = written(tmp_path / "runs.csv", runs.sample(frac=1.0, random_state=1))
+        module.scored("exp1", [file])
 
 
 @pytest.mark.parametrize(
