@@ -2,11 +2,10 @@
 their score.
 
 Predicted are the experiments of the study of July 2025 and of its extended mission, from the
-configurations of the exemplar's runner: six conditions as its seed 100 draws them, five runs of
-each manager in each. predictions/ has what an earlier `import-config --base planta_exp1
---runner-seed 100` made of each configuration; today's makes the same campaigns, but its scenarios
-are based on release15. Each simulated run has a member of the ensemble of parameter sets that fit
-the known runs (those of experiment 1 and of 2023) about equally well.
+configurations of the exemplar's runner in predictions/configs: six conditions as its seed 100 draws
+them, five runs of each manager in each. The plain command imports them (`suave-des import-config
+--revision 2025 --runner-seed 100`), and simulates. Each simulated run has a member of the ensemble
+of parameter sets that fit the known runs (those of experiment 1 and of 2023) about equally well.
 
     python analysis/predict.py [--out DIR] [--runs N] [--workers N]
     python analysis/predict.py --score EXPERIMENT FILE...
@@ -14,13 +13,15 @@ the known runs (those of experiment 1 and of 2023) about equally well.
 `--runs` are the missions of a manager under each condition, some for each member. The table has a
 row for each experiment, manager or pair ("bt - none" is the first less the second), condition and
 metric: `mean`; `median`; `std` of single runs within a condition; and `low90` to `high90`, in which
-the mean of the real runs should be in nine of ten cases. That interval has two parts: what is not
-known of vehicle and software (members differ), and the chance of the real runs. `inputs` is the
-beginning of the SHA-256 of scenario, campaign, revision and ensemble; not of the code.
+the mean of the real runs should be in nine of ten cases. That interval has three parts: what is not
+known of vehicle and software (members differ), the chance of the real runs, and what the model gets
+wrong of runs that it was not fitted to (structural_error.py). The last columns are the beginnings of
+the SHA-256 of what made the row. predictions/earlier.csv was registered without the third part.
 
-`--score` reads real runs of one experiment in any layout that `suave-des compare` reads, in the
-order in which they were made, and says how near the predictions are. A run without a reaction has
-no reaction time, on both sides.
+`--score` reads real runs of one experiment in any layout that `suave-des compare` reads, and says
+how near the predictions are. The condition of a run follows from its start and its failure times,
+and from the order of the runs where these leave several. A run without a reaction has no reaction
+time, on both sides.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ import yaml
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.special import stdtrit
+from structural_error import measured_shares
 
 from suave_des import InputError, mean_of, read_ensemble, read_real, read_runs, run_campaign
 from suave_des.errors import line_error
@@ -188,7 +190,40 @@ def study(folder: Path, runs: int, workers: int) -> pandas.DataFrame:
             for row in predict(missions)
         ]
     columns = [*KEYS, "mean", "median", "std", "low90", "high90", "first_mean", *MADE_OF]
-    return pandas.DataFrame(rows, columns=columns)
+    members = len(read_ensemble(ENSEMBLE)[0].members)
+    return widened(pandas.DataFrame(rows, columns=columns), measured_shares(), members)
+
+
+def widened(rows: pandas.DataFrame, shares: tuple[float, float], members: int) -> pandas.DataFrame:
+    """Add the structural error to the intervals.
+
+    Its standard deviation is a share of the spread of a manager's missions: of the spread in the
+    experiment, or of that in experiment 1, where the shares were measured, if it is larger.
+    `bt_extended` has that of `bt` there.
+
+    Args:
+        rows: the table.
+        shares: of a single condition, and of the mean over all.
+        members: of the ensemble.
+    """
+    spreads: dict[tuple[str, ...], float] = {}
+    parts = rows[rows["condition"] != "all"]
+    for keys, cells in parts.groupby(["experiment", "manager", "metric"], sort=False):
+        variance = (cells["std"] ** 2).mean() + cells["mean"].var(ddof=0)
+        spreads[keys] = float(variance**0.5)
+
+    def structural(row: pandas.Series[Any]) -> float:
+        share, variance = shares[row["condition"] == "all"], 0.0
+        for manager in row["manager"].split(" - "):
+            here = row["experiment"], manager, row["metric"]
+            there = "exp1", manager.removesuffix("_extended"), row["metric"]
+            variance += (share * max(spreads[here], spreads.get(there, 0.0))) ** 2
+        return variance
+
+    quantile = stdtrit(members - 1, (1 + CONFIDENCE) / 2)
+    half = (rows["high90"] - rows["low90"]) / 2.0
+    wide = (half**2 + quantile**2 * rows.apply(structural, axis=1)) ** 0.5
+    return rows.assign(low90=rows["mean"] - wide, high90=rows["mean"] + wide)
 
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
