@@ -334,6 +334,17 @@ def test_without_what_is_taken_out_missions_differ_more_from_the_real_ones(study
     assert 0.0 < shipped["distance_2025"] < 0.7 * changed["distance_2025"]
 
 
+def test_lost_failures_are_weighed_by_their_probability(study):
+    module = study("lost_failures")
+    densities = {"both": 0.1, "1 alone": 0.2, "3 alone": 0.4, "neither": 0.8}
+    of = {name: np.full(2, value) for name, value in densities.items()}
+    likelihoods = [0.1, 0.1, 0.1, 0.4]  # of a late mission and an early one, by hypothesis
+    # p = 1/4: 9/16 x 0.1 + 3/16 x (0.2 + 0.4) + 1/16 x 0.8; 3/4 x 0.4 + 1/4 x 0.8
+    likelihoods += [0.21875, 0.21875, 0.21875, 0.5]
+    found = [module.logs(each, of, np.array([False, True]), 0.25) for each in module.HYPOTHESES]
+    assert np.exp(np.ravel(found)) == pytest.approx(likelihoods)
+
+
 @pytest.mark.parametrize("table", ["speeds", "search_times", "failures"])
 def test_the_committed_facts_are_those_of_the_published_runs(study, table):
     before = pandas.read_csv(FOLDER / "published_facts" / f"{table}.csv")
