@@ -209,8 +209,21 @@ def test_shuffled_runs_are_scored_by_their_starts_and_failure_times(study, tmp_p
 def test_runs_after_missing_ones_keep_their_conditions(study, tmp_path, missing):
     runs = pandas.read_csv(PUBLISHED)
     left = runs[~np.all([runs[name].isin(values) for name, values in missing.items()], axis=0)]
-    file = written(tmp_path / "runs.csv", left.drop(columns=SAYS_CONDITION))
-    assert list(study("predict").assigned("exp1", [file])["condition"]) == list(left["condition"])
+    starts = left[["initial_x_m", "initial_y_m"]].astype(str).agg(", ".join, axis=1)
+    exemplars = pandas.DataFrame(
+        {
+            "mission name": "suave " + left["manager"],
+            "initial pos (x,y)": "(" + starts + ")",
+            "time searching pipeline (s)": left["search_time_s"],
+            "distance inspected (m)": left["distance_inspected_m"],
+            "mean reaction time (s)": left["mean_reaction_time_s"],
+        }
+    )
+    files = [
+        written(tmp_path / f"{manager}_suave.csv", exemplars[left["manager"] == manager])
+        for manager in left["manager"].unique()
+    ]
+    assert list(study("predict").assigned("exp1", files)["condition"]) == list(left["condition"])
 
 
 def test_means_of_some_conditions_are_scored_against_those_of_the_same(study, tmp_path):
