@@ -199,7 +199,8 @@ def widened(rows: pandas.DataFrame, shares: tuple[float, float], members: int) -
 
     Its standard deviation is a share of the spread of a manager's missions: of the spread in the
     experiment, or of that in experiment 1, where the shares were measured, if it is larger.
-    `bt_extended` has that of `bt` there.
+    `bt_extended` has that of `bt` there. Errors of the managers of a pair are taken as independent,
+    as those of managers that were left out are.
 
     Args:
         rows: the table.
@@ -223,7 +224,9 @@ def widened(rows: pandas.DataFrame, shares: tuple[float, float], members: int) -
     quantile = stdtrit(members - 1, (1 + CONFIDENCE) / 2)
     half = (rows["high90"] - rows["low90"]) / 2.0
     wide = (half**2 + quantile**2 * rows.apply(structural, axis=1)) ** 0.5
-    return rows.assign(low90=rows["mean"] - wide, high90=rows["mean"] + wide)
+    low = rows["mean"] - wide
+    is_pair = rows["manager"].str.contains(" - ")
+    return rows.assign(low90=low.where(is_pair, low.clip(lower=0.0)), high90=rows["mean"] + wide)
 
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
@@ -307,7 +310,7 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
         covered += abs(found.value - mean) <= half
         lines.append(
             f"{manager}, {metric}: real {found.value:.2f} ({found.text('.2f')}),"
-            f" predicted {mean:.2f} ({_range(mean - half, mean + half)})"
+            f" predicted {mean:.2f} ({_range(max(0.0, mean - half), mean + half)})"
         )
         for number, part in own.groupby("condition")[metric]:
             if metric == METRICS[0] and (manager, str(number), metric) in table.index:
@@ -333,7 +336,7 @@ def _of_conditions(rows: pandas.DataFrame, runs: pandas.Series[int]) -> tuple[fl
         runs: condition of each run.
     """
     whole, shares = rows.loc["all"], runs.astype(str).value_counts(normalize=True)
-    half = (whole["high90"] - whole["low90"]) / 2.0
+    half = whole["high90"] - whole["mean"]
     few = (len(rows) - 1) / len(shares)  # a mean of fewer conditions is less certain
     return float((rows.loc[shares.index, "mean"] * shares).sum()), half * few**0.5
 
