@@ -429,10 +429,10 @@ def _fitting(experiment: str, runs: pandas.DataFrame) -> NDArray[np.bool_]:
     known["condition"] = list(range(1, count + 1))
     fits = np.ones((len(runs), count), dtype=np.bool_)
     for column, (parameter, added, within) in SAID_BY.items():
-        if column in runs and parameter in known:
+        if column in runs:
             said = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
-            off = said[:, None] - added - np.array(known[parameter], dtype=float)
-            fits &= np.abs(off) <= within
+            right = np.array(known.get(parameter, [np.nan] * count), dtype=float)
+            fits &= np.abs(said[:, None] - added - right) <= within
     return fits
 
 
@@ -440,11 +440,12 @@ def _no_condition(experiment: str, run: pandas.Series[Any]) -> tuple[str, str]:
     """Return what is wrong with a run that is of no condition, and what would be right."""
     said = ", ".join(f"{column} {run[column]}" for column in SAID_BY if column in run)
     swept = _plain(FOLDER / f"{experiment}_campaign.yaml")["sweep"]["zip"]
-    conditions = "; ".join(
-        f"{number}: {', '.join(f'{name} {value:.2f}' for name, value in zip(swept, values, strict=True))}"
+    listed = [
+        f"{number}: {', '.join(f'{value:.2f}' for value in values)}"
         for number, values in enumerate(zip(*swept.values(), strict=True), 1)
-    )
-    return f"{said}: of no condition of {experiment}", f"they are {conditions}"
+    ]
+    remedy = f"its conditions have {', '.join(swept)} of {'; '.join(listed)}"
+    return f"{said}: of no condition of {experiment}", remedy
 
 
 def _in_order(fits: NDArray[np.bool_]) -> NDArray[np.bool_]:

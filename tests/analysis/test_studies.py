@@ -256,6 +256,12 @@ def test_a_foreign_run_is_refused_with_its_line(study, tmp_path, change, line, s
     assert f"runs.csv: line {line}: " in str(found.value) and said in str(found.value)
 
 
+def test_runs_with_failures_are_of_no_experiment_without(study):
+    module = study("predict")
+    with pytest.raises(module.InputError, match=r"line 2: .* of no condition of exp2"):
+        module.scored("exp2", [PUBLISHED])
+
+
 def test_runs_whose_order_does_not_tell_their_conditions_are_refused(study, tmp_path):
     runs = pandas.read_csv(PUBLISHED).drop(columns=SAYS_CONDITION)
     left = runs.drop(index=[10, *range(15, 20)])  # of none, one of condition 3 and all of 4
