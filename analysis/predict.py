@@ -2,11 +2,10 @@
 their score.
 
 Predicted are the experiments of the study of July 2025 and of its extended mission, from the
-configurations of the exemplar's runner: six conditions as its seed 100 draws them, five runs of
-each manager in each. predictions/ has what an earlier `import-config --base planta_exp1
---runner-seed 100` made of each configuration; today's makes the same campaigns, but its scenarios
-are based on release15. Each simulated run has a member of the ensemble of parameter sets that fit
-the known runs (those of experiment 1 and of 2023) about equally well.
+configurations of the exemplar's runner in predictions/configs: six conditions as its seed 100 draws
+them, five runs of each manager in each. The plain command imports them (`suave-des import-config
+--revision 2025 --runner-seed 100`), and simulates. Each simulated run has a member of the ensemble
+of parameter sets that fit the known runs (those of experiment 1 and of 2023) about equally well.
 
     python analysis/predict.py [--out DIR] [--runs N] [--workers N]
     python analysis/predict.py --score EXPERIMENT FILE...
@@ -14,20 +13,24 @@ the known runs (those of experiment 1 and of 2023) about equally well.
 `--runs` are the missions of a manager under each condition, some for each member. The table has a
 row for each experiment, manager or pair ("bt - none" is the first less the second), condition and
 metric: `mean`; `median`; `std` of single runs within a condition; and `low90` to `high90`, in which
-the mean of the real runs should be in nine of ten cases. That interval has two parts: what is not
-known of vehicle and software (members differ), and the chance of the real runs. `inputs` is the
-beginning of the SHA-256 of scenario, campaign, revision and ensemble; not of the code.
+the mean of the real runs should be in nine of ten cases. That interval has three parts: what is not
+known of vehicle and software (members differ), the chance of the real runs, and what the model gets
+wrong of runs that it was not fitted to (structural_error.py). The last columns are the beginnings of
+the SHA-256 of what made the row. predictions/earlier.csv was registered without the third part.
 
-`--score` reads real runs of one experiment in any layout that `suave-des compare` reads, in the
-order in which they were made, and says how near the predictions are. A run without a reaction has
-no reaction time, on both sides.
+`--score` reads real runs of one experiment in any layout that `suave-des compare` reads, and says
+how near the predictions are. The condition of a run follows from its start and its failure times,
+and from the order of the runs where these leave several. A run without a reaction has no reaction
+time, on both sides.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -35,39 +38,81 @@ from typing import Any
 import numpy as np
 import pandas
 import studies
+import yaml
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from scipy.special import stdtrit
+from structural_error import measured_shares
 
-from suave_des import InputError, mean_of, read_ensemble, read_runs, run_campaign
+from suave_des import InputError, mean_of, read_ensemble, read_real, read_runs, run_campaign
+from suave_des.errors import line_error
 
 FOLDER = Path(__file__).with_name("predictions")
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
+ROOT = Path(__file__).parents[1]
 ENSEMBLE = "planta_exp1"
-DECIDING = ("planta_exp1.yaml", "revisions/2025.yaml", f"ensembles/{ENSEMBLE}.csv")
-"""Files in scenarios/ that all predictions rest on."""
+MADE_OF = {
+    "inputs": (
+        "scenarios/planta_exp1.yaml",
+        "scenarios/revisions/2025.yaml",
+        f"scenarios/ensembles/{ENSEMBLE}.csv",
+        "analysis/structural_error/deviations.csv",
+    ),
+    "code": ("suave_des/**/*.py",),
+    "vehicle": ("scenarios/vehicles/*.yaml",),
+    "modes": ("scenarios/*_modes.yaml",),
+    "ontology": ("ontology/*.owl",),
+}
+"""Columns of the table, and the files whose hash they have; `inputs` has an experiment's own, too."""
 EXPERIMENTS = ("exp1", "exp2", "exp3", "extended_exp1", "extended_exp2", "extended_exp3")
 TITLES = {"exp1": "thrusters fail", "exp2": "visibility changes", "exp3": "both"}
 METRICS = ("search_time_s", "distance_inspected_m", "mean_reaction_time_s")
 REAL_RUNS = 5
 """Of each manager under each condition."""
 CONFIDENCE = 0.9
+DRIFT_M, START_WITHIN_M = 0.355, 0.075
+"""How far the vehicle has drifted north when guided mode begins, and how near that is to it."""
+SAID_BY = {
+    "initial_x_m": ("start.x_m", 0.0, START_WITHIN_M),
+    "initial_y_m": ("start.y_m", DRIFT_M, START_WITHIN_M),
+    "nominal_y_m": ("start.y_m", 0.0, 0.01),
+    "start.y_m": ("start.y_m", 0.0, 0.01),
+    "failure_time_s": ("thruster_events.0.time_s", 0.0, 0.1),
+    "thruster_events.0.time_s": ("thruster_events.0.time_s", 0.0, 0.1),
+    "signals.water_visibility.shift_s": ("signals.water_visibility.shift_s", 0.0, 0.1),
+    "condition": ("condition", 0.0, 0.0),
+}
+"""Columns that may say which condition a run is of: the parameter, what is added to it, and how
+near it is.
+"""
 KEYS = ["experiment", "manager", "condition", "metric"]
 
 
-def inputs(experiment: str) -> str:
-    """Return the beginning of the SHA-256 of the files that decide the predictions of an
-    experiment.
-    """
-    own = [FOLDER / f"{experiment}.yaml", FOLDER / f"{experiment}_campaign.yaml"]
-    content = b"".join(
-        path.read_bytes() for path in (*own, *(SCENARIOS / name for name in DECIDING))
-    )
-    return f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
+def import_configurations(folder: Path) -> None:
+    """Make each experiment's scenario and campaign from the files of the exemplar's runner."""
+    folder = folder.resolve()
+    for experiment in EXPERIMENTS:
+        mission = f"v1.5.0_planta_{experiment.removeprefix('extended_')}_mission_config.yaml"
+        command = [sys.executable, "-m", "suave_des", "import-config"]
+        command += [f"planta_{experiment}_runner_config.yml", mission, "--revision", "2025"]
+        command += ["--runner-seed", "100", "--out", str(folder / f"{experiment}.yaml")]
+        command += ["--campaign", str(folder / f"{experiment}_campaign.yaml"), "--overwrite"]
+        subprocess.run(command, check=True, cwd=FOLDER / "configs", stdout=subprocess.DEVNULL)
 
 
-def simulate(experiment: str, runs: int, workers: int) -> pandas.DataFrame:
+def made_of(experiment: str, folder: Path = FOLDER) -> dict[str, str]:
+    """Return the beginnings of the SHA-256 of what decides the predictions of an experiment."""
+    own = [folder / f"{experiment}.yaml", folder / f"{experiment}_campaign.yaml"]
+    found = {}
+    for name, patterns in MADE_OF.items():
+        files = [file for pattern in patterns for file in sorted(ROOT.glob(pattern))]
+        content = b"".join(file.read_bytes() for file in (own if name == "inputs" else []) + files)
+        found[name] = f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
+    return found
+
+
+def simulate(experiment: str, runs: int, workers: int, folder: Path = FOLDER) -> pandas.DataFrame:
     """Run an experiment's missions; their rows, with the number of the condition."""
-    campaign = FOLDER / f"{experiment}_campaign.yaml"
+    campaign = folder / f"{experiment}_campaign.yaml"
     frame = run_campaign(
         campaign, runs=runs, seed=studies.SEED, ensemble=ENSEMBLE, workers=workers, progress=False
     )
@@ -135,17 +180,53 @@ def _predicted(
         yield name, {"mean": mean, "std": within**0.5, "low90": mean - half, "high90": mean + half}
 
 
-def study(runs: int, workers: int, experiments: tuple[str, ...] = EXPERIMENTS) -> pandas.DataFrame:
-    """Predict all experiments: the table."""
+def study(folder: Path, runs: int, workers: int) -> pandas.DataFrame:
+    """Predict all experiments, whose scenarios and campaigns are in a folder: the table."""
     rows = []
-    for experiment in experiments:
-        missions = simulate(experiment, runs, workers)
+    for experiment in EXPERIMENTS:
+        missions = simulate(experiment, runs, workers, folder)
         rows += [
-            {"experiment": experiment, **row, "inputs": inputs(experiment)}
+            {"experiment": experiment, **row, **made_of(experiment, folder)}
             for row in predict(missions)
         ]
-    columns = [*KEYS, "mean", "median", "std", "low90", "high90", "first_mean", "inputs"]
-    return pandas.DataFrame(rows, columns=columns)
+    columns = [*KEYS, "mean", "median", "std", "low90", "high90", "first_mean", *MADE_OF]
+    members = len(read_ensemble(ENSEMBLE)[0].members)
+    return widened(pandas.DataFrame(rows, columns=columns), measured_shares(), members)
+
+
+def widened(rows: pandas.DataFrame, shares: tuple[float, float], members: int) -> pandas.DataFrame:
+    """Add the structural error to the intervals.
+
+    Its standard deviation is a share of the spread of a manager's missions: of the spread in the
+    experiment, or of that in experiment 1, where the shares were measured, if it is larger.
+    `bt_extended` has that of `bt` there. Errors of the managers of a pair are taken as independent,
+    as those of managers that were left out are.
+
+    Args:
+        rows: the table.
+        shares: of a single condition, and of the mean over all.
+        members: of the ensemble.
+    """
+    spreads: dict[tuple[str, ...], float] = {}
+    parts = rows[rows["condition"] != "all"]
+    for keys, cells in parts.groupby(["experiment", "manager", "metric"], sort=False):
+        variance = (cells["std"] ** 2).mean() + cells["mean"].var(ddof=0)
+        spreads[keys] = float(variance**0.5)
+
+    def structural(row: pandas.Series[Any]) -> float:
+        share, variance = shares[row["condition"] == "all"], 0.0
+        for manager in row["manager"].split(" - "):
+            here = row["experiment"], manager, row["metric"]
+            there = "exp1", manager.removesuffix("_extended"), row["metric"]
+            variance += (share * max(spreads[here], spreads.get(there, 0.0))) ** 2
+        return variance
+
+    quantile = stdtrit(members - 1, (1 + CONFIDENCE) / 2)
+    half = (rows["high90"] - rows["low90"]) / 2.0
+    wide = (half**2 + quantile**2 * rows.apply(structural, axis=1)) ** 0.5
+    low = rows["mean"] - wide
+    is_pair = rows["manager"].str.contains(" - ")
+    return rows.assign(low90=low.where(is_pair, low.clip(lower=0.0)), high90=rows["mean"] + wide)
 
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
@@ -199,23 +280,19 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
 
     Args:
         rows: predictions of one experiment.
-        real: its runs, with the columns of `suave_des.records.runs.COLUMNS`; five under each
-            condition, in their order.
+        real: its runs, as of `assigned`.
     """
-    if "condition" not in real:
-        real = real.assign(condition=real.groupby("manager").cumcount() // REAL_RUNS + 1)
     table = rows.set_index(["manager", "condition", "metric"])
     lines, medians, agreeing = [], [], []
     inside = covered = n = 0
     for manager, metric in dict.fromkeys(zip(rows["manager"], rows["metric"], strict=True)):
-        predicted, first, _, second = (
-            table.loc[(manager, "all", metric)],
-            *manager.partition(" - "),
-        )
-        own, ends = real[real["manager"] == first], (predicted["low90"], predicted["high90"])
+        first, _, second = manager.partition(" - ")
+        own = real[real["manager"] == first]
         if second:
             low, high = _difference(own, real[real["manager"] == second], metric)
             if low == low:
+                predicted = table.loc[(manager, "all", metric)]
+                ends = predicted["low90"], predicted["high90"]
                 agreeing.append(_better(low, high) == _better(*ends))
                 verdict = "agree" if agreeing[-1] else "DIFFER"
                 lines.append(
@@ -226,11 +303,14 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
         if len(values) < 2:
             continue
         found = mean_of(values.tolist())
-        n, inside = n + 1, inside + found.contains(predicted["mean"])
-        covered += ends[0] <= found.value <= ends[1]
+        mean, half = _of_conditions(
+            table.loc[manager, :, metric], own.loc[values.index, "condition"]
+        )
+        n, inside = n + 1, inside + found.contains(mean)
+        covered += abs(found.value - mean) <= half
         lines.append(
             f"{manager}, {metric}: real {found.value:.2f} ({found.text('.2f')}),"
-            f" predicted {predicted['mean']:.2f} ({_range(*ends)})"
+            f" predicted {mean:.2f} ({_range(max(0.0, mean - half), mean + half)})"
         )
         for number, part in own.groupby("condition")[metric]:
             if metric == METRICS[0] and (manager, str(number), metric) in table.index:
@@ -246,6 +326,19 @@ def score(rows: pandas.DataFrame, real: pandas.DataFrame) -> str:
         far = f"median {np.median(medians):.1f} s, greatest {max(medians):.1f} s"
         lines.append(f"Median search times of single conditions differ by: {far}.")
     return "\n".join(lines)
+
+
+def _of_conditions(rows: pandas.DataFrame, runs: pandas.Series[int]) -> tuple[float, float]:
+    """Return mean and half interval of the conditions that real runs were made under.
+
+    Args:
+        rows: of one manager and metric, by condition.
+        runs: condition of each run.
+    """
+    whole, shares = rows.loc["all"], runs.astype(str).value_counts(normalize=True)
+    half = whole["high90"] - whole["mean"]
+    few = (len(rows) - 1) / len(shares)  # a mean of fewer conditions is less certain
+    return float((rows.loc[shares.index, "mean"] * shares).sum()), half * few**0.5
 
 
 def _better(low: float, high: float) -> int:
@@ -284,13 +377,103 @@ def _difference(
     return mean - half, mean + half
 
 
+# The conditions of real runs
+
+
+def assigned(experiment: str, files: Sequence[Path]) -> pandas.DataFrame:
+    """Read real runs of an experiment, each with the number of its condition, from 1.
+
+    A run is of the condition that has its start, less the drift, its failure time and its shift of
+    the visibility, as far as the file has them. Where several have, the order of a manager's runs
+    decides: the exemplar's runner makes five under each condition, one condition after the other.
+    Some may be missing.
+
+    Raises:
+        InputError: with file and line: a run is of no condition or manager of the experiment, or it
+            may be of several.
+    """
+    runs = read_real(files).frame
+    places = [(path, line) for path in files for line in read_runs(path).frame.index]
+    managers = _plain(FOLDER / f"{experiment}_campaign.yaml")["managers"]
+    numbers = pandas.Series(0, runs.index)
+    fits = _fitting(experiment, runs)
+    for manager, own in runs.groupby("manager", sort=False):
+        possible = fits[own.index]
+        for row in own.index[~possible.any(axis=1)]:
+            raise line_error(*places[row], *_no_condition(experiment, runs.loc[row]))
+        if manager not in managers:
+            problem = f"nothing is predicted of manager {manager} in {experiment}"
+            raise line_error(*places[own.index[0]], problem, f"of {', '.join(managers)}")
+        if (possible.sum(axis=1) > 1).any():
+            possible = _in_order(possible)
+        for row, found in zip(own.index, possible, strict=True):
+            if found.sum() != 1:
+                listed = " or ".join(str(number + 1) for number in np.flatnonzero(fits[row]))
+                problem = f"this run may be of condition {listed}, and the order does not tell"
+                remedy = "add a column condition, or failure_time_s if thrusters fail"
+                raise line_error(*places[row], problem, remedy)
+            numbers[row] = found.argmax() + 1
+    return runs.assign(condition=numbers)
+
+
+def _plain(path: Path) -> dict[str, Any]:
+    content: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return content
+
+
+def _fitting(experiment: str, runs: pandas.DataFrame) -> NDArray[np.bool_]:
+    """Return which conditions each run fits, shape (runs, conditions)."""
+    swept = _plain(FOLDER / f"{experiment}_campaign.yaml")["sweep"]["zip"]
+    count = len(swept["start.y_m"])
+    known = {**swept, "start.x_m": [_plain(FOLDER / f"{experiment}.yaml")["start"]["x_m"]] * count}
+    known["condition"] = list(range(1, count + 1))
+    fits = np.ones((len(runs), count), dtype=np.bool_)
+    for column, (parameter, added, within) in SAID_BY.items():
+        if column in runs:
+            said = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
+            right = np.array(known.get(parameter, [np.nan] * count), dtype=float)
+            fits &= np.abs(said[:, None] - added - right) <= within
+    return fits
+
+
+def _no_condition(experiment: str, run: pandas.Series[Any]) -> tuple[str, str]:
+    """Return what is wrong with a run that is of no condition, and what would be right."""
+    said = ", ".join(f"{column} {run[column]}" for column in SAID_BY if column in run)
+    swept = _plain(FOLDER / f"{experiment}_campaign.yaml")["sweep"]["zip"]
+    listed = [
+        f"{number}: {', '.join(f'{value:.2f}' for value in values)}"
+        for number, values in enumerate(zip(*swept.values(), strict=True), 1)
+    ]
+    remedy = f"its conditions have {', '.join(swept)} of {'; '.join(listed)}"
+    return f"{said}: of no condition of {experiment}", remedy
+
+
+def _in_order(fits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which conditions runs may be of if each condition has at most five, in a row, and
+    conditions follow each other; shape (runs, conditions), as of `fits`.
+    """
+    count = fits.shape[1]
+
+    def following(state: tuple[int, int]) -> set[tuple[int, int]]:
+        condition, made = state
+        same = {(condition, made + 1)} if condition >= 0 and made < REAL_RUNS else set()
+        return same | {(later, 1) for later in range(condition + 1, count)}
+
+    reached = [{(-1, 0)}]
+    for row in fits:
+        ahead = {new for state in reached[-1] for new in following(state)}
+        reached.append({state for state in ahead if row[state[0]]})
+    possible, kept = np.zeros_like(fits), reached[-1]
+    for number in reversed(range(len(fits))):
+        possible[number, [condition for condition, _ in kept]] = True
+        kept = {state for state in reached[number] if following(state) & kept}
+    return possible
+
+
 def scored(experiment: str, files: list[Path]) -> str:
     """Read real runs of an experiment, and score the committed predictions of it."""
     rows = pandas.read_csv(FOLDER / "predictions.csv", dtype={"condition": str})
-    return score(
-        rows[rows["experiment"] == experiment],
-        pandas.concat([read_runs(path).frame for path in files]),
-    )
+    return score(rows[rows["experiment"] == experiment], assigned(experiment, files))
 
 
 def main() -> None:
@@ -311,9 +494,10 @@ def main() -> None:
         return
     members = len(read_ensemble(ENSEMBLE)[0].members)
     chosen = studies.options(str(FOLDER), __doc__ or "", runs=10 * members)
-    studies.write(
-        chosen, "predictions", study(chosen.runs, chosen.workers), draw, conclude, height=4.0
-    )
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    import_configurations(chosen.out)
+    rows = study(chosen.out, chosen.runs, chosen.workers)
+    studies.write(chosen, "predictions", rows, draw, conclude, height=4.0)
 
 
 if __name__ == "__main__":
