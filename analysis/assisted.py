@@ -27,6 +27,7 @@ from suave_des import load_scenario, run_campaign
 from suave_des.records.missions import missions_in
 from suave_des.results import style
 from suave_des.results.assisted import (
+    EACH_OF_TWO,
     LEAST_TO_WEIGH,
     UNLIKE,
     USEFUL,
@@ -71,11 +72,13 @@ DRAWN = {
 """What the study's runner drew for every five runs."""
 DRAWS, EACH, LEFT = 200, 5, 3
 """Conditions, missions under each, and how many of these are the simulator's."""
-SAMPLES = ((6, 1), (6, 5), (12, 1), (30, 1))
+SAMPLES = ((6, 1), (6, 5), (8, 1), (12, 1), (20, 1), (30, 1))
 """Conditions of the real missions, and missions under each."""
 RESAMPLES = 6_000
 LATE_S = 60.0
 """By how much real missions are late in the conditions of which the simulation knows nothing."""
+MEDIAN_S = 5.0
+"""Median of the times by which they are late in all."""
 OF_ALL_METRICS = 5
 """So many of the cases; the others move search times."""
 SPLIT_S, SPLIT = 65.0, 0.4
@@ -160,13 +163,23 @@ def system_of(frame: pandas.DataFrame, metric: str) -> System:
     }
 
 
-def late(system: System, share: float, managers: Sequence[str] = MANAGERS) -> System:
+def late(
+    system: System, share: float, by_s: float = LATE_S, managers: Sequence[str] = MANAGERS
+) -> System:
     """Return a system whose missions are late in a share of the conditions."""
     is_late = np.random.default_rng(studies.SEED).random(DRAWS) < share
     return {
-        name: values + LATE_S * is_late[:, None] * (name in managers)
+        name: values + by_s * is_late[:, None] * (name in managers)
         for name, values in system.items()
     }
+
+
+def often_late(system: System, sigma: float) -> System:
+    """Return a system whose missions are late in each condition, by times whose logarithms are
+    normally distributed.
+    """
+    late_s = MEDIAN_S * np.random.default_rng(studies.SEED).lognormal(0.0, sigma, (DRAWS, 1))
+    return {name: values + late_s for name, values in system.items()}
 
 
 def split(system: System, share: float) -> System:
@@ -192,9 +205,13 @@ def cases_of(systems: Mapping[str, System]) -> Iterator[Case]:
     yield Case("unrelated simulator", members, unrelated)
     yield Case("16% with two outcomes", [split(each, 0.16) for each in members], shipped)
     yield Case("8% late", [late(each, 0.08) for each in members], shipped)
+    one = [late(each, 0.08, managers=["bt"]) for each in members]
+    yield Case("8% late under one manager", one, shipped)
+    yield Case("5% late by 100 s", [late(each, 0.05, 100.0) for each in members], shipped)
+    yield Case("late by log-normal times", [often_late(each, 1.0) for each in members], shipped)
     yield Case("15% late", [late(each, 0.15) for each in members], shipped, is_beyond=True)
-    one = [late(each, 0.08, ["bt"]) for each in members]
-    yield Case("8% late under one manager", one, shipped, is_beyond=True)
+    wide = [often_late(each, 1.5) for each in members]
+    yield Case("late by wider log-normal times", wide, shipped, is_beyond=True)
 
 
 # Coverage
@@ -215,23 +232,34 @@ class Sampled(NamedTuple):
         population: means under all other conditions are taken from these, shape (conditions,).
         by_chance: variances that real, same and population have by chance, each (samples,) or a
             number.
+        spread: of the real missions of one manager or another, the greater standard deviation,
+            shape (samples,).
     """
 
     real: Array
     same: Array
     population: Array
     by_chance: tuple[Array, Array, float]
+    spread: Array | float = 0.0
 
 
 def sampled(
-    real: Cells, simulator: Cells, size: tuple[int, int], samples: int, chance: np.random.Generator
+    real: Sequence[Cells],
+    simulator: Cells,
+    size: tuple[int, int],
+    samples: int,
+    chance: np.random.Generator,
 ) -> Sampled:
-    """Draw conditions, missions under each, and the simulated missions that assist them."""
+    """Draw conditions, missions under each, and the simulated missions that assist them; the real
+    ones of one manager, or of two, whose differences count.
+    """
     conditions, runs_each = size
     places = chance.integers(0, DRAWS, (samples, conditions))
     # Points of a sweep share the random numbers of a run, which real missions do not.
     runs = np.argsort(chance.random((samples, conditions, EACH)), axis=2)
-    ours = np.take_along_axis(real[places], runs[..., :runs_each], axis=2)
+    of_each = [np.take_along_axis(own[places], runs[..., :runs_each], axis=2) for own in real]
+    ours = of_each[0] - of_each[1] if len(real) > 1 else of_each[0]
+    spread = np.max([own.mean(axis=2).std(axis=1, ddof=1) for own in of_each], axis=0)
     theirs = np.take_along_axis(simulator[places], runs[..., -LEFT:], axis=2)
     within = theirs.var(axis=2, ddof=1).mean(axis=1)
     repeated = ours.var(axis=2, ddof=1).mean(axis=1) if runs_each > 1 else 0.0
@@ -240,10 +268,10 @@ def sampled(
         within / LEFT,
         float(simulator.var(axis=1, ddof=1).mean()),
     )
-    return Sampled(ours.mean(axis=2), theirs.mean(axis=2), simulator[:, 0], by_chance)
+    return Sampled(ours.mean(axis=2), theirs.mean(axis=2), simulator[:, 0], by_chance, spread)
 
 
-def intervals(of: Sampled, spread: float) -> tuple[Array, Array, Array]:
+def intervals(of: Sampled, spread: Array | float | None) -> tuple[Array, Array, Array]:
     """Return mean, half-width and weight of each sample as results.assisted.assisted_mean estimates
     them, but for all samples at once; a test compares the two.
     """
@@ -253,24 +281,25 @@ def intervals(of: Sampled, spread: float) -> tuple[Array, Array, Array]:
     else:
         left = (of.real - of.same).std(axis=1, ddof=1)
         weight = (left <= USEFUL * of.real.std(axis=1, ddof=1)).astype(float)
-    half, alone = _half(of, spread, weight), _half(of, spread, np.zeros(samples))
+    half, alone = (_half(of, spread, each) for each in (weight, np.zeros(samples)))
     counts = half < alone
     weight = np.where(counts, weight, 0.0)
     mean = of.real.mean(axis=1) + weight * (of.population.mean() - of.same.mean(axis=1))
     return mean, np.where(counts, half, alone), weight
 
 
-def _half(of: Sampled, spread: float, weight: Array) -> Array:
+def _half(of: Sampled, spread: Array | float | None, weight: Array) -> Array:
     conditions, draws = of.real.shape[1], len(of.population)
     chance_real, chance_same, chance_population = of.by_chance
     total = float(of.population.var(ddof=1))
     between = max(0.0, total - chance_population)
     seen = (of.real - weight[:, None] * of.same).var(axis=1, ddof=1)
     least = (1.0 - weight) ** 2 * between + chance_real + weight**2 * chance_same
-    simulated = total / draws + (UNLIKE * spread) ** 2
-    variance = np.maximum(seen, least) / conditions + weight**2 * simulated
+    apart = weight * np.sqrt(between) if spread is None else spread
+    variance = np.maximum(seen, least) / conditions
+    variance += weight**2 * total / draws + (UNLIKE * apart) ** 2
     is_estimated = (weight > 0.0) & (conditions >= LEAST_TO_WEIGH)
-    return t.ppf(0.975, conditions - 1 - is_estimated) * np.sqrt(variance)
+    return t.ppf((1.0 + EACH_OF_TWO) / 2.0, conditions - 1 - is_estimated) * np.sqrt(variance)
 
 
 def _weight_of_least_variance(of: Sampled) -> Array:
@@ -284,8 +313,8 @@ def _weight_of_least_variance(of: Sampled) -> Array:
     return np.clip(weight, 0.0, 1.0)
 
 
-def spread_of_all(case: Case, both: Sequence[str]) -> float:
-    """Return the standard deviation of conditions, the greater one of two managers."""
+def simulated_spread(case: Case, both: Sequence[str]) -> float:
+    """Return the greater standard deviation of conditions of two managers."""
     cells = (case.simulator[name] for name in both)
     return max(spread_of(each[:, 0], float(each.var(axis=1, ddof=1).mean())) for each in cells)
 
@@ -304,12 +333,15 @@ def coverage(
     simulator = signed(case.simulator, both)
     parts = []
     for system in case.real:
-        real = signed(system, both)
+        real = [system[name] for name in both]
+        true = signed(system, both).mean()
         of = sampled(real, simulator, size, resamples // len(case.real), chance)
-        mean, half, weight = intervals(of, spread_of_all(case, both))
-        spread, conditions = of.real.std(axis=1, ddof=1), of.real.shape[1]
-        alone_half = t.ppf(0.975, conditions - 1) * spread / np.sqrt(conditions)
-        off = of.real.mean(axis=1) - real.mean(), mean - real.mean()
+        spread = np.maximum(of.spread, simulated_spread(case, both)) if len(both) > 1 else None
+        mean, half, weight = intervals(of, spread)
+        conditions = of.real.shape[1]
+        std = of.real.std(axis=1, ddof=1)
+        alone_half = t.ppf(0.975, conditions - 1) * std / np.sqrt(conditions)
+        off = of.real.mean(axis=1) - true, mean - true
         parts.append(np.array([*off, alone_half, half, weight]))
     alone_off, assisted_off, alone_half, assisted_half, weight = np.hstack(parts)
     return {

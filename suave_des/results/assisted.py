@@ -18,7 +18,7 @@ import numpy as np
 import pandas
 
 from suave_des.errors import InputError, number_of
-from suave_des.estimates import STUDENT, Estimate, std_of, t_quantile
+from suave_des.estimates import CONFIDENCE, STUDENT, Estimate, std_of, t_quantile
 from suave_des.records.metrics import FOUND, Metric
 from suave_des.results import statistics
 from suave_des.results.comparison import Row, estimate_in
@@ -34,10 +34,12 @@ LEAST_TO_WEIGH = 10
 gains. Nor can fewer tell how many real missions a simulation is worth.
 """
 UNLIKE = 0.1
-"""Share of all conditions in which real and simulated missions may differ by twice the standard
-deviation of conditions, without any of those sampled showing it. analysis/assisted.py says what
+"""Share of all conditions in which real and simulated missions, or two managers, may differ by twice
+the standard deviation of conditions more than in those sampled. analysis/assisted.py says what
 intervals with it hold.
 """
+EACH_OF_TWO = (1.0 + CONFIDENCE) / 2.0
+"""Confidence of an interval of which the narrower of two is given (Bonferroni)."""
 _LEAST_SIMULATED, _LEAST_DRAWS = 2, 10
 USEFUL = 0.5
 """With few conditions the simulation counts if what it leaves of their standard deviation is less."""
@@ -77,11 +79,12 @@ def assisted_mean(
 
     With less than LEAST_TO_WEIGH conditions, the weight of the simulation is 1 where real - same
     varies at most half as much (standard deviation) as real does; with more, it is that of PPI++.
-    It is 0 where that makes the interval narrower.
+    It is 0 where that makes the interval narrower; so each of the two is one of 97.5%.
 
-    The interval allows for UNLIKE of all conditions. What the conditions show of their variance is
-    not taken to be less than what follows from chance and from how the population varies: a few
-    may be alike by accident.
+    Where differences are averaged, real - same or those of two managers, the interval allows for
+    UNLIKE of all conditions: differences may be small in all that are sampled, and great in a few
+    others. What the conditions show of their variance is not taken to be less than what follows
+    from chance and from how the population varies: a few may be alike by accident.
 
     Args:
         real: mean of the real missions under each condition, shape (conditions,).
@@ -89,24 +92,25 @@ def assisted_mean(
         population: mean of the simulated missions under each of many other conditions, shape
             (draws,).
         chance: in these means.
-        spread: standard deviation of conditions, by which unlike ones may be off; by default that
-            of the population. Differences of two managers vary less, but what the simulation does
-            not know of one manager need not be the same for the other: theirs is the greater of the
-            managers'.
+        spread: for a difference of two managers, the greater standard deviation of conditions under
+            one of them. None: the mean is one manager's.
 
     Returns:
         The mean, with its interval by Student's t over the conditions, and the weight of the
         simulation, from 0 to 1.
     """
     sides = real, same, population
-    if spread is None:
-        spread = spread_of(population, chance.population)
-    alone = _weighed(sides, chance, spread, 0.0)
     if len(real) >= LEAST_TO_WEIGH:
         weight = _weight_of_least_variance(*sides)
     else:
         weight = float((real - same).std(ddof=1) <= USEFUL * real.std(ddof=1))
-    assisted = _weighed(sides, chance, spread, weight)
+    if spread is None:
+        spread = spread_of(population, chance.population)
+        alone = _weighed(sides, chance, 0.0, 0.0)
+        assisted = _weighed(sides, chance, weight, weight * spread)
+    else:
+        alone = _weighed(sides, chance, 0.0, spread)
+        assisted = _weighed(sides, chance, weight, spread)
     if weight > 0.0 and assisted.high - assisted.low < alone.high - alone.low:
         return assisted, weight
     return alone, 0.0
@@ -118,20 +122,20 @@ def spread_of(population: Sample, chance: float) -> float:
 
 
 def _weighed(
-    sides: tuple[Sample, Sample, Sample], chance: Chance, spread: float, weight: float
+    sides: tuple[Sample, Sample, Sample], chance: Chance, weight: float, apart: float
 ) -> Estimate:
-    """Estimate the mean with a weight of the simulation."""
+    """Estimate the mean with a weight of the simulation, and UNLIKE conditions 2 * apart off."""
     real, same, population = sides
     n = len(real)
     between = spread_of(population, chance.population) ** 2
     seen = float((real - weight * same).var(ddof=1))
     least = (1.0 - weight) ** 2 * between + chance.real + weight**2 * chance.same
     of_population = float(population.var(ddof=1)) / len(population)
-    simulated = of_population + chance.shared + (UNLIKE * spread) ** 2
-    variance = max(seen, least) / n + weight**2 * simulated
+    simulated = weight**2 * (of_population + chance.shared)
+    variance = max(seen, least) / n + simulated + (UNLIKE * apart) ** 2
     is_estimated = n >= LEAST_TO_WEIGH and weight > 0.0  # which takes a degree of freedom
     mean = float(real.mean() + weight * (population.mean() - same.mean()))
-    half = t_quantile(n - 2 if is_estimated else n - 1) * math.sqrt(variance) or math.nan
+    half = t_quantile(n - 2 if is_estimated else n - 1, EACH_OF_TWO) * math.sqrt(variance) or math.nan
     return Estimate(mean, mean - half, mean + half, STUDENT)
 
 
@@ -187,8 +191,9 @@ class AssistedComparison(Written):
             "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
             "alone: mean over these conditions. assisted: mean over the population's, from alone + weight * (population -"
             " simulated under the same conditions).",
-            f"Assisted intervals allow for conditions unlike those of the real missions: {UNLIKE:.0%} of all, off by twice"
-            " the standard deviation of conditions.",
+            "Assisted intervals, the narrower of two of 97.5%, allow for conditions unlike those of the real missions:"
+            f" {UNLIKE:.0%} of all, in which the simulation, or the other manager, is off by twice the standard deviation of"
+            " conditions.",
         )
         return [*how, *(f"Note: {note}." for note in self.notes)]
 
@@ -283,7 +288,8 @@ def _estimate(both: list[str], metric: Metric, means: _Means) -> dict[str, Any]:
     else:
         alone = statistics.mean_interval(real)
         by_chance = own["same_var"].mean() / means.draws["draw_n"].unstack().mean()
-        spread = max(spread_of(draws[name].to_numpy(), by_chance[name]) for name in both)
+        drawn = [spread_of(draws[name].to_numpy(), by_chance[name]) for name in both]
+        spread = max(*drawn, *own["real"].std()) if len(both) > 1 else None
         chance = _chance(own, means, signs, both)
         assisted, weight = assisted_mean(real, same, population, chance, spread)
     runs = int(own["real_n"].sum().sum())

@@ -231,15 +231,17 @@ def test_intervals_hold_the_mean_of_whatever_plays_the_real_system(study, size, 
     assert module.coverage(case, ["bt"], size, 100)["assisted"] >= 0.92
 
 
+@pytest.mark.parametrize("spread", [None, 50.0])
 @pytest.mark.parametrize("conditions", [6, 12])
-def test_intervals_of_many_samples_are_those_of_each(study, conditions):
+def test_intervals_of_many_samples_are_those_of_each(study, conditions, spread):
     module, chance = study("assisted"), np.random.default_rng(1)
     at, many = chance.normal(100.0, 30.0, (40, conditions)), chance.normal(100.0, 30.0, 80)
-    off = chance.normal(0.0, 30.0, (40, conditions)) * np.linspace(0.0, 1.0, 40)[:, None]
+    turned = 100.0 + np.linspace(1.0, -1.0, 40)[:, None] * (at - 100.0)
+    same = turned + chance.normal(0.0, 5.0, at.shape)
     by_chance = np.full(40, 30.0), np.full(40, 4.0), 9.0
-    found = module.intervals(module.Sampled(at, at + off, many, by_chance), 50.0)
-    pairs = zip(at, at + off, strict=True)
-    one = [assisted_mean(*each, many, Chance(30.0, 4.0, 9.0), 50.0) for each in pairs]
+    found = module.intervals(module.Sampled(at, same, many, by_chance), spread)
+    pairs = zip(at, same, strict=True)
+    one = [assisted_mean(*each, many, Chance(30.0, 4.0, 9.0), spread) for each in pairs]
     expected = [(mean.value, mean.high - mean.value, weight) for mean, weight in one]
     assert len({weight > 0.0 for *_, weight in expected}) == 2
     np.testing.assert_allclose(np.transpose(found), expected, rtol=0.0, atol=1e-9)
