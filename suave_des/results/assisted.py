@@ -135,7 +135,9 @@ def _weighed(
     variance = max(seen, least) / n + simulated + (UNLIKE * apart) ** 2
     is_estimated = n >= LEAST_TO_WEIGH and weight > 0.0  # which takes a degree of freedom
     mean = float(real.mean() + weight * (population.mean() - same.mean()))
-    half = t_quantile(n - 2 if is_estimated else n - 1, EACH_OF_TWO) * math.sqrt(variance) or math.nan
+    half = (
+        t_quantile(n - 2 if is_estimated else n - 1, EACH_OF_TWO) * math.sqrt(variance) or math.nan
+    )
     return Estimate(mean, mean - half, mean + half, STUDENT)
 
 

@@ -503,9 +503,17 @@ def matched(
     with located(place="population"):
         _check_scenario(same, population, names)
         draws = population[names].drop_duplicates()
+        flown = conditions.loc[sorted(set(real[CONDITION] - 1))]
         for name in names:
-            flown = conditions.loc[sorted(set(real[CONDITION] - 1)), name]
-            _check_drawn(name, flown, draws[name])
+            _check_drawn(name, flown[name], draws[name])
+        for one, other in combinations(names, 2):
+            if _are_shifted_together(flown, one, other) and not _are_shifted_together(
+                draws, one, other
+            ):
+                problem = (
+                    f"it draws {one} and {other} apart, which the real conditions shift together"
+                )
+                raise InputError(problem, remedy=_DRAW)
     by_draw = population.groupby(names, sort=False, dropna=False)
     return real, same, population.assign(draw=by_draw.ngroup())
 
@@ -554,6 +562,12 @@ def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]
         problem = f"it draws {name} otherwise than the real conditions are spread"
         ends = f"{low:g} to {high:g}, and these {values.min():g} to {values.max():g}"
         raise InputError(f"{problem}: from {ends} (Kolmogorov-Smirnov p < {_SURELY})", remedy=_DRAW)
+
+
+def _are_shifted_together(conditions: pandas.DataFrame, one: str, other: str) -> bool:
+    """Return whether two parameters differ by the same in all conditions, and vary."""
+    values = conditions[[one, other]].apply(pandas.to_numeric, errors="coerce")
+    return bool(values[one].nunique() > 2 and np.ptp(values[one] - values[other]) <= _ABSOLUTE)
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:

@@ -65,6 +65,11 @@ def shifted(by: float, times: float = 1.0) -> pandas.DataFrame:
     return frame.assign(**{"start.y_m": times * frame["start.y_m"] + by})
 
 
+def with_depth(frame: pandas.DataFrame, slope: float) -> pandas.DataFrame:
+    """Starts at depths of -4 to -2 m, which rise or fall with start.y_m."""
+    return frame.assign(**{"start.z_m": slope * (frame["start.y_m"] - 2.0) - 3.0})
+
+
 def compared(**changed: pandas.DataFrame) -> AssistedComparison:
     given = {
         "real": real_missions(2, 25.0),
@@ -172,7 +177,7 @@ def test_differences_of_managers_allow_for_conditions_in_which_one_is_late(n):
     for _ in range(200):
         real = chance.normal(0.0, 1.0, n) + 60.0 * (chance.random(n) < 0.08)
         same = chance.normal(0.0, 1.0, n)
-        found, weight = assisted_mean(real, same, many, Chance(1.0, 1.0, 1.0), 33.0)
+        found, _ = assisted_mean(real, same, many, Chance(1.0, 1.0, 1.0), 33.0)
         covered += found.contains(0.08 * 60.0)
     assert covered / 200 >= 0.93
 
@@ -331,6 +336,14 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit():
         (
             {"population": shifted(-25.0, 25.0)},
             "population: it draws start.y_m otherwise than the real conditions are spread: from",
+        ),
+        (
+            {
+                "real": with_depth(real_missions(2), 1.0),
+                "same": with_depth(missions(2, POINTS, 5), 1.0),
+                "population": with_depth(population(), -1.0),
+            },
+            "population: it draws start.y_m and start.z_m apart, which the real conditions shift",
         ),
         ({"population": missions(2, POINTS, 5)}, "it sweeps start.y_m"),
         (
