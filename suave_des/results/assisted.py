@@ -100,17 +100,12 @@ def assisted_mean(
         simulation, from 0 to 1.
     """
     sides = real, same, population
+    alone = _weighed(sides, chance, spread, 0.0)
     if len(real) >= LEAST_TO_WEIGH:
         weight = _weight_of_least_variance(*sides)
     else:
         weight = float((real - same).std(ddof=1) <= USEFUL * real.std(ddof=1))
-    if spread is None:
-        spread = spread_of(population, chance.population)
-        alone = _weighed(sides, chance, 0.0, 0.0)
-        assisted = _weighed(sides, chance, weight, weight * spread)
-    else:
-        alone = _weighed(sides, chance, 0.0, spread)
-        assisted = _weighed(sides, chance, weight, spread)
+    assisted = _weighed(sides, chance, spread, weight)
     if weight > 0.0 and assisted.high - assisted.low < alone.high - alone.low:
         return assisted, weight
     return alone, 0.0
@@ -122,14 +117,15 @@ def spread_of(population: Sample, chance: float) -> float:
 
 
 def _weighed(
-    sides: tuple[Sample, Sample, Sample], chance: Chance, weight: float, apart: float
+    sides: tuple[Sample, Sample, Sample], chance: Chance, spread: float | None, weight: float
 ) -> Estimate:
-    """Estimate the mean with a weight of the simulation, and UNLIKE conditions 2 * apart off."""
+    """Estimate the mean with a weight of the simulation."""
     real, same, population = sides
     n = len(real)
-    between = spread_of(population, chance.population) ** 2
+    between = spread_of(population, chance.population)
+    apart = weight * between if spread is None else spread
     seen = float((real - weight * same).var(ddof=1))
-    least = (1.0 - weight) ** 2 * between + chance.real + weight**2 * chance.same
+    least = ((1.0 - weight) * between) ** 2 + chance.real + weight**2 * chance.same
     of_population = float(population.var(ddof=1)) / len(population)
     simulated = weight**2 * (of_population + chance.shared)
     variance = max(seen, least) / n + simulated + (UNLIKE * apart) ** 2
@@ -190,12 +186,14 @@ class AssistedComparison(Written):
     def remarks(self) -> list[str]:
         """Describe the numbers, and what to know about the data."""
         how = (
-            "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
-            "alone: mean over these conditions. assisted: mean over the population's, from alone + weight * (population -"
-            " simulated under the same conditions).",
-            "Assisted intervals, the narrower of two of 97.5%, allow for conditions unlike those of the real missions:"
-            f" {UNLIKE:.0%} of all, in which the simulation, or the other manager, is off by twice the standard deviation of"
-            " conditions.",
+            "n: real missions in conditions, over which the intervals are, as missions of one are"
+            " alike: of means by Student's t, of shares by Wilson, or Bonett and Price.",
+            "alone: mean over these conditions. assisted: mean over the population's, from alone +"
+            " weight * (population - simulated under the same conditions).",
+            "Assisted intervals of means are the narrower of two, with and without the simulation,"
+            " and so each of 97.5%. They allow for conditions unlike those of the real missions:"
+            f" {UNLIKE:.0%} of all, in which the simulation, or the other manager, is off by twice"
+            " the standard deviation of conditions.",
         )
         return [*how, *(f"Note: {note}." for note in self.notes)]
 
@@ -225,29 +223,11 @@ def compare_assisted(real: Groups) -> AssistedComparison:
             for frame, name in ((in_real, "real"), (in_same, "same"))
         ]
         conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
-        means = _Means(
-            conditions, _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
-        )
+        draws = _means(drawn, "draw", metric.name, "draw")
+        shared = _shared(in_same, metric.name)
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
-            rows.append(_estimate(both, metric, means))
+            rows.append(_estimate(both, metric, conditions, draws, shared))
     return AssistedComparison(pandas.DataFrame(rows), tuple(notes), real.metrics)
-
-
-@dataclass(frozen=True)
-class _Means:
-    """Means of one metric.
-
-    Attributes:
-        conditions: by condition and manager: real and same, each with its variance (_var) and its
-            number of missions (_n).
-        draws: likewise draw, by draw and manager.
-        shared: by run and manager how far simulated missions are on average from the mean of their
-            condition.
-    """
-
-    conditions: pandas.DataFrame
-    draws: pandas.DataFrame
-    shared: pandas.DataFrame
 
 
 def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.DataFrame:
@@ -272,27 +252,46 @@ def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
     )
 
 
-def _estimate(both: list[str], metric: Metric, means: _Means) -> dict[str, Any]:
+def _of(both: list[str], means: pandas.DataFrame) -> Any:
+    """Return a column for each value and manager."""
+    by_manager: Any = means.unstack()
+    return by_manager.reindex(columns=pandas.MultiIndex.from_product([means.columns, both]))
+
+
+def _estimate(
+    both: list[str],
+    metric: Metric,
+    conditions: pandas.DataFrame,
+    draws: pandas.DataFrame,
+    shared: pandas.DataFrame,
+) -> dict[str, Any]:
     """Estimate the mean of one manager, or the difference of two, over the conditions that both
     have.
+
+    Args:
+        both: names of the managers.
+        conditions: means of real and same as of _means; likewise draws, of draw.
+        shared: how far simulated missions are off by chance that conditions share, as of _shared.
     """
-    by_manager: Any = means.conditions.unstack()
-    columns = pandas.MultiIndex.from_product([means.conditions.columns, both])
-    own = by_manager.reindex(columns=columns)
+    own = _of(both, conditions)
     own = own[own[["real", "same"]].notna().all(axis=1)]
-    draws = means.draws["draw"].unstack().reindex(columns=both).dropna()
-    _check_numbers(f"{metric.title} of {' - '.join(both)}", own, len(draws))
+    drawn = _of(both, draws)
+    drawn = drawn[drawn["draw"].notna().all(axis=1)]
+    _check_numbers(f"{metric.title} of {' - '.join(both)}", own, len(drawn))
     signs = np.array([1.0, -1.0][: len(both)])
-    real, same, population = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
+    real, same, population = (
+        each.to_numpy() @ signs for each in (own["real"], own["same"], drawn["draw"])
+    )
     if metric.name == FOUND:
         alone = assisted = _share(own["real"].to_numpy())
         weight = 0.0
     else:
         alone = statistics.mean_interval(real)
-        by_chance = own["same_var"].mean() / means.draws["draw_n"].unstack().mean()
-        drawn = [spread_of(draws[name].to_numpy(), by_chance[name]) for name in both]
-        spread = max(*drawn, *own["real"].std()) if len(both) > 1 else None
-        chance = _chance(own, means, signs, both)
+        by_chance = own["same_var"].mean() / drawn["draw_n"].mean()
+        of_runs = shared.reindex(columns=both).dropna().to_numpy() @ signs
+        chance = _chance(own, float(by_chance.sum()), of_runs)
+        varies = (drawn["draw"].var() - by_chance).clip(lower=0.0) ** 0.5
+        spread = max(*varies, *own["real"].std()) if len(both) > 1 else None
         assisted, weight = assisted_mean(real, same, population, chance, spread)
     runs = int(own["real_n"].sum().sum())
     row: dict[str, Any] = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name}
@@ -320,18 +319,15 @@ def _check_numbers(what: str, own: pandas.DataFrame, draws: int) -> None:
             )
 
 
-def _chance(own: Any, means: _Means, signs: Sample, both: list[str]) -> Chance:
+def _chance(own: Any, population: float, of_runs: Sample) -> Chance:
     """Return what means owe to chance; that of real missions is not less than the simulated ones
     have, nor than their own repetitions show.
     """
-    simulated = own["same_var"].mean()
     repeated = own["real_var"].mean().fillna(0.0)
-    real = (np.maximum(simulated, repeated) * (1.0 / own["real_n"]).mean()).sum()
+    real = (np.maximum(own["same_var"].mean(), repeated) * (1.0 / own["real_n"]).mean()).sum()
     same = (own["same_var"] / own["same_n"]).mean().sum()
-    each = float(means.draws["draw_n"].unstack().mean().mean())
-    of_runs = means.shared.reindex(columns=both).dropna().to_numpy() @ signs
     shared = float(of_runs.var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
-    return Chance(float(real), float(same), float(simulated.sum()) / each, shared)
+    return Chance(float(real), float(same), population, shared)
 
 
 def _share(shares: Sample) -> Estimate:

@@ -506,13 +506,9 @@ def matched(
         flown = conditions.loc[sorted(set(real[CONDITION] - 1))]
         for name in names:
             _check_drawn(name, flown[name], draws[name])
-        for one, other in combinations(names, 2):
-            if _are_shifted_together(flown, one, other) and not _are_shifted_together(
-                draws, one, other
-            ):
-                problem = (
-                    f"it draws {one} and {other} apart, which the real conditions shift together"
-                )
+        for both in map(list, combinations(names, 2)):
+            if _vary_together(flown[both]) and not _vary_together(draws[both]):
+                problem = f"it draws {' and '.join(both)} apart, which the real conditions do not"
                 raise InputError(problem, remedy=_DRAW)
     by_draw = population.groupby(names, sort=False, dropna=False)
     return real, same, population.assign(draw=by_draw.ngroup())
@@ -564,10 +560,10 @@ def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]
         raise InputError(f"{problem}: from {ends} (Kolmogorov-Smirnov p < {_SURELY})", remedy=_DRAW)
 
 
-def _are_shifted_together(conditions: pandas.DataFrame, one: str, other: str) -> bool:
-    """Return whether two parameters differ by the same in all conditions, and vary."""
-    values = conditions[[one, other]].apply(pandas.to_numeric, errors="coerce")
-    return bool(values[one].nunique() > 2 and np.ptp(values[one] - values[other]) <= _ABSOLUTE)
+def _vary_together(values: pandas.DataFrame) -> bool:
+    """Return whether two parameters vary, and differ by the same in all conditions."""
+    one, other = values.apply(pandas.to_numeric, errors="coerce").to_numpy(float).T
+    return len(set(one)) > 2 and bool(np.ptp(one - other) <= _ABSOLUTE)
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:

@@ -343,7 +343,7 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit():
                 "same": with_depth(missions(2, POINTS, 5), 1.0),
                 "population": with_depth(population(), -1.0),
             },
-            "population: it draws start.y_m and start.z_m apart, which the real conditions shift",
+            "population: it draws start.y_m and start.z_m apart, which the real conditions do not",
         ),
         ({"population": missions(2, POINTS, 5)}, "it sweeps start.y_m"),
         (
