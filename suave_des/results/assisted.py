@@ -218,11 +218,8 @@ def compare_assisted(real: Groups) -> AssistedComparison:
                 names.append(name)
             else:
                 notes.append(f"{name} is left out of {metric.title}, of which it has no value")
-        sides = [
-            _means(frame, CONDITION, metric.name, name)
-            for frame, name in ((in_real, "real"), (in_same, "same"))
-        ]
-        conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
+        real_means = _means(in_real, CONDITION, metric.name, "real")
+        conditions = real_means.join(_means(in_same, CONDITION, metric.name, "same"))
         draws = _means(drawn, "draw", metric.name, "draw")
         shared = _shared(in_same, metric.name)
         for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
@@ -241,15 +238,9 @@ def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.D
 def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
     # Points of a sweep share a run's random numbers, so that the means of all conditions may be off
     # by the same chance.
-    off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform(
-        "mean"
-    )
-    return (
-        same.assign(off=off)
-        .groupby(["seed", "run", "manager"], observed=True)["off"]
-        .mean()
-        .unstack("manager")
-    )
+    by_condition = same.groupby(["manager", CONDITION], observed=True)[metric]
+    off = same.assign(off=same[metric] - by_condition.transform("mean"))
+    return off.pivot_table("off", ["seed", "run"], "manager", observed=True)
 
 
 def _of(both: list[str], means: pandas.DataFrame) -> Any:
@@ -293,9 +284,8 @@ def _estimate(
         varies = (drawn["draw"].var() - by_chance).clip(lower=0.0) ** 0.5
         spread = max(*varies, *own["real"].std()) if len(both) > 1 else None
         assisted, weight = assisted_mean(real, same, population, chance, spread)
-    runs = int(own["real_n"].sum().sum())
     row: dict[str, Any] = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name}
-    row |= {"runs": runs, "conditions": len(own)}
+    row |= {"runs": int(own["real_n"].sum().sum()), "conditions": len(own)}
     row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight}
     row["narrower"] = (alone.high - alone.low) / (assisted.high - assisted.low)
     row["helps"] = weight > 0.0 and row["narrower"] >= _NOTICEABLE
