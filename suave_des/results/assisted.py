@@ -126,14 +126,11 @@ def _weighed(
     apart = weight * between if spread is None else spread
     seen = float((real - weight * same).var(ddof=1))
     least = ((1.0 - weight) * between) ** 2 + chance.real + weight**2 * chance.same
-    of_population = float(population.var(ddof=1)) / len(population)
-    simulated = weight**2 * (of_population + chance.shared)
+    simulated = weight**2 * (population.var(ddof=1) / len(population) + chance.shared)
     variance = max(seen, least) / n + simulated + (UNLIKE * apart) ** 2
     is_estimated = n >= LEAST_TO_WEIGH and weight > 0.0  # which takes a degree of freedom
     mean = float(real.mean() + weight * (population.mean() - same.mean()))
-    half = (
-        t_quantile(n - 2 if is_estimated else n - 1, EACH_OF_TWO) * math.sqrt(variance) or math.nan
-    )
+    half = t_quantile(n - 1 - is_estimated, EACH_OF_TWO) * math.sqrt(variance) or math.nan
     return Estimate(mean, mean - half, mean + half, STUDENT)
 
 
@@ -222,7 +219,7 @@ def compare_assisted(real: Groups) -> AssistedComparison:
         conditions = real_means.join(_means(in_same, CONDITION, metric.name, "same"))
         draws = _means(drawn, "draw", metric.name, "draw")
         shared = _shared(in_same, metric.name)
-        for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
+        for both in map(list, [*combinations(names, 1), *combinations(names, 2)]):
             rows.append(_estimate(both, metric, conditions, draws, shared))
     return AssistedComparison(pandas.DataFrame(rows), tuple(notes), real.metrics)
 
@@ -328,7 +325,7 @@ def _share(shares: Sample) -> Estimate:
     which an interval would follow.
     """
     if shares.shape[1] > 1:
-        return statistics.paired_share_difference(shares[:, 0], shares[:, 1])
+        return statistics.paired_share_difference(*shares.T)
     return statistics.wilson(float(shares.sum()), len(shares))
 
 
@@ -399,8 +396,7 @@ def _help(row: Row, metric: Metric) -> str:
     if not row["helps"]:
         return "the interval is not noticeably narrower with the simulation"
     narrower = f"the interval is {row['narrower']:.1f} times narrower with the simulation"
-    low = row.get("equal_conditions_low")
     high = row.get("equal_conditions_high")
-    if low is None or high is None:
+    if high is None:
         return narrower
-    return f"{narrower}, as that of {low:,} to {high:,} conditions with real missions alone"
+    return f"{narrower}, as that of {row['equal_conditions_low']:,} to {high:,} conditions with real missions alone"

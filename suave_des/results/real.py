@@ -251,8 +251,7 @@ def _block(
     that is not known.
     """
     number = len(missions)
-    # The last condition may have fewer.
-    possible = [each for each in range(1, number + 1) if -(-number // each) == conditions]
+    possible = _possible_blocks(number, conditions)
     fitting = [
         each for each in possible if _starts_fit(missions, _in_blocks(missions, each), starts)
     ]
@@ -267,6 +266,13 @@ def _block(
         each = f"{fitting[0]} or {fitting[1]}"
         return f"which may be {each} in a row of each of {conditions} conditions"
     return fitting[0]
+
+
+def _possible_blocks(number: int, conditions: int) -> list[int]:
+    """Return how many missions in a row may be of one condition, the last of which may have fewer,
+    so that there are so many conditions.
+    """
+    return [each for each in range(1, number + 1) if -(-number // each) == conditions]
 
 
 def _in_blocks(missions: pandas.DataFrame, block: int) -> NDArray[np.int64]:

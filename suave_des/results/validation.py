@@ -702,6 +702,11 @@ MARK = "*"
 PAPER_FILE = "paper_table.md"
 
 
+def _is_shown(difference: Estimate) -> bool:
+    """Whether a difference is not what chance may be."""
+    return difference.has_interval and not difference.contains(0.0)
+
+
 @dataclass(frozen=True)
 class PaperComparison:
     """The paper's table beside ours, from the missions published and ours.
@@ -759,9 +764,7 @@ class PaperComparison:
             apart = self._from_metacontrol(metric)
             if not apart:
                 continue
-            chance = [
-                name for name, each in apart.items() if each.contains(0.0) or not each.has_interval
-            ]
+            chance = [name for name, each in apart.items() if not _is_shown(each)]
             rest = f"; the difference from {' and '.join(chance)} could be chance" if chance else ""
             if metric == SEARCH_TIME and all(each.value < 0.0 for each in apart.values()):
                 does = "As in the paper, metacontrol finds the pipeline sooner than the others"
