@@ -263,6 +263,19 @@ def test_repetitions_that_differ_widen_the_interval():
     assert halves[1] > 3.1634 * math.sqrt(900.0 / 6) > halves[0]
 
 
+def test_a_difference_allows_for_unlike_conditions_also_if_the_simulation_never_varies():
+    real = real_missions(1)
+    same, many = (
+        frame.assign(search_time_s=300.0) for frame in (missions(2, POINTS, 5), population())
+    )
+    found = compared(real=real, same=same, population=many).estimates
+    row = found.set_index(["metric", "group", "other"]).loc[("search_time_s", "a", "b")]
+    times_s = real.pivot_table("search_time_s", "start.y_m", "manager")
+    by_chance = (times_s["a"] - times_s["b"]).var() / 6
+    half = 3.163381 * math.sqrt(by_chance + (0.1 * times_s.std().max()) ** 2)
+    assert row["assisted_ci95_high"] - row["assisted"] == pytest.approx(half, 1e-6)
+
+
 def test_a_share_has_an_interval_for_shares():
     points = np.linspace(1.05, 2.95, 30)
     real, same = real_missions(1, 5.0, points), missions(2, points, 5)
