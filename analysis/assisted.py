@@ -27,6 +27,7 @@ from suave_des import load_scenario, run_campaign
 from suave_des.records.missions import missions_in
 from suave_des.results import style
 from suave_des.results.assisted import (
+    EACH_OF_TWO,
     LEAST_TO_WEIGH,
     UNLIKE,
     USEFUL,
@@ -71,11 +72,13 @@ DRAWN = {
 """What the study's runner drew for every five runs."""
 DRAWS, EACH, LEFT = 200, 5, 3
 """Conditions, missions under each, and how many of these are the simulator's."""
-SAMPLES = ((6, 1), (6, 5), (12, 1), (30, 1))
+SAMPLES = ((6, 1), (6, 5), (8, 1), (12, 1), (20, 1), (30, 1))
 """Conditions of the real missions, and missions under each."""
 RESAMPLES = 6_000
 LATE_S = 60.0
 """By how much real missions are late in the conditions of which the simulation knows nothing."""
+MEDIAN_S = 5.0
+"""Median of the times by which they are late in all."""
 OF_ALL_METRICS = 5
 """So many of the cases; the others move search times."""
 SPLIT_S, SPLIT = 65.0, 0.4
@@ -160,13 +163,27 @@ def system_of(frame: pandas.DataFrame, metric: str) -> System:
     }
 
 
-def late(system: System, share: float, managers: Sequence[str] = MANAGERS) -> System:
+def late(
+    system: System, share: float, by_s: float = LATE_S, managers: Sequence[str] = MANAGERS
+) -> System:
     """Return a system whose missions are late in a share of the conditions."""
     is_late = np.random.default_rng(studies.SEED).random(DRAWS) < share
     return {
-        name: values + LATE_S * is_late[:, None] * (name in managers)
+        name: values + by_s * is_late[:, None] * (name in managers)
         for name, values in system.items()
     }
+
+
+def often_late(systems: Sequence[System], sigma: float) -> list[System]:
+    """Return systems whose missions are late in each condition, by times whose logarithms are
+    normally distributed, but never after the limit.
+    """
+    chance = np.random.default_rng(studies.SEED)
+    late_s = MEDIAN_S * chance.lognormal(0.0, sigma, (len(systems), DRAWS, 1))
+    return [
+        {name: np.minimum(values + by_s, LIMIT_S) for name, values in system.items()}
+        for system, by_s in zip(systems, late_s, strict=True)
+    ]
 
 
 def split(system: System, share: float) -> System:
@@ -192,9 +209,17 @@ def cases_of(systems: Mapping[str, System]) -> Iterator[Case]:
     yield Case("unrelated simulator", members, unrelated)
     yield Case("16% with two outcomes", [split(each, 0.16) for each in members], shipped)
     yield Case("8% late", [late(each, 0.08) for each in members], shipped)
+    one = [late(each, 0.08, managers=["bt"]) for each in members]
+    yield Case("8% late under one manager", one, shipped)
+    yield Case("5% late by 100 s", [late(each, 0.05, 100.0) for each in members], shipped)
+    yield Case("late by log-normal times", often_late(members, 1.0), shipped)
     yield Case("15% late", [late(each, 0.15) for each in members], shipped, is_beyond=True)
-    one = [late(each, 0.08, ["bt"]) for each in members]
-    yield Case("8% late under one manager", one, shipped, is_beyond=True)
+    longer = [late(each, 0.15, 100.0) for each in members]
+    yield Case("15% late by 100 s", longer, shipped, is_beyond=True)
+    wide = often_late(members, 1.5)
+    yield Case("late by wider log-normal times", wide, shipped, is_beyond=True)
+    never = {name: np.full_like(values, LIMIT_S) for name, values in shipped.items()}
+    yield Case("simulator that never finds it", members, never, is_beyond=True)
 
 
 # Coverage
@@ -215,23 +240,34 @@ class Sampled(NamedTuple):
         population: means under all other conditions are taken from these, shape (conditions,).
         by_chance: variances that real, same and population have by chance, each (samples,) or a
             number.
+        spread: of the real missions of one manager or another, the greater standard deviation,
+            shape (samples,).
     """
 
     real: Array
     same: Array
     population: Array
     by_chance: tuple[Array, Array, float]
+    spread: Array | float = 0.0
 
 
 def sampled(
-    real: Cells, simulator: Cells, size: tuple[int, int], samples: int, chance: np.random.Generator
+    real: Sequence[Cells],
+    simulator: Cells,
+    size: tuple[int, int],
+    samples: int,
+    chance: np.random.Generator,
 ) -> Sampled:
-    """Draw conditions, missions under each, and the simulated missions that assist them."""
+    """Draw conditions, missions under each, and the simulated missions that assist them; the real
+    ones of one manager, or of two, whose differences count.
+    """
     conditions, runs_each = size
     places = chance.integers(0, DRAWS, (samples, conditions))
     # Points of a sweep share the random numbers of a run, which real missions do not.
     runs = np.argsort(chance.random((samples, conditions, EACH)), axis=2)
-    ours = np.take_along_axis(real[places], runs[..., :runs_each], axis=2)
+    of_each = [np.take_along_axis(own[places], runs[..., :runs_each], axis=2) for own in real]
+    ours = of_each[0] - of_each[1] if len(real) > 1 else of_each[0]
+    spread = np.max([own.mean(axis=2).std(axis=1, ddof=1) for own in of_each], axis=0)
     theirs = np.take_along_axis(simulator[places], runs[..., -LEFT:], axis=2)
     within = theirs.var(axis=2, ddof=1).mean(axis=1)
     repeated = ours.var(axis=2, ddof=1).mean(axis=1) if runs_each > 1 else 0.0
@@ -240,10 +276,10 @@ def sampled(
         within / LEFT,
         float(simulator.var(axis=1, ddof=1).mean()),
     )
-    return Sampled(ours.mean(axis=2), theirs.mean(axis=2), simulator[:, 0], by_chance)
+    return Sampled(ours.mean(axis=2), theirs.mean(axis=2), simulator[:, 0], by_chance, spread)
 
 
-def intervals(of: Sampled, spread: float) -> tuple[Array, Array, Array]:
+def intervals(of: Sampled, spread: Array | float | None) -> tuple[Array, Array, Array]:
     """Return mean, half-width and weight of each sample as results.assisted.assisted_mean estimates
     them, but for all samples at once; a test compares the two.
     """
@@ -253,24 +289,25 @@ def intervals(of: Sampled, spread: float) -> tuple[Array, Array, Array]:
     else:
         left = (of.real - of.same).std(axis=1, ddof=1)
         weight = (left <= USEFUL * of.real.std(axis=1, ddof=1)).astype(float)
-    half, alone = _half(of, spread, weight), _half(of, spread, np.zeros(samples))
+    half, alone = (_half(of, spread, each) for each in (weight, np.zeros(samples)))
     counts = half < alone
     weight = np.where(counts, weight, 0.0)
     mean = of.real.mean(axis=1) + weight * (of.population.mean() - of.same.mean(axis=1))
     return mean, np.where(counts, half, alone), weight
 
 
-def _half(of: Sampled, spread: float, weight: Array) -> Array:
+def _half(of: Sampled, spread: Array | float | None, weight: Array) -> Array:
     conditions, draws = of.real.shape[1], len(of.population)
     chance_real, chance_same, chance_population = of.by_chance
     total = float(of.population.var(ddof=1))
     between = max(0.0, total - chance_population)
     seen = (of.real - weight[:, None] * of.same).var(axis=1, ddof=1)
     least = (1.0 - weight) ** 2 * between + chance_real + weight**2 * chance_same
-    simulated = total / draws + (UNLIKE * spread) ** 2
-    variance = np.maximum(seen, least) / conditions + weight**2 * simulated
+    apart = weight * np.sqrt(between) if spread is None else spread
+    variance = np.maximum(seen, least) / conditions
+    variance += weight**2 * total / draws + (UNLIKE * apart) ** 2
     is_estimated = (weight > 0.0) & (conditions >= LEAST_TO_WEIGH)
-    return t.ppf(0.975, conditions - 1 - is_estimated) * np.sqrt(variance)
+    return t.ppf((1.0 + EACH_OF_TWO) / 2.0, conditions - 1 - is_estimated) * np.sqrt(variance)
 
 
 def _weight_of_least_variance(of: Sampled) -> Array:
@@ -284,8 +321,8 @@ def _weight_of_least_variance(of: Sampled) -> Array:
     return np.clip(weight, 0.0, 1.0)
 
 
-def spread_of_all(case: Case, both: Sequence[str]) -> float:
-    """Return the standard deviation of conditions, the greater one of two managers."""
+def simulated_spread(case: Case, both: Sequence[str]) -> float:
+    """Return the greater standard deviation of conditions of two managers."""
     cells = (case.simulator[name] for name in both)
     return max(spread_of(each[:, 0], float(each.var(axis=1, ddof=1).mean())) for each in cells)
 
@@ -304,12 +341,15 @@ def coverage(
     simulator = signed(case.simulator, both)
     parts = []
     for system in case.real:
-        real = signed(system, both)
+        real = [system[name] for name in both]
+        true = signed(system, both).mean()
         of = sampled(real, simulator, size, resamples // len(case.real), chance)
-        mean, half, weight = intervals(of, spread_of_all(case, both))
-        spread, conditions = of.real.std(axis=1, ddof=1), of.real.shape[1]
-        alone_half = t.ppf(0.975, conditions - 1) * spread / np.sqrt(conditions)
-        off = of.real.mean(axis=1) - real.mean(), mean - real.mean()
+        spread = np.maximum(of.spread, simulated_spread(case, both)) if len(both) > 1 else None
+        mean, half, weight = intervals(of, spread)
+        conditions = of.real.shape[1]
+        std = of.real.std(axis=1, ddof=1)
+        alone_half = t.ppf(0.975, conditions - 1) * std / np.sqrt(conditions)
+        off = of.real.mean(axis=1) - true, mean - true
         parts.append(np.array([*off, alone_half, half, weight]))
     alone_off, assisted_off, alone_half, assisted_half, weight = np.hstack(parts)
     return {
@@ -399,13 +439,9 @@ def conclude(covered: pandas.DataFrame, gained: pandas.DataFrame) -> str:
     covered = covered.assign(other=covered["other"].fillna(""))
     gained = gained.assign(other=gained["other"].fillna(""))
     within = covered[~covered["is_beyond"]]
-    counts = within["weight"] > 0.0
     lines = [
-        f"- Intervals in which the simulation counts in some of the samples hold the true mean in"
-        f" {within.loc[counts, 'assisted'].min():.1%} or more of them; those of the real missions alone in"
-        f" {within.loc[counts, 'alone'].min():.1%} or more.",
-        f"- Where it never counts, they hold it in {within.loc[~counts, 'assisted'].min():.1%} or more, and those of the"
-        f" real missions alone in {within.loc[~counts, 'alone'].min():.1%} or more.",
+        f"- Intervals hold the true mean in {within['assisted'].min():.1%} of the samples or more; those of the real"
+        f" missions alone in {within['alone'].min():.1%} or more."
     ]
     for name, rows in covered[covered["is_beyond"]].groupby("case", sort=False):
         least = rows.loc[rows["assisted"].idxmin()]
@@ -414,10 +450,12 @@ def conclude(covered: pandas.DataFrame, gained: pandas.DataFrame) -> str:
             f"- Beyond what they allow for, {name}: {least['assisted']:.1%} at worst ({whose},"
             f" {least['conditions']} conditions; alone {least['alone']:.1%})."
         )
+    lines += ["", *table_of(within[within["metric"] == "search_time_s"]), ""]
     own = within[(within["metric"] == "search_time_s") & (within["case"] == "other parameters")]
-    for row in own[(own["other"] == "") & (own["runs_each"] == 1)].itertuples():
+    for row in own[(own["runs_each"] == 1) & own["conditions"].isin([6, 12, 30])].itertuples():
+        whose = f"{row.group} - {row.other}" if row.other else row.group
         lines.append(
-            f"- {row.group}, search time, {row.conditions} conditions: alone ± {row.alone_half:.1f} s, assisted ±"
+            f"- {whose}, search time, {row.conditions} conditions: alone ± {row.alone_half:.1f} s, assisted ±"
             f" {row.assisted_half:.1f} s"
         )
     for row in gained[gained["runs"].isin([6, 30]) & (gained["other"] == "")].itertuples():
@@ -427,6 +465,27 @@ def conclude(covered: pandas.DataFrame, gained: pandas.DataFrame) -> str:
             f" {unit}, assisted {row.assisted:.1f} ± {row.assisted_half:.1f} {unit}, weight {row.weight:.0f}"
         )
     return "\n".join(lines)
+
+
+def table_of(within: pandas.DataFrame) -> Iterator[str]:
+    """Yield the lines of a table of search times: how often intervals hold the mean at least, with
+    the half-width for bt.
+    """
+    sizes = [conditions for conditions, runs_each in SAMPLES if runs_each == 1]
+    yield f"| case | {' | '.join(f'{size} conditions' for size in sizes)} |"
+    yield f"| --- |{' ---: |' * len(sizes)}"
+    single = within[within["runs_each"] == 1]
+    is_pair = single["other"] != ""
+    parts = [(name, "assisted", rows) for name, rows in single.groupby("case", sort=False)]
+    parts.append(("real missions alone, one manager", "alone", single[~is_pair]))
+    parts.append(("real missions alone, two managers", "alone", single[is_pair]))
+    for name, side, rows in parts:
+        cells = []
+        for _, own in rows.groupby("conditions"):
+            cell = f"{own[side].min():.1%}"
+            of_bt = own.loc[(own["group"] == "bt") & (own["other"] == ""), f"{side}_half"]
+            cells.append(f"{cell} ({of_bt.median():.0f} s)" if len(of_bt) else cell)
+        yield f"| {name} | {' | '.join(cells)} |"
 
 
 def draw(figure: Figure, covered: pandas.DataFrame) -> None:

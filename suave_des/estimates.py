@@ -170,10 +170,8 @@ def share_of(count: int, n: int, method: Literal["wilson", "exact"] = "wilson") 
     return Estimate(count / n, float(low), float(high), _OF_SHARES[method])
 
 
-def t_quantile(freedom: int) -> float:
-    """Return half the width of the 95% interval of Student's t with that many degrees of
-    freedom.
-    """
+def t_quantile(freedom: int, confidence: float = CONFIDENCE) -> float:
+    """Return half the width of the interval of Student's t with that many degrees of freedom."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(freedom, (1.0 + CONFIDENCE) / 2.0))
+    return float(stdtrit(freedom, (1.0 + confidence) / 2.0))

@@ -18,7 +18,7 @@ import numpy as np
 import pandas
 
 from suave_des.errors import InputError, number_of
-from suave_des.estimates import STUDENT, Estimate, std_of, t_quantile
+from suave_des.estimates import CONFIDENCE, STUDENT, Estimate, std_of, t_quantile
 from suave_des.records.metrics import FOUND, Metric
 from suave_des.results import statistics
 from suave_des.results.comparison import Row, estimate_in
@@ -34,10 +34,12 @@ LEAST_TO_WEIGH = 10
 gains. Nor can fewer tell how many real missions a simulation is worth.
 """
 UNLIKE = 0.1
-"""Share of all conditions in which real and simulated missions may differ by twice the standard
-deviation of conditions, without any of those sampled showing it. analysis/assisted.py says what
+"""Share of all conditions in which real and simulated missions, or two managers, may differ by twice
+the standard deviation of conditions more than in those sampled. analysis/assisted.py says what
 intervals with it hold.
 """
+EACH_OF_TWO = (1.0 + CONFIDENCE) / 2.0
+"""Confidence of an interval of which the narrower of two is given (Bonferroni)."""
 _LEAST_SIMULATED, _LEAST_DRAWS = 2, 10
 USEFUL = 0.5
 """With few conditions the simulation counts if what it leaves of their standard deviation is less."""
@@ -77,11 +79,12 @@ def assisted_mean(
 
     With less than LEAST_TO_WEIGH conditions, the weight of the simulation is 1 where real - same
     varies at most half as much (standard deviation) as real does; with more, it is that of PPI++.
-    It is 0 where that makes the interval narrower.
+    It is 0 where that makes the interval narrower; so each of the two is one of 97.5%.
 
-    The interval allows for UNLIKE of all conditions. What the conditions show of their variance is
-    not taken to be less than what follows from chance and from how the population varies: a few
-    may be alike by accident.
+    Where differences are averaged, real - same or those of two managers, the interval allows for
+    UNLIKE of all conditions: differences may be small in all that are sampled, and great in a few
+    others. What the conditions show of their variance is not taken to be less than what follows
+    from chance and from how the population varies: a few may be alike by accident.
 
     Args:
         real: mean of the real missions under each condition, shape (conditions,).
@@ -89,18 +92,14 @@ def assisted_mean(
         population: mean of the simulated missions under each of many other conditions, shape
             (draws,).
         chance: in these means.
-        spread: standard deviation of conditions, by which unlike ones may be off; by default that
-            of the population. Differences of two managers vary less, but what the simulation does
-            not know of one manager need not be the same for the other: theirs is the greater of the
-            managers'.
+        spread: for a difference of two managers, the greater standard deviation of conditions under
+            one of them. None: the mean is one manager's.
 
     Returns:
         The mean, with its interval by Student's t over the conditions, and the weight of the
         simulation, from 0 to 1.
     """
     sides = real, same, population
-    if spread is None:
-        spread = spread_of(population, chance.population)
     alone = _weighed(sides, chance, spread, 0.0)
     if len(real) >= LEAST_TO_WEIGH:
         weight = _weight_of_least_variance(*sides)
@@ -118,20 +117,20 @@ def spread_of(population: Sample, chance: float) -> float:
 
 
 def _weighed(
-    sides: tuple[Sample, Sample, Sample], chance: Chance, spread: float, weight: float
+    sides: tuple[Sample, Sample, Sample], chance: Chance, spread: float | None, weight: float
 ) -> Estimate:
     """Estimate the mean with a weight of the simulation."""
     real, same, population = sides
     n = len(real)
-    between = spread_of(population, chance.population) ** 2
+    between = spread_of(population, chance.population)
+    apart = weight * between if spread is None else spread
     seen = float((real - weight * same).var(ddof=1))
-    least = (1.0 - weight) ** 2 * between + chance.real + weight**2 * chance.same
-    of_population = float(population.var(ddof=1)) / len(population)
-    simulated = of_population + chance.shared + (UNLIKE * spread) ** 2
-    variance = max(seen, least) / n + weight**2 * simulated
+    least = ((1.0 - weight) * between) ** 2 + chance.real + weight**2 * chance.same
+    simulated = weight**2 * (population.var(ddof=1) / len(population) + chance.shared)
+    variance = max(seen, least) / n + simulated + (UNLIKE * apart) ** 2
     is_estimated = n >= LEAST_TO_WEIGH and weight > 0.0  # which takes a degree of freedom
     mean = float(real.mean() + weight * (population.mean() - same.mean()))
-    half = t_quantile(n - 2 if is_estimated else n - 1) * math.sqrt(variance) or math.nan
+    half = t_quantile(n - 1 - is_estimated, EACH_OF_TWO) * math.sqrt(variance) or math.nan
     return Estimate(mean, mean - half, mean + half, STUDENT)
 
 
@@ -184,10 +183,13 @@ class AssistedComparison(Written):
     def remarks(self) -> list[str]:
         """Describe the numbers, and what to know about the data."""
         how = (
-            "n: real missions in conditions, over which the intervals are (Student's t), as missions of one are alike.",
-            "alone: mean over these conditions. assisted: mean over the population's, from alone + weight * (population -"
-            " simulated under the same conditions).",
-            f"Assisted intervals allow for conditions unlike those of the real missions: {UNLIKE:.0%} of all, off by twice"
+            "n: real missions in conditions, over which the intervals are, as missions of one are"
+            " alike: of means by Student's t, of shares by Wilson, or Bonett and Price.",
+            "alone: mean over these conditions. assisted: mean over the population's, from alone +"
+            " weight * (population - simulated under the same conditions).",
+            "Assisted intervals of means are the narrower of two, with and without the simulation,"
+            " and so each of 97.5%. They allow for conditions unlike those of the real missions:"
+            f" {UNLIKE:.0%} of all, in which the simulation, or the other manager, is off by twice"
             " the standard deviation of conditions.",
         )
         return [*how, *(f"Note: {note}." for note in self.notes)]
@@ -213,34 +215,13 @@ def compare_assisted(real: Groups) -> AssistedComparison:
                 names.append(name)
             else:
                 notes.append(f"{name} is left out of {metric.title}, of which it has no value")
-        sides = [
-            _means(frame, CONDITION, metric.name, name)
-            for frame, name in ((in_real, "real"), (in_same, "same"))
-        ]
-        conditions = pandas.concat(sides, axis=1).dropna(subset=["real", "same"])
-        means = _Means(
-            conditions, _means(drawn, "draw", metric.name, "draw"), _shared(in_same, metric.name)
-        )
-        for both in [[name] for name in names] + [list(both) for both in combinations(names, 2)]:
-            rows.append(_estimate(both, metric, means))
+        real_means = _means(in_real, CONDITION, metric.name, "real")
+        conditions = real_means.join(_means(in_same, CONDITION, metric.name, "same"))
+        draws = _means(drawn, "draw", metric.name, "draw")
+        shared = _shared(in_same, metric.name)
+        for both in map(list, [*combinations(names, 1), *combinations(names, 2)]):
+            rows.append(_estimate(both, metric, conditions, draws, shared))
     return AssistedComparison(pandas.DataFrame(rows), tuple(notes), real.metrics)
-
-
-@dataclass(frozen=True)
-class _Means:
-    """Means of one metric.
-
-    Attributes:
-        conditions: by condition and manager: real and same, each with its variance (_var) and its
-            number of missions (_n).
-        draws: likewise draw, by draw and manager.
-        shared: by run and manager how far simulated missions are on average from the mean of their
-            condition.
-    """
-
-    conditions: pandas.DataFrame
-    draws: pandas.DataFrame
-    shared: pandas.DataFrame
 
 
 def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.DataFrame:
@@ -254,41 +235,54 @@ def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.D
 def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
     # Points of a sweep share a run's random numbers, so that the means of all conditions may be off
     # by the same chance.
-    off = same[metric] - same.groupby(["manager", CONDITION], observed=True)[metric].transform(
-        "mean"
-    )
-    return (
-        same.assign(off=off)
-        .groupby(["seed", "run", "manager"], observed=True)["off"]
-        .mean()
-        .unstack("manager")
-    )
+    by_condition = same.groupby(["manager", CONDITION], observed=True)[metric]
+    off = same.assign(off=same[metric] - by_condition.transform("mean"))
+    return off.pivot_table("off", ["seed", "run"], "manager", observed=True)
 
 
-def _estimate(both: list[str], metric: Metric, means: _Means) -> dict[str, Any]:
+def _of(both: list[str], means: pandas.DataFrame) -> Any:
+    """Return a column for each value and manager."""
+    by_manager: Any = means.unstack()
+    return by_manager.reindex(columns=pandas.MultiIndex.from_product([means.columns, both]))
+
+
+def _estimate(
+    both: list[str],
+    metric: Metric,
+    conditions: pandas.DataFrame,
+    draws: pandas.DataFrame,
+    shared: pandas.DataFrame,
+) -> dict[str, Any]:
     """Estimate the mean of one manager, or the difference of two, over the conditions that both
     have.
+
+    Args:
+        both: names of the managers.
+        conditions: means of real and same as of _means; likewise draws, of draw.
+        shared: how far simulated missions are off by chance that conditions share, as of _shared.
     """
-    by_manager: Any = means.conditions.unstack()
-    columns = pandas.MultiIndex.from_product([means.conditions.columns, both])
-    own = by_manager.reindex(columns=columns)
+    own = _of(both, conditions)
     own = own[own[["real", "same"]].notna().all(axis=1)]
-    draws = means.draws["draw"].unstack().reindex(columns=both).dropna()
-    _check_numbers(f"{metric.title} of {' - '.join(both)}", own, len(draws))
+    drawn = _of(both, draws)
+    drawn = drawn[drawn["draw"].notna().all(axis=1)]
+    _check_numbers(f"{metric.title} of {' - '.join(both)}", own, len(drawn))
     signs = np.array([1.0, -1.0][: len(both)])
-    real, same, population = (each.to_numpy() @ signs for each in (own["real"], own["same"], draws))
+    real, same, population = (
+        each.to_numpy() @ signs for each in (own["real"], own["same"], drawn["draw"])
+    )
     if metric.name == FOUND:
         alone = assisted = _share(own["real"].to_numpy())
         weight = 0.0
     else:
         alone = statistics.mean_interval(real)
-        by_chance = own["same_var"].mean() / means.draws["draw_n"].unstack().mean()
-        spread = max(spread_of(draws[name].to_numpy(), by_chance[name]) for name in both)
-        chance = _chance(own, means, signs, both)
+        by_chance = own["same_var"].mean() / drawn["draw_n"].mean()
+        of_runs = shared.reindex(columns=both).dropna().to_numpy() @ signs
+        chance = _chance(own, float(by_chance.sum()), of_runs)
+        varies = (drawn["draw"].var() - by_chance).clip(lower=0.0) ** 0.5
+        spread = max(*varies, *own["real"].std()) if len(both) > 1 else None
         assisted, weight = assisted_mean(real, same, population, chance, spread)
-    runs = int(own["real_n"].sum().sum())
     row: dict[str, Any] = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name}
-    row |= {"runs": runs, "conditions": len(own)}
+    row |= {"runs": int(own["real_n"].sum().sum()), "conditions": len(own)}
     row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight}
     row["narrower"] = (alone.high - alone.low) / (assisted.high - assisted.low)
     row["helps"] = weight > 0.0 and row["narrower"] >= _NOTICEABLE
@@ -312,18 +306,15 @@ def _check_numbers(what: str, own: pandas.DataFrame, draws: int) -> None:
             )
 
 
-def _chance(own: Any, means: _Means, signs: Sample, both: list[str]) -> Chance:
+def _chance(own: Any, population: float, of_runs: Sample) -> Chance:
     """Return what means owe to chance; that of real missions is not less than the simulated ones
     have, nor than their own repetitions show.
     """
-    simulated = own["same_var"].mean()
     repeated = own["real_var"].mean().fillna(0.0)
-    real = (np.maximum(simulated, repeated) * (1.0 / own["real_n"]).mean()).sum()
+    real = (np.maximum(own["same_var"].mean(), repeated) * (1.0 / own["real_n"]).mean()).sum()
     same = (own["same_var"] / own["same_n"]).mean().sum()
-    each = float(means.draws["draw_n"].unstack().mean().mean())
-    of_runs = means.shared.reindex(columns=both).dropna().to_numpy() @ signs
     shared = float(of_runs.var(ddof=1)) / len(of_runs) if len(of_runs) > 1 else 0.0
-    return Chance(float(real), float(same), float(simulated.sum()) / each, shared)
+    return Chance(float(real), float(same), population, shared)
 
 
 def _share(shares: Sample) -> Estimate:
@@ -334,7 +325,7 @@ def _share(shares: Sample) -> Estimate:
     which an interval would follow.
     """
     if shares.shape[1] > 1:
-        return statistics.paired_share_difference(shares[:, 0], shares[:, 1])
+        return statistics.paired_share_difference(*shares.T)
     return statistics.wilson(float(shares.sum()), len(shares))
 
 
@@ -405,8 +396,7 @@ def _help(row: Row, metric: Metric) -> str:
     if not row["helps"]:
         return "the interval is not noticeably narrower with the simulation"
     narrower = f"the interval is {row['narrower']:.1f} times narrower with the simulation"
-    low = row.get("equal_conditions_low")
     high = row.get("equal_conditions_high")
-    if low is None or high is None:
+    if high is None:
         return narrower
-    return f"{narrower}, as that of {low:,} to {high:,} conditions with real missions alone"
+    return f"{narrower}, as that of {row['equal_conditions_low']:,} to {high:,} conditions with real missions alone"

@@ -88,7 +88,7 @@ def _sentence_of_means(found: Row, metric: Metric) -> str:
         claim = difference_claim(group, other, apart.value, metric)
         on_average = "" if _is_of_shares(found) else " on average"
         return f"{claim}{on_average} ({_interval(found, metric)}; {test})."
-    signed = f"{group} - {other}: {metric.amount(apart.value)}, {_signed_interval(found, metric)}"
+    signed = f"{group} - {other}: {metric.amount(apart.value)}, {_interval_text(apart, metric)}"
     what = f"the {metric.title}" if _is_of_shares(found) else f"the mean {_without_mean(metric)}"
     if _mean_p(found) < SIGNIFICANCE:
         return (
@@ -234,11 +234,6 @@ def _interval(found: Row, metric: Metric) -> str:
     return _interval_text(-apart if apart.value < 0.0 else apart, metric)
 
 
-def _signed_interval(found: Row, metric: Metric) -> str:
-    """Write the interval of first - second."""
-    return _interval_text(found["difference"], metric)
-
-
 def _interval_text(apart: Estimate, metric: Metric) -> str:
     text = apart.text(f".{metric.decimals}f", metric.scale)
     return f"95% interval {text}" if text else "no interval"
@@ -336,11 +331,13 @@ def _claim_of_best(
 ) -> str:
     """Write by how much the best mean is better than those from which it differs."""
     amounts = _and(_amounts(best, metric, better))
-    test = _ps(better)
+    tests = " and ".join(dict.fromkeys(_mean_test(each) for each in better))
+    test = f"{tests}, {_largest([_mean_p(each) for each in better], better[0])}"
     if not is_best_of_all:
         rest = _and([_not_shown(each, best) for each in alike]) if alike else ""
         no_others = f"; no difference of the means is shown to {rest}" if rest else ""
-        return f"On average, {best} {_verb(metric)} {amounts}; {test}{no_others}."
+        verb = (metric.less if metric.better < 0 else metric.more).partition(" {}")[0]
+        return f"On average, {best} {verb} {amounts}; {test}{no_others}."
     if _is_of_shares(better[0]):
         return f"{best} {metric.most}: {amounts}; {test}."
     return f"{best} {metric.most} on average: {amounts}; {test}."
@@ -432,17 +429,6 @@ def _amounts(best: str, metric: Metric, better: Sequence[Row]) -> list[str]:
         f"{metric.amount(abs(each['difference'].value))}{words} {_other(each, best)} ({_interval(each, metric)})"
         for each in better
     ]
-
-
-def _verb(metric: Metric) -> str:
-    verb, _, _ = (metric.less if metric.better < 0 else metric.more).partition(" {}")
-    return verb
-
-
-def _ps(rows: Sequence[Row]) -> str:
-    """Write the tests of means, and the largest of their p-values."""
-    tests = " and ".join(dict.fromkeys(_mean_test(each) for each in rows))
-    return f"{tests}, {_largest([_mean_p(each) for each in rows], rows[0])}"
 
 
 def _ps_of_ranks(rows: Sequence[Row]) -> str:

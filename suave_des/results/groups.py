@@ -258,18 +258,15 @@ def _assisted(
     sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
     _check_numbers(sides, chosen)
     limit_s = common_limit_s(sides)
-    in_same = same.frame
-    in_population = population.frame
     if math.isfinite(limit_s):
-        frame = to_horizon(frame, limit_s)
-        in_same = to_horizon(in_same, limit_s)
-        in_population = to_horizon(in_population, limit_s)
+        sides = {place: to_horizon(each, limit_s) for place, each in sides.items()}
     else:
-        frame = at_horizons(frame, ())
-    matching = matched(frame, in_same, in_population, same.swept)
+        sides[_PLACES[0]] = at_horizons(frame, ())
+    real, in_same, drawn = sides.values()
+    matching = matched(real, in_same, drawn, same.swept)
     groups = [
         Group(name, _by_run(part), horizon_s=limit_s)
-        for part, name, _ in _parts(frame, managers, ())
+        for part, name, _ in _parts(real, managers, ())
     ]
     notes = [*same.notes, *population.notes, *_notes(groups, (), frame, {})]
     notes += _notes_on_metrics(groups, chosen)

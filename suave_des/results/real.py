@@ -503,9 +503,13 @@ def matched(
     with located(place="population"):
         _check_scenario(same, population, names)
         draws = population[names].drop_duplicates()
+        flown = conditions.loc[sorted(set(real[CONDITION] - 1))]
         for name in names:
-            flown = conditions.loc[sorted(set(real[CONDITION] - 1)), name]
-            _check_drawn(name, flown, draws[name])
+            _check_drawn(name, flown[name], draws[name])
+        for both in map(list, combinations(names, 2)):
+            if _vary_together(flown[both]) and not _vary_together(draws[both]):
+                problem = f"it draws {' and '.join(both)} apart, which the real conditions do not"
+                raise InputError(problem, remedy=_DRAW)
     by_draw = population.groupby(names, sort=False, dropna=False)
     return real, same, population.assign(draw=by_draw.ngroup())
 
@@ -554,6 +558,12 @@ def _check_drawn(name: str, flown: pandas.Series[Any], drawn: pandas.Series[Any]
         problem = f"it draws {name} otherwise than the real conditions are spread"
         ends = f"{low:g} to {high:g}, and these {values.min():g} to {values.max():g}"
         raise InputError(f"{problem}: from {ends} (Kolmogorov-Smirnov p < {_SURELY})", remedy=_DRAW)
+
+
+def _vary_together(values: pandas.DataFrame) -> bool:
+    """Return whether two parameters vary, and differ by the same in all conditions."""
+    one, other = values.apply(pandas.to_numeric, errors="coerce").to_numpy(float).T
+    return len(set(one)) > 2 and bool(np.ptp(one - other) <= _ABSOLUTE)
 
 
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:

@@ -144,7 +144,9 @@ class Validation:
         if len(self.conditions):
             yield (
                 "Missions of one condition are alike: 95% intervals of means and of differences of"
-                " means are over the conditions (Student's t)."
+                " means are over the conditions (Student's t). The tests (KS, AD, Mann-Whitney) and"
+                " intervals of standard deviations, their ratios and shares take missions as"
+                " independent, and are a rough guide."
             )
         met = self.targets["met"].tolist()
         is_met, is_not = ("is" if met.count(each) == 1 else "are" for each in (True, False))

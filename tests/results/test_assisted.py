@@ -31,7 +31,7 @@ def missions(
     managers: str = "ab",
 ) -> pandas.DataFrame:
     """Missions of managers whose search takes 60 s more for each metre of start.y_m; the second's
-    10 s more.
+    20 s more.
     """
     rows = product(managers, conditions, range(1, runs + 1))
     frame = pandas.DataFrame(rows, columns=["manager", "start.y_m", "run"]).assign(
@@ -39,7 +39,7 @@ def missions(
     )
     noise = noise_s * np.random.default_rng(seed).normal(size=(len(frame), 2))
     search_time_s = (
-        60.0 * frame["start.y_m"] + 10.0 * (frame["manager"] == "b") + shift_s + noise[:, 0]
+        60.0 * frame["start.y_m"] + 20.0 * (frame["manager"] == "b") + shift_s + noise[:, 0]
     )
     frame = frame.assign(
         search_time_s=search_time_s, distance_inspected_m=20.0 * frame["start.y_m"] + noise[:, 1]
@@ -63,6 +63,11 @@ def real_missions(runs: int, shift_s: float = 0.0, points: np.ndarray = POINTS) 
 def shifted(by: float, times: float = 1.0) -> pandas.DataFrame:
     frame = population()
     return frame.assign(**{"start.y_m": times * frame["start.y_m"] + by})
+
+
+def with_depth(frame: pandas.DataFrame, slope: float) -> pandas.DataFrame:
+    """Starts at depths of -4 to -2 m, which rise or fall with start.y_m."""
+    return frame.assign(**{"start.z_m": slope * (frame["start.y_m"] - 2.0) - 3.0})
 
 
 def compared(**changed: pandas.DataFrame) -> AssistedComparison:
@@ -99,7 +104,7 @@ def by_hand(real, same, many, weight: float, freedom: int, least: float) -> tupl
     seen = variance([each - weight * other for each, other in zip(real, same, strict=True)])
     unlike = 0.1**2 * variance(many)
     square = max(seen, least) / len(real) + weight**2 * (variance(many) / len(many) + unlike)
-    half = float(t.ppf(0.975, freedom)) * math.sqrt(square)
+    half = float(t.ppf(0.9875, freedom)) * math.sqrt(square)  # of 97.5%, as one of two is chosen
     return mean, mean - half, mean + half
 
 
@@ -148,9 +153,9 @@ def test_deviations_that_happen_to_be_equal_are_not_taken_for_certain():
     narrow, _ = assisted_mean(real, real + 4.0, many)
     wide, _ = assisted_mean(real, real + 4.0, many, chance)
     unlike = 0.1**2 * many.var(ddof=1)
-    assert narrow.high - narrow.low == pytest.approx(2 * 4.302653 * math.sqrt(unlike), 0.01)
+    assert narrow.high - narrow.low == pytest.approx(2 * 6.205347 * math.sqrt(unlike), 0.01)
     least = 12.0 / 3 + many.var(ddof=1) / 10_000 + 2.0 + 0.1**2 * (many.var(ddof=1) - 3.0)
-    assert wide.high - wide.low == pytest.approx(2 * 4.302653 * math.sqrt(least), 1e-6)
+    assert wide.high - wide.low == pytest.approx(2 * 6.205347 * math.sqrt(least), 1e-6)
 
 
 @pytest.mark.parametrize("n", [6, 12, 30])
@@ -163,6 +168,26 @@ def test_intervals_hold_the_mean_where_the_simulation_is_wrong_in_few_conditions
         found, _ = assisted_mean(real, at, many, Chance(4.0, 0.0, 0.0))
         covered += found.contains(90.0 + 0.08 * 60.0)
     assert covered / 200 >= 0.93
+
+
+@pytest.mark.parametrize("n", [6, 12])
+def test_differences_of_managers_allow_for_conditions_in_which_one_is_late(n):
+    chance, covered = np.random.default_rng(n), 0
+    many = chance.normal(0.0, 1.0, 400)
+    for _ in range(200):
+        real = chance.normal(0.0, 1.0, n) + 60.0 * (chance.random(n) < 0.08)
+        same = chance.normal(0.0, 1.0, n)
+        found, _ = assisted_mean(real, same, many, Chance(1.0, 1.0, 1.0), 33.0)
+        covered += found.contains(0.08 * 60.0)
+    assert covered / 200 >= 0.93
+
+
+def test_one_manager_alone_has_no_allowance_but_pays_for_the_choice():
+    real, same = np.array([52.0, 118, 83, 61]), np.array([130.0, 40, 90, 110])
+    found, weight = assisted_mean(real, same, np.linspace(80.0, 90.0, 20))
+    assert weight == 0.0
+    # Bonferroni: t of 3 degrees of freedom at 98.75%
+    assert found.high - found.value == pytest.approx(4.176535 * real.std(ddof=1) / 2.0, 1e-6)
 
 
 @pytest.mark.parametrize("shift_s", [0.0, 40.0])
@@ -190,7 +215,7 @@ def test_a_comparison_corrects_what_the_conditions_do():
     assert row["narrower"] > 3.0
     difference = by_name.loc[("search_time_s", "a", "b")]
     assert difference["runs"] == 24
-    assert difference["assisted"] == pytest.approx(-10.0, abs=3.0)
+    assert difference["assisted"] == pytest.approx(-20.0, abs=3.0)
     assert found.estimates["conclusion"].str.contains("^a finds the pipeline.* sooner than b").any()
     assert [note.split(" are ")[0] for note in found.notes] == [
         "intervals and numbers of runs needed"
@@ -234,8 +259,21 @@ def test_repetitions_that_differ_widen_the_interval():
         estimates = compared(real=real.assign(search_time_s=changed)).estimates
         row = estimates.query("group == 'a' and other == '' and metric == 'search_time_s'").iloc[0]
         halves.append((row["assisted_ci95_high"] - row["assisted_ci95_low"]) / 2.0)
-    # 60 s apart: variance 1800 of a mission, 900 of a mean of two; t of 5 degrees of freedom.
-    assert halves[1] > 2.5706 * math.sqrt(900.0 / 6) > halves[0]
+    # 60 s apart: variance 1800 of a mission, 900 of a mean of two; t of 5 degrees of freedom, 97.5%.
+    assert halves[1] > 3.1634 * math.sqrt(900.0 / 6) > halves[0]
+
+
+def test_a_difference_allows_for_unlike_conditions_also_if_the_simulation_never_varies():
+    real = real_missions(1)
+    same, many = (
+        frame.assign(search_time_s=300.0) for frame in (missions(2, POINTS, 5), population())
+    )
+    found = compared(real=real, same=same, population=many).estimates
+    row = found.set_index(["metric", "group", "other"]).loc[("search_time_s", "a", "b")]
+    times_s = real.pivot_table("search_time_s", "start.y_m", "manager")
+    by_chance = (times_s["a"] - times_s["b"]).var() / 6
+    half = 3.163381 * math.sqrt(by_chance + (0.1 * times_s.std().max()) ** 2)
+    assert row["assisted_ci95_high"] - row["assisted"] == pytest.approx(half, 1e-6)
 
 
 def test_a_share_has_an_interval_for_shares():
@@ -311,6 +349,14 @@ def test_missions_that_never_found_the_pipeline_count_with_the_limit():
         (
             {"population": shifted(-25.0, 25.0)},
             "population: it draws start.y_m otherwise than the real conditions are spread: from",
+        ),
+        (
+            {
+                "real": with_depth(real_missions(2), 1.0),
+                "same": with_depth(missions(2, POINTS, 5), 1.0),
+                "population": with_depth(population(), -1.0),
+            },
+            "population: it draws start.y_m and start.z_m apart, which the real conditions do not",
         ),
         ({"population": missions(2, POINTS, 5)}, "it sweeps start.y_m"),
         (

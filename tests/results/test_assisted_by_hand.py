@@ -27,7 +27,7 @@ def test_an_estimated_weight_takes_a_degree_of_freedom():
     of_population = np.var(many, ddof=1)
     unseen = max(np.var(real - weight * same, ddof=1), (1.0 - weight) ** 2 * of_population) / 12
     variance = unseen + weight**2 * (of_population / 20 + UNLIKE**2 * of_population)
-    half = stats.t.ppf(0.975, 10) * math.sqrt(variance)
+    half = stats.t.ppf(0.9875, 10) * math.sqrt(variance)
     assert 0.0 < weight < 1.0
     assert found.high - found.low == pytest.approx(2.0 * half)
 

@@ -482,8 +482,11 @@ class TestIntervalsOverConditions:
         assert ends.tolist() == pytest.approx(expected)
 
 
-def test_a_validation_says_that_its_intervals_are_over_conditions(few_resamples):
+def test_a_validation_says_what_is_over_conditions_and_what_is_not(few_resamples):
     real = missions("bt", {1: [50.0, 52.0], 2: [90.0, 92.0]})
-    assert any(
-        "are over the conditions" in line for line in validate(real, real, ["bt"]).remarks("real")
-    )
+    text = " ".join(validate(real, real, ["bt"]).remarks("real"))
+    assert "are over the conditions (Student's t)" in text
+    assert "The tests (KS, AD, Mann-Whitney) and intervals of standard deviations" in text
+    assert "take missions as independent" in text
+    alone = real.drop(columns="condition")
+    assert "independent" not in " ".join(validate(alone, alone, ["bt"]).remarks("real"))
