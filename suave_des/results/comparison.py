@@ -436,4 +436,5 @@ def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
         if each.get("variance_ratio", 1.0) < _WORSE
     ]
     if worse:
-        yield f"differences within pairs have a greater variance than those of independent runs: {listed(worse)}"
+        claim = "differences within pairs have a greater variance than those of independent runs"
+        yield f"{claim}: {listed(worse)}"

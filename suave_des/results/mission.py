@@ -666,19 +666,23 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
         else:
             legend |= {style.text(f"{name}: {words}"): colour for _, colour, words in bars}
     if legend:
-        patches = [Patch(color=colour, label=label) for label, colour in legend.items()]
-        axes.legend(
-            handles=patches,
-            ncols=5 if max(map(len, legend)) <= 20 else 4,
-            handlelength=1.2,
-            columnspacing=1.2,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.0),
-            borderaxespad=0.2,
-        )
+        _show_colours(axes, legend)
     axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
+
+
+def _show_colours(axes: Axes, colours: Mapping[str, str]) -> None:
+    """Draw a legend of colours above the bars."""
+    axes.legend(
+        handles=[Patch(color=colour, label=label) for label, colour in colours.items()],
+        ncols=5 if max(map(len, colours)) <= 20 else 4,
+        handlelength=1.2,
+        columnspacing=1.2,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+    )
 
 
 def _bar_texts(
