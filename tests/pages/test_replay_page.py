@@ -245,6 +245,14 @@ def test_a_key_hides_all_that_explains_the_mission_and_what_is_to_come(one, brow
         found.wait_until(f"{visible}.length === 4")
 
 
+def test_the_key_hides_the_panels_of_two_missions_too(both, browser):
+    with opened(browser, both) as found:
+        found.page.keyboard.press("w")
+        found.wait_until("document.documentElement.classList.contains('wordless')")
+        panels = "[...document.querySelectorAll('.mind')].map(each => each.checkVisibility())"
+        assert found.value(panels) == [False, False]
+
+
 def test_with_two_missions_in_a_low_window_readings_stand_below_the_picture(both, browser):
     place = "document.querySelector('{}').getBoundingClientRect()"
     with opened(browser, both, DESKTOP) as found:
