@@ -28,6 +28,9 @@ _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*:")
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _STYLE = re.compile(r"<style scoped>.*?</style>", re.DOTALL)
 _TITLE = re.compile(r'(title|insert)=("[^"]*"|\S+)')
+_TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
+_WORD_PART = re.compile(r"(?<=\w[_/])(?=\w[^<>]*<)")
+"""Where a name or path in a text may be broken, as `distance_inspected_m`; not inside a tag."""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -97,6 +100,19 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         shown += [_on_site(markdown[place : block.start()], own, root), _code(block)]
         place = block.end()
     return "".join([*shown, _on_site(markdown[place:], own, root)])
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Let long names and paths in tables break between their parts, so that phones show tables
+    whole.
+
+    Args:
+        html: the page's content.
+        page: which page it is.
+        config: the site's configuration.
+        files: the site's files.
+    """
+    return _TABLE.sub(lambda table: _WORD_PART.sub("<wbr>", table[0]), html)
 
 
 def _on_site(text: str, own: str, root: Path) -> str:

@@ -431,9 +431,10 @@ def _lost(groups: Groups, names: Sequence[str]) -> str:
 def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
     """Yield a note on pairs whose differences vary more than those of independent runs would."""
     worse = [
-        f"{each['group']} - {each['other']} in {each['metric']}, {1.0 / each['variance_ratio']:.1f} times"
+        f"{each['group']} - {each['other']} in {each['metric']} ({1.0 / each['variance_ratio']:.1f} times)"
         for each in differences
         if each.get("variance_ratio", 1.0) < _WORSE
     ]
     if worse:
-        yield f"pairing made the variance of a difference larger, not smaller ({listed(worse)})"
+        claim = "differences within pairs have a greater variance than those of independent runs"
+        yield f"{claim}: {listed(worse)}"

@@ -27,9 +27,7 @@ Row = Mapping[str, Any]
 _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
 _MOST_SENTENCES = 3
 """Of a metric of which neither more nor less is better, in the conclusion from all differences."""
-_OPEN = (
-    "the interval of the mean, which is not corrected for the number of tests, does not contain 0"
-)
+_OPEN = "the interval, which is for this difference alone, excludes 0"
 
 
 def conclusion(found: Row, metric: Metric) -> str:

@@ -648,57 +648,60 @@ def _mode_colour(function: str, mode: str, colours: Mapping[str, str]) -> str:
 
 
 def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
-    """Draw a bar for each span; its text is in it or behind it, or in a legend where there is no
-    room for any.
+    """Draw a bar for each span; the texts of a line are in its bars or behind them, or, where one
+    has no room, all of them in a legend.
     """
     end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
-    letter_s = _LETTER_IN / _LINES_IN * end_s
     legend: dict[str, str] = {}
     for row, (name, bars) in enumerate(lines):
-        named: set[str] = set()
-        unnamed: dict[str, str] = {}
-        ends_s = [*(span.begin_s for span, _, _ in bars[1:]), end_s]
-        for (span, colour, text), next_s in zip(bars, ends_s, strict=True):
-            label = style.text(text)
-            if _draw_bar(axes, row, (span, colour, label), next_s, letter_s):
-                named.add(label)
-            else:
-                unnamed[label] = colour
-        for label in unnamed:
-            if label not in named:
-                legend[f"{style.text(name)}: {label}"] = unnamed[label]
+        for span, colour, _ in bars:
+            length_s = span.end_s - span.begin_s
+            edge: dict[str, Any] = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
+            axes.barh(row, length_s, _BAR, span.begin_s, color=colour, **edge)
+        texts = list(_bar_texts(bars, end_s))
+        if {label for label, *_ in texts} == {style.text(words) for *_, words in bars}:
+            for label, begin_s, ink in texts:
+                look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3}
+                axes.text(begin_s, row, label, color=ink, clip_on=True, **look)
+        else:
+            legend |= {style.text(f"{name}: {words}"): colour for _, colour, words in bars}
     if legend:
-        patches = [Patch(color=colour, label=label) for label, colour in legend.items()]
-        axes.legend(
-            handles=patches,
-            ncols=4,
-            handlelength=1.2,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.0),
-            borderaxespad=0.2,
-        )
+        _show_colours(axes, legend)
     axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
 
 
-def _draw_bar(
-    axes: Axes, row: int, bar: tuple[Span, str, str], next_s: float, letter_s: float
-) -> bool:
-    """Draw a bar with its text, if there is room for it, and return whether there is."""
-    span, colour, label = bar
-    width_s = span.end_s - span.begin_s
-    axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
-    look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3}
-    if 0.0 < width_s >= len(label) * letter_s:
-        luminance = np.dot((0.299, 0.587, 0.114), to_rgb(colour))
-        ink = style.BLACK if luminance > 0.5 else "white"
-        axes.text(span.begin_s + 1.0, row, label, color=ink, clip_on=True, **look)
-        return True
-    if next_s - span.end_s > len(label) * letter_s:
-        axes.text(span.end_s + 1.0, row, label, **look)
-        return True
-    return False
+def _show_colours(axes: Axes, colours: Mapping[str, str]) -> None:
+    """Draw a legend of colours above the bars."""
+    axes.legend(
+        handles=[Patch(color=colour, label=label) for label, colour in colours.items()],
+        ncols=5 if max(map(len, colours)) <= 20 else 4,
+        handlelength=1.2,
+        columnspacing=1.2,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+    )
+
+
+def _bar_texts(
+    bars: Sequence[tuple[Span, str, str]], end_s: float
+) -> Iterator[tuple[str, float, str]]:
+    """Yield text, beginning (s) and colour of it for each bar that has room for it, in the bar or
+    behind it.
+    """
+    letter_s = _LETTER_IN / _LINES_IN * end_s
+    ends_s = [*(span.begin_s for span, _, _ in bars[1:]), end_s]
+    for (span, colour, words), next_s in zip(bars, ends_s, strict=True):
+        label = style.text(words)
+        text_s = len(label) * letter_s
+        length_s = span.end_s - span.begin_s
+        if 0.0 < length_s >= text_s:
+            luminance = np.dot((0.299, 0.587, 0.114), to_rgb(colour))
+            yield label, span.begin_s + 1.0, style.BLACK if luminance > 0.5 else "white"
+        elif next_s - span.end_s > text_s:
+            yield label, span.end_s + 1.0, style.BLACK
 
 
 def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:

@@ -715,13 +715,14 @@ def _runner(parameters: Sequence[Parameter]) -> Runner | None:
 
 
 class Experiment(NamedTuple):
-    """Missions of one manager, and the level of the battery below which they are aborted; None:
-    they go on.
+    """Missions of one manager, whether they are extended ones, and the level of the battery below
+    which they are aborted; None: they go on.
     """
 
     place: str
     manager: str
     runs: int
+    is_extended: bool
     launch: str
     level: float | None
 
@@ -736,9 +737,10 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
         arguments = dict(re.findall(r"(\w+):=(\S*)", each.experiment_launch))
         notes += _not_simulated(place, EXPERIMENT, json.loads(parameter.value[index]))
         notes += _not_simulated(place, LAUNCH, arguments)
-        manager = _manager(place, each, arguments, notes)
+        is_extended = _is_extended(each, arguments)
+        manager = _manager(place, each.adaptation_manager, arguments, is_extended, notes)
         level = _level(place, arguments, notes)
-        yield Experiment(place, manager, each.num_runs, each.experiment_launch, level)
+        yield Experiment(place, manager, each.num_runs, is_extended, each.experiment_launch, level)
 
 
 def _not_simulated(place: str, node: str, given: Mapping[str, Any]) -> Iterator[str]:
@@ -749,29 +751,31 @@ def _not_simulated(place: str, node: str, given: Mapping[str, Any]) -> Iterator[
             yield f"{place}: not simulated: {words}: {shown(value)}"
 
 
+def _is_extended(experiment: _Experiment, arguments: Mapping[str, str]) -> bool:
+    """Whether an experiment or its launch is of the extended mission."""
+    of_launch = [arguments.get(name) for name in ("mission_name", "mission", "mission_type")]
+    launch_file = "".join(experiment.experiment_launch.split()[3:4])
+    return EXTENDED in (experiment.mission_name, *of_launch) or "extended" in launch_file
+
+
 def _manager(
-    place: str, experiment: _Experiment, arguments: Mapping[str, str], notes: list[str]
+    place: str,
+    named: str,
+    arguments: Mapping[str, str],
+    is_extended: bool,
+    notes: list[str],
 ) -> str:
-    """Return the manager of an experiment, by its name here; notes if its launch or mission is
-    another one.
+    """Return the manager of an experiment, by its name here; a note if its launch starts another
+    one.
     """
-    named = experiment.adaptation_manager
-    launch = experiment.experiment_launch
     manager = arguments.get("adaptation_manager", named)
     if manager != named:
         notes.append(f"{place}: its launch starts {manager}, and not {named}")
-    of_launch = [arguments.get(name) for name in ("mission_name", "mission", "mission_type")]
-    launch_file = "".join(launch.split()[3:4])
-    is_extended = EXTENDED in (experiment.mission_name, *of_launch) or "extended" in launch_file
-    if manager == "bt":
-        tree = "suave_bt_extended" if is_extended else "suave_bt"
-        executable = arguments.get("bt_executable", tree)
-        return TREES.get(executable, executable)
-    if is_extended:
-        notes.append(
-            f"{place}: not simulated: the mission {EXTENDED} under {manager}, which flies suave here"
-        )
-    return manager
+    if manager != "bt":
+        return manager
+    tree = "suave_bt_extended" if is_extended else "suave_bt"
+    executable = arguments.get("bt_executable", tree)
+    return TREES.get(executable, executable)
 
 
 def _level(place: str, arguments: Mapping[str, str], notes: list[str]) -> float | None:
@@ -817,7 +821,7 @@ def _requested(
         InputError: there is none.
     """
     runs = dict[str, int]()
-    for place, manager, number, *_ in experiments:
+    for place, manager, number, is_extended, *_ in experiments:
         if manager not in known:
             remedy = did_you_mean(manager, known)
             notes.append(f"{place}: not imported: there is no manager {shown(manager)} ({remedy})")
@@ -825,6 +829,9 @@ def _requested(
         if manager in runs:
             why = f"{manager} is there already, and a campaign has each manager once"
             notes.append(f"{place}: not imported: {why}")
+        elif is_extended and manager not in TREES.values():
+            of_mission = f"the mission {EXTENDED} under {manager}, which flies suave here"
+            notes.append(f"{place}: not simulated: {of_mission}")
         runs[manager] = max(runs.get(manager, 0), number)
     if runs:
         return runs

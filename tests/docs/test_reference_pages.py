@@ -223,6 +223,11 @@ def test_what_the_container_runs_is_run_by_this_version(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+def test_the_container_has_what_compare_and_report_need():
+    (extras,) = re.findall(r"suave-des\[(.*)\]", (ROOT / "Containerfile").read_text("utf-8"))
+    assert "report" in extras.split(",")
+
+
 def test_the_change_log_has_this_version():
     assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 

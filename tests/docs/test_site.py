@@ -4,7 +4,7 @@ import re
 
 import pytest
 from doc_blocks import ROOT
-from mkdocs_hooks import on_page_markdown
+from mkdocs_hooks import on_page_content, on_page_markdown
 from refresh_notebooks import NOTEBOOKS, shown
 
 from tests.helpers.browser import DESKTOP, PHONE, chromium, opened
@@ -91,6 +91,25 @@ def test_no_page_and_no_code_is_wider_than_the_window(site, browser, page, size)
     assert not overflowing(site, browser, page, size)
 
 
+SCROLLING = """[...document.querySelectorAll('.md-typeset__scrollwrap')]
+    .filter(each => each.scrollWidth > each.clientWidth + 1)
+    .map(each => each.textContent.trim().slice(0, 80))"""
+
+
+@pytest.mark.parametrize("page", SOME_PAGES)
+def test_tables_are_shown_whole_on_a_desktop(site, browser, page):
+    with opened(browser, site / page / "index.html") as found:
+        assert not found.value(SCROLLING)
+
+
+@pytest.mark.parametrize(
+    "page", ["analysis", "notebooks/own-manager", "notebooks/sweep-with-salib"]
+)
+def test_tables_of_up_to_five_columns_are_shown_whole_on_a_phone(site, browser, page):
+    with opened(browser, site / page / "index.html", PHONE) as found:
+        assert not found.value(SCROLLING)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 def test_that_is_so_of_every_page(site, browser, size):
@@ -174,6 +193,12 @@ class TestHooks:
     def test_addresses_and_pictures_in_the_page_stay(self):
         for text in ("![](data:image/png;base64,a//b/+c=)", "[a](mailto:a@b.org)"):
             assert self.markdown(text) == text
+
+    def test_names_and_paths_in_tables_may_break_between_their_parts_and_nothing_else_may(self):
+        table = '<table><td><a href="a_b/c_d.md">a_b/c_d</a></td></table>'
+        assert on_page_content(f"<p>a_b</p>{table}", None, None, None) == (
+            '<p>a_b</p><table><td><a href="a_b/c_d.md">a_<wbr>b/<wbr>c_<wbr>d</a></td></table>'
+        )
 
     def test_code_stays(self):
         assert self.markdown("```python\nhooks[name](event)\n```") == (

@@ -177,14 +177,31 @@ def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):
         assert place(found, 0) != place(found, 1)
 
 
-def test_two_managers_reasoning_is_in_sight_on_a_projector(both, browser):
-    with opened(browser, both, (1280, 800), hash_="#t=60") as found:
-        bottom = "document.querySelector('.phase.plan').getBoundingClientRect().bottom"
-        assert found.value(
-            f"{bottom} < document.querySelector('.deck').getBoundingClientRect().top + 1"
-        )
-        found.page.keyboard.press("b")
-        assert found.value("getComputedStyle(document.body).zoom") == "1.4"
+IN_SIGHT = """(inner, phase) => {
+  const box = document.querySelector(`.phase.${phase}`).getBoundingClientRect();
+  const shown = document.querySelector(`.phase.${phase} ${inner}`).getBoundingClientRect();
+  const deck = document.querySelector('.deck').getBoundingClientRect();
+  return shown.bottom <= Math.min(box.bottom, deck.top) + 1;
+}"""
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "is_enlarged"),
+    [
+        ("one", (1024, 768), True),
+        ("both", DESKTOP, False),
+        ("both", (1920, 1080), False),
+        ("both", (1920, 1080), True),
+    ],
+)
+def test_analyze_and_plan_are_in_sight_on_a_projector(name, size, is_enlarged, browser, request):
+    page = request.getfixturevalue(name)
+    with opened(browser, page, size, hash_=f"#t={FAILURE_S + 1.0}") as found:
+        if is_enlarged:
+            found.page.keyboard.press("b")
+            assert found.value("getComputedStyle(document.body).zoom") == "1.4"
+        assert found.value(f"({IN_SIGHT})('.fact .by', 'analyze')")
+        assert found.value(f"({IN_SIGHT})('.chosen .name', 'plan')")
 
 
 def test_it_says_when_no_design_is_left(tmp_path, browser):
@@ -226,6 +243,14 @@ def test_a_key_hides_all_that_explains_the_mission_and_what_is_to_come(one, brow
         assert colours(found, "#timeline") < drawn / 2
         found.page.keyboard.press("w")
         found.wait_until(f"{visible}.length === 4")
+
+
+def test_the_key_hides_the_panels_of_two_missions_too(both, browser):
+    with opened(browser, both) as found:
+        found.page.keyboard.press("w")
+        found.wait_until("document.documentElement.classList.contains('wordless')")
+        panels = "[...document.querySelectorAll('.mind')].map(each => each.checkVisibility())"
+        assert found.value(panels) == [False, False]
 
 
 def test_with_two_missions_in_a_low_window_readings_stand_below_the_picture(both, browser):

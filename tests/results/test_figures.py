@@ -183,6 +183,16 @@ class TestTimeline:
         assert len(listed) == len(adaptations(record)) == record.metrics["adaptations"] > 3
         assert listed[0].startswith("A  ")
 
+    def test_the_modes_of_a_function_are_all_in_its_bars_or_all_in_the_legend(self, tmp_path):
+        run_mission("seams2023", "metacontrol", 8, 1, tmp_path / "out")
+        lines = draw_timeline(read_mission(tmp_path / "out")).axes[1]
+        in_bars = [text.get_text() for text in lines.texts]
+        in_legend = [text.get_text() for text in lines.get_legend().get_texts()]
+        searches = {"search: high", "search: medium", "search: low"}
+        assert searches <= set(in_legend)
+        assert not {"high", "medium", "low"} & set(in_bars)
+        assert "search pipeline" in in_bars
+
     def test_a_failure_ends_with_the_recovery(self, tmp_path):
         run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "out")
         (span,) = failure_spans(read_mission(tmp_path / "out"))["c_thruster_1"]

@@ -637,6 +637,15 @@ class TestExperiments:
         )
         assert notes_about(result, words)
 
+    def test_a_second_mission_of_a_manager_is_not_imported_and_nothing_else(self, imported):
+        twice = [
+            json.dumps({"num_runs": 20, "adaptation_manager": "random", "mission_name": mission})
+            for mission in ("suave", "suave_extended")
+        ]
+        result = self.with_experiments(imported, *twice)
+        assert notes_about(result, "random is there already")
+        assert not notes_about(result, "flies suave here")
+
     def test_the_launch_says_which_manager_is_started(self, imported):
         launch = "ros2 launch suave_bringup mission.launch.py adaptation_manager:=random gui:=false"
         experiment = json.dumps(
