@@ -15,6 +15,7 @@ import re
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from glob import escape
 from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -465,8 +466,8 @@ def remove_results(folder: Path, names: Collection[str], own: Collection[str] = 
         InputError: one cannot be removed.
     """
     with _user_errors(folder):
-        for name in names:
-            for part in folder.glob(f".{name}.*{_PART}"):
+        for final in (folder / name for name in names if _is_in(folder, name)):
+            for part in final.parent.glob(f".{escape(final.name)}.*{_PART}"):
                 part.unlink(missing_ok=True)
         for name in own:
             (folder / name).unlink(missing_ok=True)

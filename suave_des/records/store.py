@@ -606,15 +606,13 @@ def tidy(store: Store, *, is_new: bool) -> None:
         raise InputError(
             "is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it"
         )
-    own: dict[str, str] = {}
-    if is_new:
-        noted: Noted = {}
-        with suppress(InputError):  # it is damaged: what the manifest lists is known
-            noted = store.written()
-        own = own_files(folder, MANIFEST_FILE, noted)
+    noted: Noted = {}
+    with suppress(InputError):  # it is damaged: what the manifest lists is known
+        noted = store.written()
+    own = own_files(folder, MANIFEST_FILE, noted) if is_new else {}
     if own:
         own[MANIFEST_FILE] = ""
-    remove_results(folder, FILES, own)
+    remove_results(folder, {*FILES, *noted}, own)
     _leave_empty(folder, own)
 
 
