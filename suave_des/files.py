@@ -117,7 +117,7 @@ def sha256_of(path: Path, limit: int = LIMIT_BYTES) -> str:
 
 
 def _own_sha256_of(path: Path) -> str:
-    """Return the SHA-256, in hex, of a result file, which may be of any length; raises as `opened`."""
+    """Return the SHA-256, in hex, of a result file of any length; raises as `opened`."""
     with opened(path) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
@@ -435,8 +435,8 @@ def own_files(
 
 
 def _is_in(folder: Path, name: str) -> bool:
-    """Return whether a name, which may come from elsewhere, is that of a file in a folder, or in one
-    that is in it: not of one that a path or a link leads to.
+    """Return whether a name, which may come from elsewhere, is that of a file in a folder, or in
+    one that is in it: not of one that a path or a link leads to.
     """
     path = folder / name
     return (
@@ -446,8 +446,8 @@ def _is_in(folder: Path, name: str) -> bool:
 
 
 def check_unchanged(folder: Path, names: Iterable[str], own: Collection[str]) -> None:
-    """Check that those of the files in a folder that are there are `own`: as the project has written
-    them.
+    """Check that those of the files in a folder that are there are `own`: as the project has
+    written them.
 
     Raises:
         InputError: one was changed since, or is the user's.

@@ -138,8 +138,8 @@ class CampaignResult:
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
 
     def write(self, kept: store.Store, provenance: Mapping[str, Any]) -> None:
-        """Write the campaign's files, with its provenance in the manifest, into its folder, which is
-        that of its store, replacing earlier ones.
+        """Write the campaign's files, with its provenance in the manifest, into the folder of its
+        store, replacing earlier ones.
 
         Raises:
             InputError: as of store.write_campaign.

@@ -155,19 +155,15 @@ class Rule:
 
     @property
     def identities_of_names(self) -> tuple[Atom, ...]:
-        """Atoms of the body that ask whether individuals are the same, or different, with nothing in
-        it that says which: of names, or of variables that no fact binds.
+        """Atoms of the body that ask whether individuals are the same, or different, with nothing
+        in it that says which: of names, or of variables that no fact binds.
 
         Pellet decides these by cases, and what it was asked before can decide what follows.
         """
         facts = [atom for atom in self.body if atom.kind in ("class", "object", "data")]
-        bound = {term for atom in facts for term in atom.arguments}
-        return tuple(
-            atom
-            for atom in self.body
-            if atom.predicate in IDENTITIES
-            and not any(isinstance(term, Variable) and term in bound for term in atom.arguments)
-        )
+        bound = {term for atom in facts for term in atom.arguments if isinstance(term, Variable)}
+        asking = [atom for atom in self.body if atom.predicate in IDENTITIES]
+        return tuple(atom for atom in asking if bound.isdisjoint(atom.arguments))
 
 
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
