@@ -14,7 +14,13 @@ from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.progress import OnProgress, is_live, shown
 from suave_des.campaign.spec import RUNS_LIMIT, SEED_LIMIT, CampaignSpec, check_range
-from suave_des.files import check_output_folder, make_output_folder, own_files, write_files
+from suave_des.files import (
+    check_output_folder,
+    make_output_folder,
+    own_files,
+    remove_results,
+    write_files,
+)
 from suave_des.metrics.result import MissionResult
 from suave_des.records.mission_folder import MISSION_FILE, mission_files, record_of
 from suave_des.registry import ManagerLike, name_of
@@ -105,6 +111,7 @@ def run_mission(
     if folder is not None:
         make_output_folder(folder)
         files = mission_files(result, loaded, inputs, command)
+        remove_results(folder, files)
         write_files(folder, files, stale=own_files(folder, MISSION_FILE))
     return RecordedMission(
         **{each.name: getattr(result, each.name) for each in fields(result)}, loaded=loaded

@@ -15,9 +15,10 @@ import re
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from glob import escape
 from itertools import accumulate, islice
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, TypeVar
 
 from suave_des.errors import InputError, line_error
 
@@ -31,11 +32,17 @@ _DEEPEST = 200
 _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _PART = ".part"
 
+PAGES = ("replay.html", "report.html")
+"""Files that are made beside the results of any family."""
+VALIDATION_FILES = (
+    *("validation.csv", "validation_pairs.csv", "validation_shares.csv"),
+    *("validation_targets.csv", "validation.json"),
+)
 DERIVED = (
     *("paper_table.md", "paper_table.csv"),
-    *("validation.csv", "validation_pairs.csv", "validation_shares.csv"),
-    *("validation_targets.csv", "validation.json", "distributions.png", "detections.png"),
-    *("replay.html", "report.html"),
+    *VALIDATION_FILES,
+    *("distributions.png", "detections.png"),
+    *PAGES,
 )
 """Files that reproduce, validate, report and replay make of a campaign's, beside them."""
 FAMILIES: Mapping[str, tuple[str, ...]] = {
@@ -65,11 +72,13 @@ LISTED = "files_sha256"
 """Key of a listing of files that the project has written, with their SHA-256, in hex."""
 FileContent = str | bytes | Iterable[str]
 Listing = Callable[[Mapping[str, str]], str]
+Noted = Mapping[str, Collection[str]]
+"""SHA-256 of each file that was written, by its name: of now, and of before."""
 _Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None", object)
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[BinaryIO]:
+def opened(path: Path) -> Iterator[io.BufferedReader]:
     """Open a file that the user named; what is no file, such as a pipe, is not waited for.
 
     Raises:
@@ -105,6 +114,12 @@ def read_bytes(path: Path, limit: int = LIMIT_BYTES) -> bytes:
 def sha256_of(path: Path, limit: int = LIMIT_BYTES) -> str:
     """Return the SHA-256 of a file, in hex; raises as read_bytes does."""
     return hashlib.sha256(read_bytes(path, limit)).hexdigest()
+
+
+def _own_sha256_of(path: Path) -> str:
+    """Return the SHA-256, in hex, of a result file of any length; raises as `opened`."""
+    with opened(path) as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def real(path: Path) -> Path:
@@ -270,6 +285,7 @@ def check_output_folder(
     *,
     overwrite: bool,
     left_over: Callable[[str], bool] = lambda name: False,
+    noted: Mapping[str, Collection[str]] = {},
 ) -> None:
     """Check that results can go into a folder, without changing anything.
 
@@ -277,6 +293,7 @@ def check_output_folder(
         family: the kind of results, a key of FAMILIES.
         overwrite: whether the folder need not be empty.
         left_over: returns whether a file of that name does not count.
+        noted: what was written, if more is known of that than is listed.
 
     Raises:
         InputError: it is not empty and `overwrite` is false, has results of another family, is a
@@ -288,7 +305,7 @@ def check_output_folder(
         has_parent = folder.parent.is_dir()
     _check_family(folder, family, entries)
     if overwrite and is_there:
-        _check_replaced(folder, family, entries)
+        _check_replaced(folder, family, entries, noted)
     counting = sorted(name for name in entries if not left_over(name))
     _check(
         folder,
@@ -318,17 +335,17 @@ def check_output_folder(
 def _check_family(folder: Path, family: str, entries: Collection[str]) -> None:
     """Check that no results of another family are in a folder."""
     for other, names in FAMILIES.items():
-        known = sorted(set(entries).intersection(names))
+        known = sorted(set(entries).intersection(names).difference(PAGES))
         if other != family and known:
             problem = f"the output folder has a {other}'s results in it ({known[0]}), which this command does not replace"
             remedy = "give another folder, or remove them first"
             raise InputError(problem, file=folder, remedy=remedy)
 
 
-def _check_replaced(folder: Path, family: str, entries: Collection[str]) -> None:
+def _check_replaced(folder: Path, family: str, entries: Collection[str], noted: Noted) -> None:
     """Check that all that would be replaced in a folder is the project's, and unchanged."""
     listing = LISTINGS[family]
-    own = own_files(folder, listing)
+    own = own_files(folder, listing, noted)
     about: Any = {LISTED: {}}
     if listing in entries:
         about = read_json(folder / listing)
@@ -390,19 +407,55 @@ def make_output_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
 
 
-def own_files(folder: Path, listing: str) -> dict[str, str]:
-    """Return the SHA-256 of the files in a folder that are as the project has written them, by
-    their names: those that the listing, a JSON file in it, has under `files_sha256`, unchanged.
+def listed_files(folder: Path, listing: str) -> dict[str, Any]:
+    """Return what a folder's listing, a JSON file that may come from elsewhere, has under
+    `files_sha256`: the SHA-256 of files by their names.
     """
     try:
-        listed = read_json(folder / listing)[LISTED]
-        return {
-            name: digest
-            for name, digest in listed.items()
-            if ".." not in Path(name).parts and sha256_of(folder / name) == digest
-        }
-    except (InputError, KeyError, TypeError, AttributeError, ValueError):
-        return {}  # it lists nothing
+        return dict(read_json(folder / listing)[LISTED])
+    except (InputError, KeyError, TypeError, ValueError):
+        return {}
+
+
+def own_files(
+    folder: Path, listing: str, noted: Mapping[str, Collection[str]] = {}
+) -> dict[str, str]:
+    """Return the SHA-256 of the files in a folder that are as the project has written them, by
+    their names: those that are listed, or noted elsewhere, unchanged.
+    """
+    listed = listed_files(folder, listing)
+    own = {}
+    for name in {**listed, **noted}:
+        with suppress(InputError, ValueError):  # it is not there, or has no name of a file
+            if _is_in(folder, name):
+                digest = _own_sha256_of(folder / name)
+                if digest in (listed.get(name), *noted.get(name, ())):
+                    own[name] = digest
+    return own
+
+
+def _is_in(folder: Path, name: str) -> bool:
+    """Return whether a name, which may come from elsewhere, is that of a file in a folder, or in
+    one that is in it: not of one that a path or a link leads to.
+    """
+    path = folder / name
+    return (
+        ".." not in path.parts[len(folder.parts) :]
+        and real(folder) in real(path.parent / "x").parents
+    )
+
+
+def check_unchanged(folder: Path, names: Iterable[str], own: Collection[str]) -> None:
+    """Check that those of the files in a folder that are there are `own`: as the project has
+    written them.
+
+    Raises:
+        InputError: one was changed since, or is the user's.
+    """
+    for name in names:
+        if name not in own and os.path.lexists(folder / name):  # a link that leads nowhere, too
+            remedy = "move it away, and it is made anew"
+            raise InputError("is not as suave-des wrote it", file=folder / name, remedy=remedy)
 
 
 def remove_results(folder: Path, names: Collection[str], own: Collection[str] = ()) -> None:
@@ -413,8 +466,8 @@ def remove_results(folder: Path, names: Collection[str], own: Collection[str] = 
         InputError: one cannot be removed.
     """
     with _user_errors(folder):
-        for name in names:
-            for part in folder.glob(f".{name}.*{_PART}"):
+        for final in (folder / name for name in names if _is_in(folder, name)):
+            for part in final.parent.glob(f".{escape(final.name)}.*{_PART}"):
                 part.unlink(missing_ok=True)
         for name in own:
             (folder / name).unlink(missing_ok=True)
@@ -435,8 +488,9 @@ def write_files(
     Args:
         files: content by name, in an existing folder; text is written as UTF-8, pieces of it one
             after the other. A listing is made from the SHA-256 of all others by their names, and is
-            renamed first: what a kill leaves is then not as it says.
-        stale: names of files of an earlier use of the folder, removed unless they are written anew.
+            renamed first: what a kill leaves is then a part of what it lists, and nothing else.
+        stale: names of files of an earlier use of the folder, removed when the new ones are
+            complete, and before these are renamed.
 
     Raises:
         InputError: the disk is full, the folder cannot be written, or a file of that name is no
@@ -456,10 +510,10 @@ def write_files(
                 content = files[name]
                 written = content(hashes) if callable(content) else content
                 hashes[name] = _write(parts[name], written)
+            for name in stale:
+                (folder / name).unlink(missing_ok=True)
             for name, final in reversed(finals.items()):
                 parts[name].replace(final)
-            for name in set(stale) - set(files):
-                (folder / name).unlink(missing_ok=True)
     finally:
         for part in parts.values():
             with suppress(OSError):  # what could not be written has been told of
@@ -508,10 +562,26 @@ def _is_written_into(file: Path) -> bool:
     return is_there and (not file.is_file() or Path("/dev") in file.absolute().parents)
 
 
-def write_beside(folder: Path, files: Mapping[str, str], listing: str) -> None:
+def listing_in(folder: Path) -> str:
+    """Return the name of the file that lists a folder's results: a campaign's, if it has none."""
+    has_mission = (folder / LISTINGS["mission"]).is_file()
+    return LISTINGS["mission" if has_mission else "campaign"]
+
+
+def check_beside(folder: Path, names: Iterable[str]) -> None:
+    """Check that files can be made beside a folder's results, as check_unchanged does; of a folder
+    that lists nothing, nothing is known.
+    """
+    listing = listing_in(folder)
+    if (folder / listing).is_file():
+        check_unchanged(folder, names, own_files(folder, listing))
+
+
+def write_beside(folder: Path, files: Mapping[str, str]) -> None:
     """Write files that were made from a folder's results, and note them in its listing, if it has
     one, so that they go when the results are replaced; raises as write_files does.
     """
+    listing = listing_in(folder)
     about = read_json(folder / listing) if (folder / listing).is_file() else None
     if not isinstance(about, dict) or not isinstance(about.get(LISTED), dict):
         write_files(folder, files)
@@ -520,7 +590,8 @@ def write_beside(folder: Path, files: Mapping[str, str], listing: str) -> None:
     def noted(hashes: Mapping[str, str]) -> str:
         return json_text({**about, LISTED: {**about[LISTED], **hashes}})
 
-    write_files(folder, {**files, listing: noted})
+    own = own_files(folder, listing).keys() & files.keys()
+    write_files(folder, {**files, listing: noted}, stale=own)
 
 
 @contextmanager

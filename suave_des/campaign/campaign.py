@@ -41,9 +41,11 @@ from suave_des.records.store import (
     MissionFailure,
     Store,
     StoreError,
+    check_replaceable,
     has_campaign,
     is_left_over,
     read_note,
+    read_written,
     store_read,
     tidy,
 )
@@ -123,7 +125,12 @@ def _check_is_free(folder: Path, *, overwrite: bool) -> None:
     Raises:
         InputError: something is in it that is not to be replaced.
     """
-    files.check_output_folder(folder, "campaign", overwrite=overwrite, left_over=is_left_over)
+    noted = read_written(folder) if overwrite else {}
+    files.check_output_folder(
+        folder, "campaign", overwrite=overwrite, left_over=is_left_over, noted=noted
+    )
+    if noted:
+        check_replaceable(folder, noted)
     if not overwrite and has_campaign(folder):
         remedy = f"--resume {folder} continues it, --overwrite replaces it; {_MORE_MANAGERS}"
         problem = "the output folder is not empty: it has a campaign in it"
@@ -310,7 +317,8 @@ def _resume(store: Store, checked: _Checked, folder: Path) -> None:
     """
     with store.reading():
         identity.check_same(store.about("deciding"), checked.about["deciding"], folder)
-    tidy(folder, is_new=False)
+        check_replaceable(folder, store.written())
+    tidy(store, is_new=False)
     store.forget_passing_failures()
     for name, value in checked.about.items():
         store.note(name, value)
@@ -357,7 +365,7 @@ def _result(checked: _Checked, store: Store, remarks: Sequence[Remark]) -> Campa
                 of_file = campaign.file.inputs if campaign.file else {}
                 hashes = {**checked.decided_by, **of_file}
                 made = provenance(campaign.loaded, hashes, campaign.spec.command)
-                result.write({**made, "campaign_sha256": checked.about["identity"]})
+                result.write(store, {**made, "campaign_sha256": checked.about["identity"]})
         return result
     except KeyboardInterrupt:
         if folder is None:
@@ -385,7 +393,7 @@ def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]
         store = Store(folder / STORE_FILE, replace=True)
         try:
             # first, or a kill would leave earlier results beside the new campaign
-            tidy(folder, is_new=True)
+            tidy(store, is_new=True)
             store.begin(about)
             yield store
         finally:

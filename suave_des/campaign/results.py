@@ -137,16 +137,15 @@ class CampaignResult:
             return kept
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
 
-    def write(self, provenance: Mapping[str, Any]) -> None:
-        """Write the campaign's files, with its provenance in the manifest, into its folder,
-        replacing earlier ones.
+    def write(self, kept: store.Store, provenance: Mapping[str, Any]) -> None:
+        """Write the campaign's files, with its provenance in the manifest, into the folder of its
+        store, replacing earlier ones.
 
         Raises:
-            InputError: they cannot be written; nothing half-written stays.
+            InputError: as of store.write_campaign.
         """
         spec = self.campaign.spec
         sweep = self.campaign.variation.sweep
-        assert self.folder is not None
         about = {"scenario": self.campaign.loaded.scenario.name}
         about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
         columns = (*SUMMARY_COLUMNS, *sweep.parameters)
@@ -162,7 +161,7 @@ class CampaignResult:
             files[CAMPAIGN_KNOWLEDGE_FILE] = self._knowledge_lines()
         about |= {**self._varied(), **self.report(), **provenance}
         store.write_campaign(
-            self.folder, about, files, dict(self._suave_files()) if spec.suave_format else {}
+            kept, about, files, dict(self._suave_files()) if spec.suave_format else {}
         )
 
     def _varied(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from suave_des.cli.options import (
     manager_options,
 )
 from suave_des.errors import InputError, number_of
-from suave_des.files import FAMILIES, LISTINGS, write_beside
+from suave_des.files import FAMILIES, check_beside, write_beside
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
 
@@ -252,6 +252,8 @@ def reproduce(
     from suave_des.records.missions import PAPER_ORDER
     from suave_des.results.validation import PAPER_FILE, compare_with_paper
 
+    if "out" in options:
+        check_beside(options["out"], [PAPER_FILE])
     settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}
     with progress.shown("reproduce", quiet=quiet) as show:
         result = run_campaign(
@@ -267,7 +269,7 @@ def reproduce(
     if result.folder is None:
         console.print("\nNo files were written; --out DIR keeps each mission's figures.")
     else:
-        write_beside(result.folder, {PAPER_FILE: comparison.markdown()}, LISTINGS["campaign"])
+        write_beside(result.folder, {PAPER_FILE: comparison.markdown()})
         console.print(
             f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/{PAPER_FILE}"
         )

@@ -30,7 +30,8 @@ from suave_des.cli.options import (
 from suave_des.errors import InputError
 from suave_des.errors import shown as quoted
 from suave_des.files import (
-    LISTINGS,
+    VALIDATION_FILES,
+    check_beside,
     check_output_file,
     check_output_folder,
     make_output_folder,
@@ -299,6 +300,7 @@ def _recorded(file: Path, columns: Sequence[str], managers: Sequence[str], optio
     out = options.get("out")
     if out is not None:
         check_output_folder(out, "campaign", overwrite="overwrite" in options)
+        check_beside(out, VALIDATION_FILES)
         make_output_folder(out)
     return recorded
 
@@ -309,6 +311,8 @@ def _simulated(
     """Run the missions to compare."""
     from suave_des.campaign.campaign import run_campaign
 
+    if "out" in options:
+        check_beside(options["out"], VALIDATION_FILES)
     settings: Given = {"workers": None, "command": command_line(), **options}
     with progress.shown(name, quiet=quiet) as show:
         return run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
@@ -335,7 +339,7 @@ def _keep_validation(
         output().print("\nNo files were written; --out DIR keeps the tables.")
         return
     about = {"version": __version__, "command": command_line(), **sources}
-    write_beside(out, validation.texts(about), LISTINGS["campaign"])
+    write_beside(out, validation.texts(about))
     output().print(f"\nTables and validation.json are in {out}")
 
 
@@ -451,6 +455,8 @@ def replay(
         check_no_use({"--point": point}, "without a campaign's folder")
     if out is not None or not folders:
         check_output_file(page_file, overwrite=True)
+    else:
+        check_beside(page_file.parent, [page_file.name])
     if scenario is not None:
         loaded = load_scenario(scenario, **files.replacements)
         missions = missions_run(loaded, names or ("metacontrol",), run, 1 if seed is None else seed)
@@ -495,5 +501,7 @@ def report(
     page_file = out or (first if first.is_dir() else first.parent) / "report.html"
     if out is not None:
         check_output_file(page_file, overwrite=True)
+    else:
+        check_beside(page_file.parent, [page_file.name])
     write_page(page_file, report_page(results, paths), show=show)
     print(f"the report is {page_file}")

@@ -27,6 +27,7 @@ from suave_des.knowledge.pellet import TIME_LIMIT_S
 from suave_des.knowledge.rdf import Lit, local_name
 from suave_des.knowledge.resolver import Sources, as_written, is_metamodel
 from suave_des.knowledge.rules import (
+    NOT_THE_SAME,
     Atom,
     Named,
     Place,
@@ -765,6 +766,15 @@ def equal_individuals(material: Material) -> Iterator[Finding]:
                 yield material.suspicious(rule, atom.place(), f"{write_atom(atom)} {needs}", remedy)
 
 
+def identities_of_names(material: Material) -> Iterator[Finding]:
+    """Find rules that ask about identity with nothing but names, as knowledge.rules says."""
+    remedy = "add an atom about these individuals, such as their class"
+    for rule in material.rules:
+        for atom in rule.identities_of_names:
+            problem = f"{write_atom(atom)} {NOT_THE_SAME}"
+            yield material.suspicious(rule, atom.place(), problem, remedy)
+
+
 #: Axioms by which individuals that have different names can be the same.
 _MAKE_SAME: Final = re.compile(rdf.OWL + "(sameAs|.*Functional|.*ardinality|oneOf|hasKey|hasValue)")
 
@@ -963,6 +973,7 @@ CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
     for_other_models,
     never_fires,
     equal_individuals,
+    identities_of_names,
     same_individuals,
     misspelt_variables,
     two_values,

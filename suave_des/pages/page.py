@@ -16,7 +16,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from suave_des.files import DERIVED, LISTINGS, write_beside, write_file
+from suave_des.files import DERIVED, write_beside, write_file
 
 
 @cache
@@ -67,7 +67,7 @@ def write_page(file: Path, text: str, *, show: bool) -> None:
         InputError: it cannot be written.
     """
     if file.name in DERIVED and (file.is_file() or not file.exists()):
-        write_beside(file.parent, {file.name: text}, LISTINGS["campaign"])
+        write_beside(file.parent, {file.name: text})
     else:
         write_file(file, text)
     if show:

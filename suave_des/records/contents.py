@@ -81,6 +81,11 @@ _FAILURE: TypeAdapter[tuple[str, int, float | None, str, bool, int]] = TypeAdapt
 )
 
 
+_WRITTEN: TypeAdapter[dict[str, list[str]]] = TypeAdapter(
+    dict[FileName, list[str]], config=Recorded.model_config
+)
+
+
 def row_of(cells: list[Any]) -> tuple[Cell, ...]:
     """Check the cells of a row of runs.csv, with what a campaign keeps besides; a ValueError if
     one has another type.
@@ -92,6 +97,13 @@ def row_of(cells: list[Any]) -> tuple[Cell, ...]:
 def failure_of(cells: list[Any]) -> tuple[str, int, float | None, str, bool, int]:
     """Check what a campaign keeps of a mission that failed; a ValueError likewise."""
     return _FAILURE.validate_python(tuple(cells))
+
+
+def written_of(noted: Any) -> dict[str, list[str]]:
+    """Check what a campaign keeps of the files that it wrote: SHA-256 by name; a ValueError
+    likewise.
+    """
+    return _WRITTEN.validate_python(noted)
 
 
 class MissionFile(Recorded):

@@ -209,12 +209,15 @@ def read_states(folder: Path) -> tuple[Scenario, tuple[KnowledgeRecord, ...]]:
 
 def _check_listed(folder: Path, mission: contents.MissionFile) -> None:
     """Check that the files are those of the mission, not of an earlier one, as a kill leaves."""
-    for name, digest in mission.files_sha256.items():
-        if name in FAMILIES["mission"] and sha256_of(folder / name) != digest:
+    listed = mission.files_sha256
+    for name in {*FAMILIES["mission"]} - {MISSION_FILE} if listed else ():
+        path = folder / name
+        is_right = sha256_of(path) == listed[name] if name in listed else not path.exists()
+        if not is_right:
             problem = (
                 f"is not as {MISSION_FILE} beside it says: it was changed, or is of another mission"
             )
-            raise InputError(problem, file=folder / name, remedy="run the mission again")
+            raise InputError(problem, file=path, remedy="run the mission again")
 
 
 def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:

@@ -8,6 +8,7 @@ and it comes with Python. In addition, each outcome carries a checksum.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sqlite3
@@ -25,11 +26,15 @@ from suave_des.files import (
     LISTED,
     FileContent,
     Listing,
+    Noted,
     check_own,
+    check_unchanged,
     json_text,
     json_value,
+    listed_files,
     make_output_folder,
     own_files,
+    read_json,
     remove_results,
     write_files,
 )
@@ -42,6 +47,8 @@ STORE_FILE = "campaign.sqlite"
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
 ENSEMBLE_FILE = "ensemble.csv"
 FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+_WRITTEN = "written"
+"""What is noted of the files beside it."""
 SUAVE_FOLDER = "suave"
 """Folder of the exemplar's own files, for its scripts."""
 _ENDINGS = ("", "-wal", "-shm", "-journal")
@@ -231,6 +238,15 @@ class Store:
             self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
         self.commit()
 
+    def written(self) -> dict[str, list[str]]:
+        """Return the SHA-256 of each result file that was written, by its name: of now, and of
+        before.
+        """
+        if self.is_new:
+            return {}
+        with self.reading():
+            return contents.written_of(self.about(_WRITTEN, default={}))
+
     # Outcomes.
 
     def append(self, outcomes: Iterable[MissionOutcome]) -> None:
@@ -369,8 +385,20 @@ def has_campaign(folder: Path) -> bool:
         return True
 
 
-def read_note(path: Path, name: str) -> Any:
-    """Return what is noted under a name in a store, which may come from elsewhere, without changing it.
+def read_written(folder: Path) -> Noted:
+    """Return what is noted of the result files in a folder; nothing if its store is damaged, in use
+    or not there.
+    """
+    path = folder / STORE_FILE
+    with suppress(SuaveDesError), store_read(path):
+        if path.is_file():
+            return contents.written_of(read_note(path, _WRITTEN, {}))
+    return {}
+
+
+def read_note(path: Path, name: str, default: Any = None) -> Any:
+    """Return what is noted under a name in a store, which may come from elsewhere, without changing
+    it.
 
     Raises:
         InputError: the store is not a campaign's, or damaged.
@@ -378,7 +406,7 @@ def read_note(path: Path, name: str) -> Any:
     """
     with store_read(path), closing(_connected(path, "immutable")) as db:
         _check_schema(db, path)
-        return _about(db, path, name, None)
+        return _about(db, path, name, default)
 
 
 def check_store(path: Path) -> None:
@@ -486,27 +514,38 @@ def _crc(*parts: object) -> int:
 
 
 def write_campaign(
-    folder: Path,
+    store: Store,
     about: Mapping[str, Any],
     files: Mapping[str, FileContent],
     suave: Mapping[str, FileContent],
 ) -> None:
     """Write a campaign's manifest, which lists all others, and its files, of those in FILES, into
-    its folder, replacing those of an earlier campaign.
+    the folder of its store, replacing those of an earlier use.
 
     The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a
     folder, or compare one file with the others, find what they expect.
 
     Raises:
-        InputError: they cannot be written; nothing half-written stays.
+        InputError: they cannot be written; nothing half-written stays. Or one would replace a file
+            that was changed since, or is the user's.
     """
-    before = own_files(folder, MANIFEST_FILE)
+    assert store.path is not None
+    folder = store.path.parent
+    noted = store.written()
+    check_replaceable(folder, noted)
+    before = own_files(folder, MANIFEST_FILE, noted)
+    names = [*files, *(f"{SUAVE_FOLDER}/{name}" for name in suave)]
+    check_unchanged(folder, names, before)
     derived = {name: digest for name, digest in before.items() if name in DERIVED}
     inner = folder / SUAVE_FOLDER
     if suave:
         make_output_folder(inner)
 
     def manifest(hashes: Mapping[str, str]) -> str:
+        # before any is renamed, or a kill would leave what is not known
+        made = {**hashes, MANIFEST_FILE: _digest(about)}
+        known = {name: {*noted.get(name, ()), new} for name, new in made.items()}
+        store.note(_WRITTEN, {name: sorted(digests) for name, digests in known.items()})
         return json_text({**about, LISTED: {**derived, **hashes}})
 
     all_files: dict[str, FileContent | Listing] = {
@@ -518,6 +557,35 @@ def write_campaign(
     _leave_empty(folder, before)
 
 
+def check_replaceable(folder: Path, noted: Noted) -> None:
+    """Check that the files of the campaign in a folder, which are to be written anew, are as they
+    were written, as far as is noted and listed.
+
+    Raises:
+        InputError: one was changed since, or is the user's.
+    """
+    own = own_files(folder, MANIFEST_FILE, noted)
+    with suppress(InputError):
+        content = read_json(folder / MANIFEST_FILE)
+        is_ours = isinstance(content, dict) and LISTED in content
+        if MANIFEST_FILE in noted:
+            is_ours = _digest(content) in noted[MANIFEST_FILE]
+        if is_ours:
+            own[MANIFEST_FILE] = ""
+    known = {**listed_files(folder, MANIFEST_FILE), **noted}.keys() - {*DERIVED}
+    check_unchanged(folder, [RUNS_FILE, SUMMARY_FILE, *sorted(known), MANIFEST_FILE], own)
+
+
+def _digest(content: Any) -> str:
+    """Return the SHA-256, in hex, of what a manifest says, but for the files that it lists, as more
+    are added when pages are made of them.
+    """
+    rest = content
+    if isinstance(content, dict):
+        rest = {key: value for key, value in content.items() if key != LISTED}
+    return hashlib.sha256(json.dumps(rest).encode()).hexdigest()
+
+
 def _leave_empty(folder: Path, removed: Collection[str]) -> None:
     """Remove the folder of the exemplar's files if only its files that were removed were in it."""
     if any(name.startswith(f"{SUAVE_FOLDER}/") for name in removed):
@@ -525,21 +593,26 @@ def _leave_empty(folder: Path, removed: Collection[str]) -> None:
             (folder / SUAVE_FOLDER).rmdir()
 
 
-def tidy(folder: Path, *, is_new: bool) -> None:
-    """Remove unfinished files from the folder of a campaign, and the results of an earlier one, if
-    this is a new one.
+def tidy(store: Store, *, is_new: bool) -> None:
+    """Remove unfinished files from the folder of a campaign's store, and the results of an earlier
+    one, if this is a new one.
 
     Raises:
         InputError: the folder of the exemplar's files is a link, whose files would be replaced.
     """
+    assert store.path is not None
+    folder = store.path.parent
     if (folder / SUAVE_FOLDER).is_symlink():
         raise InputError(
             "is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it"
         )
-    own = own_files(folder, MANIFEST_FILE) if is_new else {}
+    noted: Noted = {}
+    with suppress(InputError):  # it is damaged: what the manifest lists is known
+        noted = store.written()
+    own = own_files(folder, MANIFEST_FILE, noted) if is_new else {}
     if own:
         own[MANIFEST_FILE] = ""
-    remove_results(folder, FILES, own)
+    remove_results(folder, {*FILES, *noted}, own)
     _leave_empty(folder, own)
 
 
@@ -561,7 +634,7 @@ def read_manifest(folder: Path) -> contents.Manifest:
     store = folder / STORE_FILE
     if not path.exists():
         return contents.Manifest()
-    remedy = f"restore it, or suave-des campaign --resume {folder} writes it anew"
+    remedy = f"restore it, or remove it: suave-des campaign --resume {folder} writes it anew"
     manifest = contents.read(contents.Manifest, path, remedy)
     kept = None
     if store.is_file():

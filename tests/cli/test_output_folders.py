@@ -2,13 +2,16 @@
 campaign.
 """
 
+import json
 import os
 import stat
 import subprocess
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
+from suave_des.campaign import campaign
 from suave_des.files import FAMILIES
 
 RUN = ("run", "seams2023", "--manager", "none", "--out", "out")
@@ -126,6 +129,103 @@ def test_overwriting_refuses_where_a_file_of_the_user_s_would_go(command, first,
     assert files() == before
 
 
+def _edit(path: Path) -> bytes:
+    """Change a file as a user may; return its bytes."""
+    if path.name == "manifest.json":
+        path.write_text(json.dumps({"note": MINE, **json.loads(path.read_text())}))
+    else:
+        path.write_bytes(path.read_bytes() + MINE.encode())
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "again", [("campaign", "--resume", "out", "--runs", "2"), (*CAMPAIGN, "--overwrite")]
+)
+@pytest.mark.parametrize(
+    "name",
+    ["runs.csv", "summary.csv", "manifest.json", "knowledge_states.jsonl", "suave/none*.csv"],
+)
+def test_a_result_file_that_the_user_changed_is_not_replaced(command, name, again):
+    assert command(*CAMPAIGN, "--format", "suave", "--record-knowledge")[0] == 0
+    (changed,) = Path("out").glob(name)
+    content = _edit(changed)
+    before = files_in("out")
+    done = command(*again)
+    assert done.status == 2 and "not as suave-des wrote it" in done.err and changed.name in done.err
+    assert changed.read_bytes() == content
+    assert files_in("out") == before
+    changed.rename("moved")
+    assert command(*again)[0] == 0
+
+
+def files_in(folder: str) -> dict[Path, bytes]:
+    """Return the content of all files but the store, which SQLite marks when it opens it."""
+    found = [path for path in Path(folder).rglob("*") if path.is_file()]
+    return {path: path.read_bytes() for path in found if path.suffix != ".sqlite"}
+
+
+def test_a_file_of_the_user_s_that_came_while_missions_ran_is_not_replaced(command, monkeypatch):
+    """They are kept in the store, and the files written when it is gone."""
+    work = campaign._work
+
+    def with_a_file(*arguments):
+        Path("out/summary.csv").write_text(MINE)
+        return work(*arguments)
+
+    monkeypatch.setattr(campaign, "_work", with_a_file)
+    done = command(*CAMPAIGN)
+    assert done.status == 2 and "out/summary.csv: is not as suave-des wrote it" in done.err
+    assert Path("out/summary.csv").read_text() == MINE
+    assert not Path("out/runs.csv").exists()
+
+
+def test_a_folder_that_lacks_one_result_file_may_be_used_again(command):
+    """As a campaign that is killed while it removes those of the one before leaves it."""
+    assert command(*CAMPAIGN)[0] == 0
+    Path("out/summary.csv").unlink()
+    assert command(*CAMPAIGN, "--overwrite")[0] == 0
+
+
+@pytest.mark.parametrize("place", ["{here}/precious.csv", "link/precious.csv", "../precious.csv"])
+def test_a_file_elsewhere_that_a_listing_names_stays(command, tmp_path, place):
+    Path("precious.csv").write_text(MINE)
+    assert command(*CAMPAIGN)[0] == 0
+    Path("out/link").symlink_to(tmp_path)
+    manifest = json.loads(Path("out/manifest.json").read_text())
+    manifest["files_sha256"][place.format(here=tmp_path)] = sha256(MINE.encode()).hexdigest()
+    Path("out/manifest.json").write_text(json.dumps(manifest))
+    command(*CAMPAIGN, "--overwrite")
+    assert Path("precious.csv").read_text() == MINE
+
+
+@pytest.mark.parametrize("page", ["report", "replay"])
+@pytest.mark.parametrize("first", [RUN, CAMPAIGN])
+def test_a_page_that_the_user_changed_is_replaced_only_where_it_is_named(command, first, page):
+    if first == RUN and page == "report":
+        pytest.skip("a report is of a campaign")
+    assert command(*first)[0] == 0
+    assert command(page, "out")[0] == 0
+    assert command(page, "out")[0] == 0
+    file = Path(f"out/{page}.html")
+    content = _edit(file)
+    done = command(page, "out")
+    assert done.status == 2 and f"{file}: is not as suave-des wrote it" in done.err
+    assert file.read_bytes() == content
+    assert command(page, "out", "--out", str(file))[0] == 0
+    assert file.read_bytes() != content
+
+
+@pytest.mark.parametrize(
+    ("again", "name"), [(REPRODUCE, "paper_table.md"), (VALIDATE, "validation.csv")]
+)
+def test_a_table_that_the_user_changed_is_not_replaced(command, again, name):
+    assert command(*again)[0] == 0
+    content = _edit(Path("out", name))
+    done = command(*again, "--overwrite")
+    assert done.status == 2 and f"out/{name}: is not as suave-des wrote it" in done.err
+    assert Path("out", name).read_bytes() == content
+
+
 def test_a_page_that_was_made_of_the_results_goes_with_them(command):
     assert command(*CAMPAIGN)[0] == 0
     assert command("replay", "out")[0] == 0
@@ -143,6 +243,16 @@ def test_a_mission_beside_files_of_another_is_told(command, name):
     for words in (["figure", "out", "--out", "m.png"], ["replay", "out"]):
         done = command(*words)
         assert done.status == 2 and f"out/{name}: is not as mission.json beside it says" in done.err
+
+
+def test_states_of_knowledge_of_an_earlier_mission_are_told(command):
+    """As a kill before the last of its files is removed left it."""
+    assert command(*RUN, "--manager", "metacontrol")[0] == 0
+    before = Path("out/knowledge.jsonl").read_bytes()
+    assert command(*RUN, "--overwrite")[0] == 0
+    Path("out/knowledge.jsonl").write_bytes(before)
+    done = command("replay", "out")
+    assert done.status == 2 and "out/knowledge.jsonl: is not as mission.json beside" in done.err
 
 
 WRITING = {

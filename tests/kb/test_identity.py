@@ -66,3 +66,24 @@ def test_of_facts_that_follow_from_one_another_each_is_told_once(tmp_path):
     assert len(explanation.facts[0].rules()) == 1 + 20 * 2 - 1
     with pytest.raises(InputError, match="does not follow"):
         knowledge.explain(knowledge.state(), "a20(c_thruster_1)")
+
+
+@pytest.mark.parametrize(
+    ("body", "warns"),
+    [
+        ("differentFrom(c_thruster_1, c_thruster_2)", True),
+        ("sameAs(?x, c_thruster_1)", True),
+        ("Component(?z) ^ sameAs(?x, c_thruster_1)", True),
+        ("requiresO(?x, ?y) ^ sameAs(?x, ?y)", False),
+    ],
+)
+def test_that_inferences_about_names_alone_may_change_is_told(command, tmp_path, body, warns):
+    """By each command that shows what Pellet infers; the rule is named."""
+    (tmp_path / "own.swrl").write_text(f"alone: {body} -> Role(c_thruster_3)\n")
+    told = "Pellet's inferences are not the same each time"
+    for words in (["check"], ["infer"], ["why-not", "alone"]):
+        done = command(*words, "--rules", tmp_path / "own.swrl")
+        lines = [line for line in (done.out + done.err).splitlines() if told in line]
+        assert all("rule alone" in line for line in lines)
+        assert bool(lines) == warns, words
+        assert done.status == 0

@@ -115,7 +115,7 @@ def test_where_it_comes_from_has_no_time_of_day(loaded):
 
 def written(path: Path, text: str) -> None:
     """Write a file of a mission's folder and list it in mission.json, as a mission would have."""
-    write_beside(path.parent, {path.name: text}, MISSION_FILE)
+    write_beside(path.parent, {path.name: text})
 
 
 def replaced(path: Path, line: int, column: str, text: str) -> None:

@@ -258,20 +258,28 @@ def test_what_was_drawn_has_all_its_digits_in_runs_csv():
     assert line == "0.1234567890123456,low"
 
 
+def written(folder, about, files, suave):
+    """Write the files of a campaign beside its store."""
+    with closing(Store(folder / STORE_FILE)) as store:
+        if store.is_new:
+            store.begin({})
+        write_campaign(store, about, files, suave)
+
+
 def test_files_of_an_earlier_campaign_that_are_not_written_again_are_gone(tmp_path):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a", ENSEMBLE_FILE: "a"}, {})
-    write_campaign(tmp_path, {}, {RUNS_FILE: "b"}, {})
-    assert {path.name for path in tmp_path.iterdir()} == {RUNS_FILE, MANIFEST_FILE}
+    written(tmp_path, {}, {RUNS_FILE: "a", ENSEMBLE_FILE: "a"}, {})
+    written(tmp_path, {}, {RUNS_FILE: "b"}, {})
+    assert {path.name for path in tmp_path.iterdir()} == {STORE_FILE, RUNS_FILE, MANIFEST_FILE}
 
 
 def test_files_that_are_written_again_take_the_place_of_the_earlier_ones(tmp_path):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
-    write_campaign(tmp_path, {}, {RUNS_FILE: "b"}, {})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    written(tmp_path, {}, {RUNS_FILE: "b"}, {})
     assert (tmp_path / RUNS_FILE).read_text() == "b"
 
 
 def test_the_manifest_has_what_is_known_of_the_campaign_and_the_hash_of_each_file(tmp_path):
-    write_campaign(tmp_path, {"seed": 1}, {RUNS_FILE: "abc"}, {"none_suave.csv": ""})
+    written(tmp_path, {"seed": 1}, {RUNS_FILE: "abc"}, {"none_suave.csv": ""})
     assert json.loads((tmp_path / MANIFEST_FILE).read_text()) == {
         "seed": 1,
         "files_sha256": {  # as sha256sum prints them
@@ -284,42 +292,47 @@ def test_the_manifest_has_what_is_known_of_the_campaign_and_the_hash_of_each_fil
 
 
 def test_the_exemplars_files_have_a_folder_of_their_own(tmp_path):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
     assert (tmp_path / SUAVE_FOLDER / "none_suave.csv").read_text() == "b"
 
 
 def test_which_is_gone_when_a_campaign_has_none(tmp_path):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {})
     assert not (tmp_path / SUAVE_FOLDER).exists()
 
 
 def test_unless_the_user_has_put_something_into_it(tmp_path):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {"none_suave.csv": "b"})
     (tmp_path / SUAVE_FOLDER / "notes.txt").write_text("mine")
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {})
     assert [path.name for path in (tmp_path / SUAVE_FOLDER).iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize(("is_new", "left"), [(True, []), (False, [MANIFEST_FILE, RUNS_FILE])])
+@pytest.mark.parametrize(
+    ("is_new", "left"), [(True, [STORE_FILE]), (False, [STORE_FILE, MANIFEST_FILE, RUNS_FILE])]
+)
 def test_the_results_of_an_earlier_campaign_are_removed_before_a_new_one(tmp_path, is_new, left):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
-    tidy(tmp_path, is_new=is_new)
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    with closing(Store(tmp_path / STORE_FILE)) as store:
+        tidy(store, is_new=is_new)
     assert sorted(path.name for path in tmp_path.iterdir()) == left
 
 
 def test_but_not_what_the_user_has_changed_in_them(tmp_path):
-    write_campaign(tmp_path, {}, {RUNS_FILE: "a"}, {})
+    written(tmp_path, {}, {RUNS_FILE: "a"}, {})
     (tmp_path / RUNS_FILE).write_text("mine")
-    tidy(tmp_path, is_new=True)
+    with closing(Store(tmp_path / STORE_FILE)) as store:
+        tidy(store, is_new=True)
     assert (tmp_path / RUNS_FILE).read_text() == "mine"
 
 
 def test_a_link_in_place_of_the_exemplars_folder_is_not_followed(tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / SUAVE_FOLDER).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match="is a link"):
-        tidy(tmp_path, is_new=True)
+    store = Store(tmp_path / STORE_FILE)
+    with closing(store), pytest.raises(InputError, match="is a link"):
+        tidy(store, is_new=True)
 
 
 def test_a_folder_without_a_manifest_has_an_empty_one(tmp_path):

@@ -5,6 +5,7 @@ follows.
 import re
 import shutil
 import sqlite3
+import time
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,15 @@ def test_a_folder_whose_store_is_not_a_campaigns_is_refused(campaign, tmp_path, 
         store.execute("CREATE VIEW endless AS SELECT * FROM outcomes")
     with pytest.raises(InputError, match="does not have the tables of a campaign's store"):
         use([folder])
+
+
+@pytest.mark.slow
+def test_a_comparison_of_sixty_managers_takes_seconds():
+    drawn = np.random.default_rng(1)
+    groups = {f"m{n}": list(drawn.uniform(100.0, 150.0, 5)) for n in range(60)}
+    before_s = time.process_time()
+    compare_frame(runs(**groups))
+    assert time.process_time() - before_s < 10.0
 
 
 def test_progress_is_told_of_each_difference():

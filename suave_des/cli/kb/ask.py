@@ -28,6 +28,7 @@ from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
+    from suave_des.knowledge.ontology import Ontology
     from suave_des.knowledge.state import Fact, Reasoning, Value
 
 
@@ -38,8 +39,20 @@ def infer(options: ReasonerOptions, at: At = None) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     knowledge = options.knowledge()
     state = state_at(at, knowledge)
+    _tell_of_identities(knowledge.base)
     lines = _inference_lines(knowledge.infer(state), knowledge.identities(state))
     print(*lines, sep="\n")
+
+
+def _tell_of_identities(base: Ontology, names: Iterable[str] = ()) -> None:
+    """Say of which rules, by default of all, the inferences may not be the same each time."""
+    from suave_des.knowledge.rules import NOT_THE_SAME, write_atom
+
+    chosen = set(names)
+    for rule in base.content.enabled_rules:
+        atoms = rule.identities_of_names if not chosen or rule.name in chosen else ()
+        for atom in atoms:
+            errors().print(f"suave-des: rule {rule.name}: {write_atom(atom)} {NOT_THE_SAME}")
 
 
 def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterator[str]:
@@ -86,6 +99,7 @@ def explain(
 ) -> None:
     """Explain why a fact follows, or why a design is chosen or not."""
     knowledge = options.knowledge()
+    _tell_of_identities(knowledge.base)
     print(knowledge.explain(state_at(at, knowledge), question))
 
 
@@ -189,6 +203,7 @@ def why_not(
     builder = StateBuilder(questions.base, ManagingSettings.of(loaded.scenario))
     builder.add_words(at or ())
     state = builder.state()
+    _tell_of_identities(questions.base, names or ())
     limit = TimeLimit(time_limit, "--time-limit")
     answers = [
         limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire")

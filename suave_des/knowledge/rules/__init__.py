@@ -74,6 +74,10 @@ FACT_KINDS: Final = ("class", "object", "data", "same", "different")
 SAME: Final = OWL + "sameAs"
 DIFFERENT: Final = OWL + "differentFrom"
 IDENTITIES: Final = (SAME, DIFFERENT)
+NOT_THE_SAME: Final = (
+    "asks about identity with nothing but names: Pellet's inferences are not the same each time"
+)
+"""Of atoms in Rule.identities_of_names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +152,18 @@ class Rule:
     def atoms(self) -> tuple[Atom, ...]:
         """Body and head."""
         return (*self.body, *self.head)
+
+    @property
+    def identities_of_names(self) -> tuple[Atom, ...]:
+        """Atoms of the body that ask whether individuals are the same, or different, with nothing
+        in it that says which: of names, or of variables that no fact binds.
+
+        Pellet decides these by cases, and what it was asked before can decide what follows.
+        """
+        facts = [atom for atom in self.body if atom.kind in ("class", "object", "data")]
+        bound = {term for atom in facts for term in atom.arguments if isinstance(term, Variable)}
+        asking = [atom for atom in self.body if atom.predicate in IDENTITIES]
+        return tuple(atom for atom in asking if bound.isdisjoint(atom.arguments))
 
 
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
