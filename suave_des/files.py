@@ -564,7 +564,8 @@ def _is_written_into(file: Path) -> bool:
 
 def listing_in(folder: Path) -> str:
     """Return the name of the file that lists a folder's results: a campaign's, if it has none."""
-    has_mission = (folder / LISTINGS["mission"]).is_file()
+    with _user_errors(folder):
+        has_mission = (folder / LISTINGS["mission"]).is_file()
     return LISTINGS["mission" if has_mission else "campaign"]
 
 

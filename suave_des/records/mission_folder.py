@@ -210,7 +210,7 @@ def read_states(folder: Path) -> tuple[Scenario, tuple[KnowledgeRecord, ...]]:
 def _check_listed(folder: Path, mission: contents.MissionFile) -> None:
     """Check that the files are those of the mission, not of an earlier one, as a kill leaves."""
     listed = mission.files_sha256
-    for name in {*FAMILIES["mission"]} - {MISSION_FILE} if listed else ():
+    for name in sorted({*FAMILIES["mission"]} - {MISSION_FILE}) if listed else ():
         path = folder / name
         is_right = sha256_of(path) == listed[name] if name in listed else not path.exists()
         if not is_right:
