@@ -725,7 +725,7 @@ def _list(base: Ontology, values: list[str | Lit]) -> str:
 
 #: How many rules are named for a fact that does not follow, and values where another one is needed.
 _MOST: Final = 3
-_WHY: Final = re.compile(r"why\s+(?:not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
+_WHY: Final = re.compile(r"why\s+(?:not\s+)?([^\s(?]+)\s*\??", re.IGNORECASE)
 _FORMS: Final = 'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
 
 

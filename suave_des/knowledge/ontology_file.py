@@ -57,7 +57,8 @@ _OTHER_NOTATIONS: Final = {
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
 _EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
 #: Stands for the folder of a file without xml:base, and reveals nothing of this machine's folders.
-RELATIVE_TO: Final = "http://ontology.invalid/"
+#: As deep as a path may climb by "../".
+RELATIVE_TO: Final = "http://ontology.invalid/a/a/a/a/a/a/a/a/"
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +214,7 @@ def _turtle(path: Path, text: str) -> tuple[Graph, None, dict[str, int]]:
     for number, line in enumerate(text.split("\n"), start=1):
         for iri in re.findall(r"<([^<>\s]*)>", line):
             lines.setdefault(iri, number)
-            lines.setdefault(RELATIVE_TO + iri, number)
+            lines.setdefault(urljoin(RELATIVE_TO, iri) if is_iri(iri) else iri, number)
     return _parse_graph(path, text, "Turtle"), None, lines
 
 
@@ -305,15 +306,15 @@ def _parse_graph(path: Path, text: str, notation: str) -> Graph:
     finally:
         rdflib.NORMALIZE_LITERALS = before
     for term in chain.from_iterable(graph):
-        if isinstance(term, URIRef) and not _is_iri(term):
+        if isinstance(term, URIRef) and not is_iri(term):
             raise KnowledgeError(
                 f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`'
             )
     return graph
 
 
-def _is_iri(text: str) -> bool:
-    """Whether a text can be an IRI, as far as readers depend on it."""
+def is_iri(text: str) -> bool:
+    """Return whether a text can be an IRI, as far as readers depend on it."""
     try:
         urlsplit(text)  # an address in brackets
     except ValueError:

@@ -16,11 +16,12 @@ their scheme and their last mark, '#' or '/'.
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
-from urllib.parse import urldefrag, urlsplit
+from urllib.parse import urldefrag, urljoin, urlsplit
 from urllib.request import url2pathname
 
 from lxml import etree
@@ -32,6 +33,7 @@ from suave_des.knowledge.ontology_file import (
     RELATIVE_TO,
     TURTLE_ENDINGS,
     OntologyFile,
+    is_iri,
     read_ontology,
 )
 from suave_des.knowledge.rdf import MROS, TOMASYS, local_name
@@ -114,7 +116,14 @@ def is_metamodel(file: OntologyFile) -> bool:
 
 def as_written(iri: str) -> str:
     """Return an imported IRI as its file writes it: a relative one without the made-up base."""
-    return iri.removeprefix(RELATIVE_TO)
+    if not _is_relative(iri):
+        return iri
+    mark = iri[len(urldefrag(iri)[0]) :]
+    return posixpath.relpath(urlsplit(iri).path, urlsplit(RELATIVE_TO).path) + mark
+
+
+def _is_relative(iri: str) -> bool:
+    return urlsplit(iri).netloc == urlsplit(RELATIVE_TO).netloc
 
 
 def _among_own_files(
@@ -146,7 +155,7 @@ def _where_the_file_says(
     if catalogued is not None and catalogued.parent != shipped_folder("ontology"):
         return read_ontology(catalogued), f"by {_CATALOG}"
     named = _path_of(file, iri)
-    if named is not None and named.is_file():
+    if named is not None and _is_file(named):
         return read_ontology(named), "by its path"
     for path in beside:
         if _may_have_iri(path, iri) and has_iri(read_ontology(path), iri):
@@ -238,8 +247,8 @@ def _comparable(iri: str) -> str:
 def _beside(file: OntologyFile) -> Iterator[Path]:
     """Yield the other ontology files in the folder of a file, by name."""
     for path in sorted(file.path.parent.iterdir()):
-        is_other = path.resolve() != file.path.resolve()
-        if path.suffix in _ENDINGS and path.name != _CATALOG and is_other and path.is_file():
+        is_ontology = path.suffix in _ENDINGS and path.name != _CATALOG and path.is_file()
+        if is_ontology and path.resolve() != file.path.resolve():
             yield path
 
 
@@ -256,12 +265,17 @@ def _may_have_iri(path: Path, iri: str) -> bool:
 
 def _path_of(file: OntologyFile, iri: str) -> Path | None:
     """Return the path that an import itself names; None if it names none."""
-    if iri.startswith(RELATIVE_TO):
-        return file.path.parent / url2pathname(iri.removeprefix(RELATIVE_TO))
-    parts = urlsplit(iri)
-    if parts.scheme == "file":
-        return Path(url2pathname(parts.path))
+    parts = urlsplit(urldefrag(as_written(iri))[0])
+    if _is_relative(iri) or parts.scheme == "file":
+        return file.path.parent / url2pathname(parts.path)
     return None
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # too long a name
+        return False
 
 
 def _in_catalog(file: OntologyFile, iri: str) -> Path | None:
@@ -281,7 +295,10 @@ def _in_catalog(file: OntologyFile, iri: str) -> Path | None:
             f"not well-formed XML: {error.msg}", file=catalog, remedy="remove it, or correct it"
         ) from error
     for entry in root.iter(_CATALOG_ENTRY):
-        path = catalog.parent / url2pathname(urlsplit(entry.get("uri", "")).path)
-        if _comparable(entry.get("name", "")) == _comparable(iri) and path.is_file():
+        name, uri = entry.get("name", ""), entry.get("uri", "")
+        if not is_iri(name) or not is_iri(uri) or _comparable(name) != _comparable(iri):
+            continue
+        path = catalog.parent / url2pathname(urlsplit(urljoin(entry.base or "", uri)).path)
+        if _is_file(path):
             return path
     return None

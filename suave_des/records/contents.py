@@ -43,7 +43,9 @@ FileName = InstanceOf[str]
 class Recorded(BaseModel):
     """A part of a file; further keys in it are left out."""
 
-    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+    # Only texts with a limit are looked at: halves of surrogate pairs, which JSON may have, end in
+    # errors of those who write or draw them.
+    model_config = ConfigDict(strict=True, allow_inf_nan=False, str_max_length=10**9)
 
 
 # Metrics

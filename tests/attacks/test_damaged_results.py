@@ -159,3 +159,15 @@ def test_a_file_of_something_else(results, tmp_path, name, content):
     shutil.copytree(results, folder)
     (folder / name).write_bytes(content)
     read_as_commands_do(folder, name)
+
+
+def test_a_half_of_a_surrogate_pair_is_no_manager(results, tmp_path):
+    """Fonts and files have none: it would end in an error of matplotlib's."""
+    folder = tmp_path / "copy"
+    shutil.copytree(results / "mission", folder)
+    file = folder / "mission.json"
+    content = json.loads(file.read_text())
+    content["metrics"]["manager"] = "\ud800x"
+    file.write_text(json.dumps(content))
+    with pytest.raises(SuaveDesError, match=r"mission\.json: metrics\.manager: "):
+        read_mission(folder)

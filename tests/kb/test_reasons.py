@@ -89,6 +89,13 @@ def test_a_fact_that_the_schema_adds_names_it(suave_copy):
     assert {each.source for each in kind.premises} <= {"state", "ontology"}
 
 
+def test_a_design_may_have_any_name(suave_copy):
+    name = "fd_d'or_\N{OCTOPUS}"
+    knowledge = KnowledgeBase.load(suave_copy(replace={"fd_spiral_high": name}))
+    (decision,) = knowledge.explain(knowledge.state(), f"why {name}?").decisions
+    assert f"{name} is chosen" in decision[0]
+
+
 def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path):
     rules = tmp_path / "any.swrl"
     rules.write_text(

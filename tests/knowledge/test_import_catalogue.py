@@ -196,6 +196,41 @@ def test_relative_paths_are_relative_to_the_file(tmp_path):
     assert reasons(app)["app.owl", iri] == (lib, "by its path")
 
 
+@pytest.mark.parametrize("ending", ["owl", "ttl"])
+def test_relative_paths_may_climb_and_end_in_a_mark(tmp_path, ending):
+    """A shared folder of ontologies beside that of the model."""
+    relative = f"../my%20libs/lib.v2.{ending}#"
+    app = written(tmp_path / "model" / "app.owl", "http://example.org/app", relative)
+    if ending == "ttl":
+        app = app.with_suffix(".ttl")
+        app.write_text(
+            "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n"
+            f"<http://example.org/app> a owl:Ontology ; owl:imports <{relative}> .\n"
+        )
+    with pytest.raises(KnowledgeError, match=r"import \.\./my%20libs/lib\.v2\..*# does not"):
+        collect([app])
+    lib = written(tmp_path / "my libs" / "lib.v2.owl", LIB)
+    if ending == "ttl":
+        lib = lib.with_suffix(".ttl")
+        lib.write_text(f"<{LIB}> a <http://www.w3.org/2002/07/owl#Ontology> .\n")
+    ((supplied, reason),) = reasons(app).values()
+    assert (supplied.resolve(), reason) == (lib, "by its path")
+
+
+@pytest.mark.parametrize("iri", ["a" * 400 + ".owl", "file:///" + "a" * 400, "file:gone/lib.owl"])
+def test_a_path_that_no_file_can_have_does_not_resolve(tmp_path, iri):
+    app = written(tmp_path / "app.owl", "http://example.org/app", iri)
+    with pytest.raises(KnowledgeError, match=r"import .* does not resolve"):
+        collect([app])
+
+
+def test_links_in_a_circle_beside_are_nobodys_input(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
+    lib = written(tmp_path / "lib.owl", LIB)
+    (tmp_path / "circle.owl").symlink_to("circle.owl")
+    assert reasons(app)["app.owl", LIB][0] == lib
+
+
 def test_a_relative_path_that_leads_nowhere_is_told_as_written_with_its_line(tmp_path):
     app = written(tmp_path / "app.owl", "http://example.org/app", "sub/lib.owl")
     with pytest.raises(KnowledgeError, match=r"line 4: import sub/lib.owl does not resolve"):
@@ -232,6 +267,23 @@ def test_a_catalog_that_names_a_missing_file_is_passed_over(tmp_path):
     catalog = CATALOG.format(iri=LIB, uri="gone.owl")
     (tmp_path / "catalog-v001.xml").write_text(catalog, encoding="utf-8")
     assert reasons(app)["app.owl", LIB][0] == lib
+
+
+@pytest.mark.parametrize("uri", ["http://[half", "a" * 400])
+def test_a_catalog_with_entries_that_are_no_files_is_passed_over(tmp_path, uri):
+    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
+    lib = written(tmp_path / "lib.owl", LIB)
+    catalog = CATALOG.format(iri=LIB, uri=uri)
+    (tmp_path / "catalog-v001.xml").write_text(catalog, encoding="utf-8")
+    assert reasons(app)["app.owl", LIB][0] == lib
+
+
+def test_a_group_of_the_catalog_has_its_own_base(tmp_path):
+    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
+    lib = written(tmp_path / "sub" / "mine.owl", "http://example.org/mine")
+    catalog = CATALOG.format(iri=LIB, uri="mine.owl").replace("<group ", '<group xml:base="sub/" ')
+    (tmp_path / "catalog-v001.xml").write_text(catalog, encoding="utf-8")
+    assert reasons(app)["app.owl", LIB] == (lib, "by catalog-v001.xml")
 
 
 def test_a_catalog_that_is_no_xml_is_named(tmp_path):
