@@ -184,18 +184,21 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Ontology:
     return Ontology.load([path])
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(900, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [60, pytest.param(1400, marks=pytest.mark.slow)])
 def test_a_generated_rule_that_is_said_not_to_fire_changes_nothing(small, count):
     firing = 0
     for number in range(count):
+        rules = generated(number)
+        if any(rule.identities_of_names for rule in rules):
+            continue  # of which `kb check` says that Pellet's inferences are not the same each time
         try:
-            found, fires = differing(with_rules(small, generated(number)), KnowledgeState())
+            found, fires = differing(with_rules(small, rules), KnowledgeState())
         except KnowledgeError as error:  # of Pellet itself, in one of a hundred
             assert "Pellet cannot use the ontologies" in str(error)
             continue
         assert found == [], number
         firing += fires
-    assert firing > count / 10
+    assert firing > count / 15
 
 
 @pytest.mark.parametrize("scenario", ["seams2023", "extended"])
