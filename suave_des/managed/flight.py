@@ -85,9 +85,8 @@ def fly(
                 vehicles[_BEFORE] = vehicle
             advance(vehicles, track, row)
         if first_detection(camera, track, vehicle.row, STEP_S, visibility, points):
-            if (
-                camera.next_row < vehicle.row
-            ):  # control may change at the first sight: it is flown to
+            if camera.next_row < vehicle.row:
+                # Control may change at the first sight, so the vehicle is flown again, up to that.
                 vehicles[0] = vehicles[_BEFORE]
             return Ends.SIGHT.value
         if flight.next_tick_s > until_s:

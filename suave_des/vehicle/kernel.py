@@ -167,8 +167,15 @@ def begin_leg(vehicle: VehicleRecord) -> None:
 def along_leg(
     time: float, length: float, quarter: float, jerk: float, top_speed: float
 ) -> tuple[float, float]:
-    """Find how far the autopilot's target has moved along a leg since it began, and how fast it is:
-    jerk +, -, -, + for a quarter of the leg's time each.
+    """Find how far the autopilot's target has moved along a leg, m, and how fast it is, m/s: jerk
+    +, -, -, + for a quarter of the leg's time each.
+
+    Args:
+        time: since the leg began, s.
+        length: of the leg, m.
+        quarter: a quarter of its time, s.
+        jerk: m/s3.
+        top_speed: in the middle of the leg, m/s.
     """
     left = min(time, 4.0 * quarter - time)  # time to the nearer end
     if left <= 0.0:
