@@ -37,7 +37,7 @@ def signals_raised() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    with handled(not_ignored(), _stop), _repeated_if_lost():
+    with handled(not_ignored(), _stop), _repeated_if_lost(), _not_printed_by_extensions():
         _blocks.append(1)
         try:
             yield
@@ -91,6 +91,26 @@ def _repeated_if_lost() -> Iterator[None]:
         for timer in timers:
             timer.cancel()
             timer.join()
+
+
+@contextmanager
+def _not_printed_by_extensions() -> Iterator[None]:
+    """Keep an extension that is imported from printing the exception of a signal.
+
+    NumPy's import_array, which most extensions in C call as they are imported, prints whatever
+    stops it, and raises an ImportError in its place.
+    """
+    report = sys.excepthook
+
+    def printed(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        if not issubclass(kind, Stopped):
+            report(kind, error, trace)
+
+    sys.excepthook = printed
+    try:
+        yield
+    finally:
+        sys.excepthook = report
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

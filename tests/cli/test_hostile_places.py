@@ -214,6 +214,28 @@ class TestStopped:
         done = python("-c", program)
         assert (done.returncode, done.stderr) == (0, "")
 
+    def test_an_extension_that_it_stops_as_it_is_imported_says_nothing(self):
+        program = (
+            "import builtins, os, signal\n"
+            "import numpy.random\n"
+            "from suave_des.interrupts import signals_raised\n"
+            "imported = builtins.__import__\n"
+            "def interrupted(name, *rest, **named):\n"
+            "    if '_multiarray_umath' in name:\n"
+            "        builtins.__import__ = imported\n"
+            "        os.kill(os.getpid(), signal.SIGHUP)\n"
+            "    return imported(name, *rest, **named)\n"
+            "try:\n"
+            "    with signals_raised():\n"
+            "        builtins.__import__ = interrupted\n"
+            "        import numba._helperlib\n"
+            "except ImportError as error:\n"
+            "    print(error)\n"
+        )
+        done = python("-c", program)
+        assert done.stderr == ""
+        assert "failed to import" in done.stdout
+
     @pytest.mark.slow
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
     def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path, number):
