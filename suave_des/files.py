@@ -15,6 +15,7 @@ import re
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from glob import escape
 from itertools import accumulate, islice
 from pathlib import Path
@@ -188,7 +189,12 @@ def json_value(text: str | bytes, real: Callable[[str], float] = float) -> Any:
         depths = accumulate(1 if each in "[{" else -1 for each in brackets)
         if max(depths, default=0) > _DEEPEST:
             raise ValueError(f"nested more than {_DEEPEST} deep")
-    return json.loads(decoded, parse_constant=real, parse_float=real)
+    return _decoder(real).decode(decoded)
+
+
+@cache  # json.loads makes one at each call, which takes as long as a short text
+def _decoder(real: Callable[[str], float]) -> json.JSONDecoder:
+    return json.JSONDecoder(parse_float=real, parse_constant=real)
 
 
 def _finite(text: str) -> float:

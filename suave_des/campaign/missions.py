@@ -100,10 +100,15 @@ class Campaign:
     file: CampaignFile | None
     inputs: Mapping[str, str]
 
+    @cached_property
+    def points(self) -> int:
+        """Number of points of its sweep."""
+        return self.variation.sweep.points
+
     @property
     def planned(self) -> int:
         """Number of missions."""
-        return self.variation.sweep.points * len(self.spec.managers) * self.spec.runs
+        return self.points * len(self.spec.managers) * self.spec.runs
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
@@ -116,7 +121,7 @@ class Campaign:
         """
         key, found = outcome
         names = self.spec.managers
-        is_planned = 0 <= key.point < self.variation.sweep.points and 1 <= key.run <= self.spec.runs
+        is_planned = 0 <= key.point < self.points and 1 <= key.run <= self.spec.runs
         if not (is_planned and 0 <= key.manager < len(names)):
             return f"it has run {key.run} of manager {key.manager + 1}, which was not to be run"
         own = names[key.manager], key.run
@@ -134,7 +139,7 @@ class Campaign:
         their turn comes.
         """
         for point, manager in product(
-            range(self.variation.sweep.points), range(len(self.spec.managers))
+            range(self.points), range(len(self.spec.managers))
         ):
             known = settled(point, manager)
             yield from (
