@@ -138,9 +138,7 @@ class Campaign:
         `settled` returns the runs of a manager at a point that need not be run; it is called when
         their turn comes.
         """
-        for point, manager in product(
-            range(self.points), range(len(self.spec.managers))
-        ):
+        for point, manager in product(range(self.points), range(len(self.spec.managers))):
             known = settled(point, manager)
             yield from (
                 MissionKey(point, manager, run)

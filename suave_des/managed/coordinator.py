@@ -16,9 +16,9 @@ import simpy
 from suave_des.clock import Process, abandon, tick_at_or_after, until
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SURFACE, Task
 from suave_des.draws import Draws
+from suave_des.events import Log, Said
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
-from suave_des.managed.node import Log
 from suave_des.monitor.measurements import BatteryMeasurements
 from suave_des.scenario.models import Scenario
 
@@ -159,13 +159,13 @@ class MissionCoordinator:
 
     def _begin(self, task: Task) -> None:
         self.task = task
-        self.log("coordinator", "task_requested", task.name)
+        self.log("coordinator", Said("task_requested", task.name))
         self._request(task)
 
     def _end(self, how: str) -> None:
         task, self.task = self.task, None
         if task is not None:
-            self.log("coordinator", how, task.name)
+            self.log("coordinator", Said(how, task.name))
             self._cancel(task)
 
     def _finish(self, why: str) -> None:
@@ -173,5 +173,5 @@ class MissionCoordinator:
             # Effects of cancelling the current task come too late for the metric.
             self._inspected_m = self.follow.distance_m
             self._end("task_cancelled")
-            self.log("coordinator", "mission_ended", why)
+            self.log("coordinator", Said("mission_ended", why))
             self.ended.succeed()

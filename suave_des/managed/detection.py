@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import simpy
 
 from suave_des.clock import exactly_at
-from suave_des.managed.node import Log
+from suave_des.events import Log, PipelineDetected
 
 
 @dataclass(eq=False)
@@ -34,7 +34,7 @@ class PipelineDetector:
 
         def detect(_: simpy.Event) -> None:
             self.first_point, self.detected_s = point, t_s
-            self.log("detection", "pipeline_detected", f"point {point}")
+            self.log("detection", PipelineDetected(point))
             self.detected.succeed(point)
 
         exactly_at(self.env, t_s).callbacks.append(detect)

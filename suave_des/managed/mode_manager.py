@@ -11,7 +11,8 @@ import simpy
 from suave_des.clock import call_at
 from suave_des.domain import UNGROUND_MODE
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.managed.node import FunctionNode, Log
+from suave_des.events import Log, ModeRefused, ModeRequested, ModeSet
+from suave_des.managed.node import FunctionNode
 from suave_des.scenario.modes import Mode, ModeTable
 
 
@@ -77,7 +78,7 @@ class ModeManager:
         chosen = self.table.get(function, mode)
         if chosen is None or function not in self.nodes:
             self.refused[function, mode] = None
-            self.log("mode_manager", "refused", f"{function} -> {mode}")
+            self.log("mode_manager", ModeRefused(function, mode))
             return False
         before, self._requested[function] = self._requested.get(function, ""), mode
         self.requests += 1
@@ -87,7 +88,7 @@ class ModeManager:
                 listener(function, before, mode)
         elif mode != UNGROUND_MODE:
             self._in_use.add(function)
-        self.log("mode_manager", "mode_requested", f"{function} -> {mode}")
+        self.log("mode_manager", ModeRequested(function, mode))
         delay_s = self.latency_s() if latency_s is None else latency_s
         due_s = max(self.env.now + delay_s, self._effect_due_s.get(function, 0.0))
         self._effect_due_s[function] = due_s
@@ -110,6 +111,6 @@ class ModeManager:
 
     def _take_effect(self, function: str, mode: Mode) -> None:
         self.nodes[function].apply(mode)
-        self.log("mode_manager", "mode_set", f"{function} = {mode.name}")
+        self.log("mode_manager", ModeSet(function, mode.name))
         for listener in self.listeners:
             listener(function, mode)

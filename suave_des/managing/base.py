@@ -16,6 +16,7 @@ import simpy
 
 from suave_des.domain import UNGROUND_MODE, Task
 from suave_des.errors import InputError
+from suave_des.events import Said
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 from suave_des.scenario.models import Scenario
 
@@ -120,7 +121,7 @@ class System:
 
     def log(self, event: str, detail: str) -> None:
         """Add an event and its detail to the mission's record."""
-        self._recorder.log(self._manager, event, detail)
+        self._recorder.log(self._manager, Said(event, detail))
 
     def log_state(self, state: KnowledgeState) -> None:
         """Add a knowledge state that is reasoned about to the mission's record."""

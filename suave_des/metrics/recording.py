@@ -5,12 +5,19 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, TypeVar, overload
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar, overload
 
 import simpy
 
 from suave_des.compiling import Array
 from suave_des.domain import BATTERY_LEVEL, MOVING_FUNCTIONS, WATER_VISIBILITY
+from suave_des.events import (
+    BatteryCrossing,
+    ComponentStatus,
+    Said,
+    VisibilityCrossing,
+    texts_of,
+)
 from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.monitor.diagnostics import HULL, Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
@@ -43,10 +50,10 @@ class Recorder:
     _moving: str | None = None  # the function that the last of these modes is one of
     _modes: list[tuple[float, str]] = field(default_factory=lambda: [(0.0, "")])
 
-    def log(self, source: str, event: str, detail: str) -> None:
+    def log(self, source: str, happening: NamedTuple) -> None:
         """Keep an event."""
         if self.enabled:
-            self.events.append(Event(float(self.env.now), source, event, detail))
+            self.events.append(Event(float(self.env.now), source, *texts_of(happening)))
 
     def log_state(self, state: KnowledgeState) -> None:
         """Keep a state that is reasoned about, if it differs from the one before."""
@@ -61,32 +68,35 @@ class Recorder:
         value = diagnostic.value
         if diagnostic.kind == Kind.COMPONENT_STATUS:
             monitor = "leak_monitor" if key == HULL else "thruster_monitor"
-            self.log(monitor, "component_status", f"{key} {value}")
+            self.log(monitor, ComponentStatus(key, str(value)))
         elif not isinstance(value, float):
             return
         elif key == WATER_VISIBILITY:
             limits_m = sorted(self.metric.visibility_thresholds_m)
-            self._measured(key, value, limits_m, "visibility", " m")
+            self._measured("visibility_monitor", VisibilityCrossing, value, limits_m, " m")
         elif key == BATTERY_LEVEL:
-            self._measured(key, value, [self.metric.battery_limit], "battery", "")
+            limits = [self.metric.battery_limit]
+            self._measured("battery_monitor", BatteryCrossing, value, limits, "")
 
     def _measured(
-        self, key: str, value: float, limits: Sequence[float], word: str, unit: str
+        self,
+        monitor: str,
+        crossing: type[VisibilityCrossing | BatteryCrossing],
+        value: float,
+        limits: Sequence[float],
+        unit: str,
     ) -> None:
         """Keep the first value of a quality attribute, and when it reaches or leaves a limit."""
-        monitor = f"{word}_monitor"
         measured = f"{value:.2f}{unit}"
-        before = self._reached.get(key)
+        before = self._reached.get(monitor)
         reached = bisect_right(limits, value)
         if before is None:
-            self.log(monitor, "first_measurement", measured)
+            self.log(monitor, Said("first_measurement", measured))
         elif reached > before:
-            text = f"rises to {limits[reached - 1]:g}{unit} ({measured})"
-            self.log(monitor, f"{word}_crossing", text)
+            self.log(monitor, crossing(f"rises to {limits[reached - 1]:g}{unit}", measured))
         elif reached < before:
-            text = f"falls below {limits[reached]:g}{unit} ({measured})"
-            self.log(monitor, f"{word}_crossing", text)
-        self._reached[key] = reached
+            self.log(monitor, crossing(f"falls below {limits[reached]:g}{unit}", measured))
+        self._reached[monitor] = reached
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""

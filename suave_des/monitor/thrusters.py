@@ -12,6 +12,7 @@ import simpy
 from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.draws import Draws
+from suave_des.events import Log, Said
 from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Timing
 from suave_des.scenario.models import Scenario, ThrusterEvent, ThrusterFailureRevision
@@ -32,7 +33,7 @@ class Thrusters:
     env: simpy.Environment
     vehicle: Vehicle
     revision: ThrusterFailureRevision
-    log: Callable[[str, str, str], None]
+    log: Log
     unrecoverable: set[int] = field(default_factory=set, init=False)
     working: list[tuple[float, int]] = field(default_factory=list, init=False)
 
@@ -40,9 +41,8 @@ class Thrusters:
         """Let one of the scenario's events happen to the vehicle now."""
         fails = event.event == "failure"
         if fails and self.env.now < self.revision.effective_from_s:
-            self.log(
-                "thruster_monitor", "failure_without_effect", THRUSTER_NAMES[event.thruster - 1]
-            )
+            name = THRUSTER_NAMES[event.thruster - 1]
+            self.log("thruster_monitor", Said("failure_without_effect", name))
             return
         if fails and not event.recoverable:
             self.unrecoverable.add(event.thruster)

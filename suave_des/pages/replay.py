@@ -17,6 +17,7 @@ from suave_des.campaign.campaign import opened_campaign
 from suave_des.compiling import Array
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.events import ComponentStatus, PipelineDetected
 from suave_des.kb.explain import LEFT_OUT, Derivation, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.states import ManagingSettings
@@ -33,7 +34,7 @@ from suave_des.pages.page import page
 from suave_des.records.mission_folder import MISSION_FILE, MissionRecord, read_mission, record_of
 from suave_des.records.store import STORE_FILE
 from suave_des.resources import find, hashes
-from suave_des.results.mission import Rules, adaptations, details, mode_spans
+from suave_des.results.mission import Rules, adaptations, happenings, mode_spans
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.world.pipeline import sample_points
@@ -161,8 +162,7 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
         for function, spans in mode_spans(mission).items()
     }
     thrusters: list[tuple[float, int, bool]] = []
-    for t_s, detail in details(mission, "component_status"):
-        component, _, status = detail.partition(" ")
+    for t_s, (component, status) in happenings(mission, ComponentStatus):
         number = component.rpartition("_")[2]
         if number.isdecimal():
             thrusters.append((t_s, int(number), status != FAILED))
@@ -190,10 +190,9 @@ def _way(mission: MissionRecord) -> Array | None:
     """The way along the pipeline from the point that was seen first, see `there_and_back`."""
     pipeline = mission.settings.pipeline
     points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
-    for _, detail in details(mission, "pipeline_detected"):
-        number = detail.rpartition(" ")[2]
-        if number.isdecimal() and int(number) < len(points):
-            return there_and_back(points)[int(number) :]
+    for _, seen in happenings(mission, PipelineDetected):
+        if seen.point < len(points):
+            return there_and_back(points)[seen.point :]
     return None
 
 

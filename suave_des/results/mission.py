@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import cycle, groupby, pairwise
 from string import ascii_uppercase
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pandas
@@ -21,6 +21,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
+from suave_des import events
 from suave_des.domain import (
     FOLLOW_PIPELINE,
     GENERATE_SEARCH_PATH,
@@ -40,6 +41,7 @@ from suave_des.results.style import (
     plain,
 )
 
+_Kind = TypeVar("_Kind", bound=NamedTuple)
 _LATEST_REACTION_S = 5.0
 """What was reported earlier is not taken as the cause of an adaptation."""
 _RECHARGED, _ROUNDING = 0.3, 0.01
@@ -66,10 +68,14 @@ class Adaptation:
     cause: str = ""
 
 
-def details(record: MissionRecord, event: str) -> list[tuple[float, str]]:
-    """Return times and details of the events of one kind."""
-    own = record.events[record.events["event"] == event]
-    return list(zip(own["t_s"].astype(float), own["detail"], strict=True))
+def happenings(record: MissionRecord, kind: type[_Kind]) -> list[tuple[float, _Kind]]:
+    """Return the events of one kind with their times; those whose text is of another are left
+    out.
+    """
+    own = record.events[record.events["event"] == events.name_of(kind)]
+    texts = zip(own["t_s"].astype(float), own["detail"], strict=True)
+    read = [(t_s, events.read(kind, detail)) for t_s, detail in texts]
+    return [(t_s, found) for t_s, found in read if found is not None]
 
 
 def _spans(changes: Iterable[tuple[float, str, str]], end_s: float) -> dict[str, list[Span]]:
@@ -91,8 +97,8 @@ def _spans(changes: Iterable[tuple[float, str, str]], end_s: float) -> dict[str,
 
 def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of each function's modes."""
-    changes = ((t_s, detail.partition(" = ")) for t_s, detail in details(record, "mode_set"))
-    return _spans(((t_s, function, mode) for t_s, (function, _, mode) in changes), record.end_s)
+    changes = happenings(record, events.ModeSet)
+    return _spans(((t_s, *mode_set) for t_s, mode_set in changes), record.end_s)
 
 
 def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]]:
@@ -100,8 +106,7 @@ def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]
     whether failed.
     """
     failed: set[str] = set()
-    for t_s, detail in details(record, "component_status"):
-        component, _, status = detail.partition(" ")
+    for t_s, (component, status) in happenings(record, events.ComponentStatus):
         if (status == FAILED) != (component in failed):
             failed ^= {component}
             yield t_s, component, status == FAILED
@@ -134,22 +139,19 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
     The first mode of a function in a task is none, nor is what is requested between a task's end
     and that.
     """
-    mode_set = details(record, "mode_set")
+    mode_set = happenings(record, events.ModeSet)
     in_use = set[str]()
     modes = dict[str, str]()
+    requested = events.name_of(events.ModeRequested)
     found = list[Adaptation]()
     for t_s, event, detail in zip(
         *(record.events[name] for name in ("t_s", "event", "detail")), strict=True
     ):
-        if event == "mode_requested":
-            function, _, mode = detail.partition(" -> ")
+        if event == requested and (change := events.read(events.ModeRequested, detail)):
+            function, mode = change
             if function in in_use:
                 effect_s = next(
-                    (
-                        at_s
-                        for at_s, new in mode_set
-                        if at_s >= t_s and new == f"{function} = {mode}"
-                    ),
+                    (at_s for at_s, new in mode_set if at_s >= t_s and new == (function, mode)),
                     t_s,
                 )
                 cause = _cause(record, function, modes[function], Span(effect_s, effect_s, mode))
@@ -184,8 +186,8 @@ def _cause(record: MissionRecord, function: str, before: str, after: Span) -> st
     elif cause := _battery_cause(record, before, after):
         return cause
     else:
-        crossings = details(record, "visibility_crossing")
-        causes = [(t_s, f"visibility {detail.split(' (')[0]}") for t_s, detail in crossings]
+        crossings = happenings(record, events.VisibilityCrossing)
+        causes = [(t_s, f"visibility {crossing.change}") for t_s, crossing in crossings]
     recent = [
         (t_s, text) for t_s, text in causes if 0.0 <= after.begin_s - t_s <= _LATEST_REACTION_S
     ]
@@ -324,13 +326,11 @@ def _marks(record: MissionRecord) -> Iterator[_Mark]:
     """Yield the events that are marked: the detection, failures, recoveries from these, and the
     battery's limits.
     """
-    found = [
-        (t_s, "pipeline detected", style.BLACK) for t_s, _ in details(record, "pipeline_detected")
-    ]
-    for t_s, detail in details(record, "battery_crossing"):
-        found.append(
-            (t_s, "battery low" if detail.startswith("falls") else "recharged", _BATTERY_COLOUR)
-        )
+    detected = happenings(record, events.PipelineDetected)
+    found = [(t_s, "pipeline detected", style.BLACK) for t_s, _ in detected]
+    for t_s, crossing in happenings(record, events.BatteryCrossing):
+        text = "battery low" if crossing.change.startswith("falls") else "recharged"
+        found.append((t_s, text, _BATTERY_COLOUR))
     for t_s, component, is_failed in component_changes(record):
         what, colour = ("failed", style.VERMILION) if is_failed else ("recovered", style.BLACK)
         found.append((t_s, f"{component_words(component)} {what}", colour))

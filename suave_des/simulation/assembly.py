@@ -19,6 +19,7 @@ from suave_des.clock import MissionEnvironment, stop_at
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.draws import Draws
 from suave_des.errors import MissionError, SuaveDesError
+from suave_des.events import Said
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.destinations import GenerateRechargePath, Surface
 from suave_des.managed.detection import PipelineDetector
@@ -246,6 +247,9 @@ def _make_custom_functions(
     def stream(function: str, name: str) -> random.Random:
         return around.draws.stream(f"functions/{function}/{name}")
 
+    def log(function: str, event: str, detail: str) -> None:
+        around.recorder.log(function, Said(event, detail))
+
     nodes: dict[str, FunctionNode] = {}
     for name, kind in order.prepared.custom_functions.items():
         settings = order.scenario.functions.get(name)
@@ -256,7 +260,7 @@ def _make_custom_functions(
             sender=make_sender(name),
             bus=around.bus,
             stream=partial(stream, name),
-            log=partial(around.recorder.log, name),
+            log=partial(log, name),
         )
         try:
             nodes[name] = node = kind(context)

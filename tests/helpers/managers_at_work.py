@@ -60,7 +60,7 @@ def system_of(
     seed: int = 1,
 ) -> System:
     """What a manager sees, without a vehicle and a knowledge base."""
-    recorder = SimpleNamespace(log=lambda source, event, detail: None)
+    recorder = SimpleNamespace(log=lambda source, happening: None)
     parts = {
         "_manager": "m",
         "_coordinator": coordinator,

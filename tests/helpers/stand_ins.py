@@ -5,6 +5,7 @@ vehicle.
 import random
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -105,7 +106,7 @@ ACTIVE = Mode("active", True, {})
 INACTIVE = Mode("fd_unground", False, {})
 
 
-def silent(source: str, event: str, detail: str) -> None:
+def silent(source: str, happening: NamedTuple) -> None:
     """A log that keeps nothing."""
 
 

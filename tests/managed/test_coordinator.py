@@ -8,6 +8,7 @@ import pytest
 import simpy
 
 from suave_des.domain import Task
+from suave_des.events import texts_of
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario.models import Scenario
@@ -59,7 +60,7 @@ class Mission:
             ),
             self.detector,
             self.follow,
-            lambda source, event, detail: self.logged.append((self.env.now, event, detail)),
+            lambda source, happening: self.logged.append((self.env.now, *texts_of(happening))),
         )
         self.coordinator.start(self.request, self.cancel)
 

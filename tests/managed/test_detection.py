@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.clock import MissionEnvironment
+from suave_des.events import texts_of
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.flight import Flight
 from suave_des.scenario.models import Pipeline
@@ -38,7 +39,8 @@ class Sight:
         self.visibility_m = visibility_m
         self.logged: list[tuple[float, str]] = []
         self.detector = PipelineDetector(
-            self.env, lambda source, event, detail: self.logged.append((self.env.now, event))
+            self.env,
+            lambda source, happening: self.logged.append((self.env.now, texts_of(happening)[0])),
         )
         camera = CameraRecord(True, VIEW_TANGENT, *POINTS.min(axis=0), *POINTS.max(axis=0))
         always = np.array([[0.0], [visibility_m]])

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from suave_des.clock import call_at
 from suave_des.draws import Draws, Streams
+from suave_des.events import Said
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import (
     BatteryMeasurements,
@@ -251,11 +252,11 @@ def test_a_recovery_by_itself_ends_even_a_failure_that_is_not_recoverable():
 
 @pytest.mark.parametrize(("effective_from_s", "state"), [(0.0, "frozen"), (0.1, "works")])
 def test_a_failure_has_no_effect_before_the_revisions_time(effective_from_s, state):
-    logged = list[tuple[str, ...]]()
+    logged = list[tuple[str, Said]]()
     thrusters = noted_thrusters(effective_from_s, logged)
     thrusters.apply(ThrusterEvent(thruster=6, event="failure", time_s=0.0))
     assert thrusters.vehicle.thrusters[5] == state
-    without_effect = [("thruster_monitor", "failure_without_effect", "c_thruster_6")]
+    without_effect = [("thruster_monitor", Said("failure_without_effect", "c_thruster_6"))]
     assert logged == (without_effect if state == "works" else [])
 
 
