@@ -334,8 +334,8 @@ def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
         )
     members = []
     for line, row in rows:
-        cells = dict(zip(header, row, strict=False))
-        member = tuple(as_number(cells.get(name, "")) for name in paths)
+        numbers = {name: as_number(cell) for name, cell in zip(header, row, strict=False)}
+        member = tuple(numbers.get(name, math.nan) for name in paths)
         if len(row) != len(header) or not all(map(math.isfinite, member)):
             problem = f"expected {len(header)} numbers, got {', '.join(row)}"
             raise line_error(path, line, problem, "give each column one")

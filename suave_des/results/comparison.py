@@ -376,6 +376,15 @@ def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
     return pandas.DataFrame(plain, columns=columns)
 
 
+def _means(summaries: Sequence[Row], metric: Metric) -> dict[str, float]:
+    """Return the mean of a metric of each group that has one."""
+    return {
+        each["group"]: each["mean"].value
+        for each in summaries
+        if each["metric"] == metric.name and "mean" in each
+    }
+
+
 def _conclusions(
     groups: Groups, summaries: Sequence[Row], differences: Sequence[Row]
 ) -> Iterator[str]:
@@ -383,11 +392,7 @@ def _conclusions(
     have the same.
     """
     metric = groups.metrics[0]
-    means = {
-        each["group"]: each["mean"].value
-        for each in summaries
-        if each["metric"] == metric.name and "mean" in each
-    }
+    means = _means(summaries, metric)
     points_of: dict[str, list[str]] = {}
     for point, names in _names_at_points(groups):
         own = {name: means[name] for name in names if name in means}

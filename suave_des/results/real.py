@@ -441,12 +441,8 @@ def common_limit_s(sides: Mapping[str, pandas.DataFrame]) -> float:
     }
     for (other, theirs), (place, ours) in combinations(limits_s.items(), 2):
         for manager in ours.index.intersection(theirs.index):
-            ends_s = float(ours[manager])
-            others_s = float(theirs[manager])
-            if math.isnan(ends_s):  # none of these found the pipeline later than the others' limit
-                ends_s = max(others_s, float(longest_s[place][manager]))
-            elif math.isnan(others_s):
-                others_s = max(ends_s, float(longest_s[other][manager]))
+            ends_s = _end_s(ours[manager], theirs[manager], longest_s[place][manager])
+            others_s = _end_s(theirs[manager], ours[manager], longest_s[other][manager])
             if abs(ends_s - others_s) > SAME_LIMIT_S:
                 problem = f"missions of {manager} end after {ends_s:.0f} s, {other} after {others_s:.0f} s"
                 remedy = (
@@ -455,6 +451,13 @@ def common_limit_s(sides: Mapping[str, pandas.DataFrame]) -> float:
                 raise InputError(problem, place=place, remedy=remedy)
     known_s = [each.max() for each in limits_s.values() if each.notna().any()]
     return math.floor(min(known_s)) if known_s else math.inf
+
+
+def _end_s(limit_s: float, others_s: float, longest_s: float) -> float:
+    """Return a limit, or, where it is not known, the others', unless a search took longer."""
+    if math.isnan(limit_s):
+        return max(float(others_s), float(longest_s))
+    return float(limit_s)
 
 
 def _limits_s(frame: pandas.DataFrame, place: str) -> pandas.Series[float]:

@@ -57,12 +57,15 @@ def check_inputs(
     files = list[Path]()
     if given or any(kind.needs_knowledge for kind in kinds.values()):
         files += _check_knowledge(scenarios[0])
-    functions = [kind for each in scenarios for kind in custom_functions(each).values()]
-    code = code_files(managers, functions)
     for each, (manager, kind) in product(scenarios, kinds.items()):
         _check_manager(manager, kind, each)
     files += declared_files(scenarios, kinds).values()
-    inputs = hashes(files, LIMIT_BYTES)
+    functions = [kind for each in scenarios for kind in custom_functions(each).values()]
+    return _with_code(hashes(files, LIMIT_BYTES), code_files(managers, functions))
+
+
+def _with_code(inputs: dict[str, str], code: Mapping[str, Path]) -> dict[str, str]:
+    """Add the files of code to the hashes of input files, which may have the names of modules."""
     places = {place: f"module {place}" if place in inputs else place for place in code}
     return inputs | {places[place]: sha256_of(path) for place, path in code.items()}
 
