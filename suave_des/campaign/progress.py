@@ -35,7 +35,9 @@ OnProgress = Callable[[Progress], None]
 
 def is_live() -> bool:
     """Whether a line of standard error can be written over: on a terminal, and in a notebook."""
-    return "ipykernel" in sys.modules or (sys.stderr.isatty() and os.environ.get("TERM") != "dumb")
+    if type(sys.stderr).__module__.startswith("ipykernel."):
+        return True
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 @contextmanager
