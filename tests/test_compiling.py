@@ -110,12 +110,14 @@ def test_after_a_change_and_back_again_it_is_found(known_program):
     assert known_program() == ["65.0", "True"]
 
 
+@pytest.mark.slow
 def test_after_a_change_whose_first_run_cannot_write_the_old_is_not_used(program):
     program()
     assert program("PART = 0.5", "PART = 1.0", largest_file=100)[0] == "85.0"
     assert [program("PART = 0.5", "PART = 1.0")[0] for _ in range(2)] == ["85.0", "85.0"]
 
 
+@pytest.mark.slow
 def test_files_under_each_other_s_names_are_not_used(program, tmp_path):
     program()
     program("PART = 0.5", "PART = 1.0")

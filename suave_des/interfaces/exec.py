@@ -125,6 +125,8 @@ class _Program:
             if len(self._rest) > LINE_LIMIT_BYTES:
                 raise ProgramError(f"answered with a line of more than {LINE_LIMIT_BYTES:,} bytes")
             if not self._has_more(due_s):
+                if self._process.poll() is not None:  # and a child keeps its output open
+                    raise self._ended()
                 half = " but half a line" if self._rest else ""
                 raise ProgramTimeoutError(f"gave no answer{half} within {time_out_s:g} s")
             if not (part := os.read(self._out, _READ_BYTES)):
@@ -136,7 +138,7 @@ class _Program:
         return line
 
     def _has_more(self, due_s: float) -> bool:
-        """Wait until the program has written something, or a time has come.
+        """Wait until the program has written something or ended, or a time has come.
 
         One at which this process was stopped (Ctrl-Z), and the program perhaps, too, is put off.
         """
@@ -144,6 +146,8 @@ class _Program:
             part_s = min(wait_s, _LOOK_S)
             if self._poll.poll(part_s * 1e3):
                 return True
+            if self._process.poll() is not None:
+                break
             stopped_s = time.monotonic() - (due_s - wait_s) - part_s
             if stopped_s > _LOOK_S:
                 due_s += stopped_s

@@ -108,6 +108,7 @@ def test_a_wrong_parameter_file_is_refused(both, tmp_path, entry, words):
     assert str(file) in str(raised.value)
 
 
+@pytest.mark.slow
 def test_the_program_writes_fitted_scenarios(tmp_path):
     free = f"free:\n  - {{path: {JERK}, lower: 0.3, upper: 1.0}}\n"
     free += (

@@ -22,6 +22,7 @@ def run(name: str, *arguments: object, folder: Path) -> subprocess.CompletedProc
     return python(ROOT / "benchmarks" / name, *arguments, cwd=folder)
 
 
+@pytest.mark.slow
 def test_two_installations_are_compared_by_scenario_and_manager(tmp_path):
     few = ("--missions", 2, "--rounds", 1, "--scenarios", "seams2023", "--managers", "none,random")
     ended = run("versions.py", ROOT, ROOT, *few, folder=tmp_path)

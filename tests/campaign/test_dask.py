@@ -303,6 +303,7 @@ def test_another_version_on_a_worker_is_named_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_lost_in_the_middle(small_cluster, scenario, tmp_path, capfd):
     stopped_s = []
 

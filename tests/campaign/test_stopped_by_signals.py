@@ -95,7 +95,14 @@ def test_workers_leave_ctrl_c_to_the_campaign(scenario, tmp_path):
     assert chaos.ended(process) == (0, "")
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGINT,
+        pytest.param(signal.SIGHUP, marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
+    ],
+)
 def test_a_signal_to_all_its_processes_is_told_once(number, scenario, tmp_path):
     """As a terminal sends it that is closed, or a scheduler of jobs."""
     command = [

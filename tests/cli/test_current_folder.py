@@ -78,7 +78,7 @@ def test_an_empty_part_of_the_path_is_not_this_folder(folder):
     assert repr(str(folder)) not in done.stdout and repr(str(checkout)) in done.stdout
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_a_manager_that_is_named_is_found_with_what_it_imports_and_libraries_are_not(
     folder, workers
 ):

@@ -160,6 +160,7 @@ SBATCH = "#!/bin/sh\ncp $1 job.sh\nbash job.sh > job.log 2>&1 &\necho $! >> jobs
 SCANCEL = "#!/bin/sh\nkill $@\n"
 
 
+@pytest.mark.slow
 def test_the_slurm_script_runs(tmp_path):
     (script,) = [
         block.text

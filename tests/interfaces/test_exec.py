@@ -160,12 +160,18 @@ def test_programs_and_their_children_end_with_the_campaign():
 
 
 def test_the_children_of_a_program_that_fails_end_with_its_mission():
-    failure(program(WITH_A_CHILD + "sys.exit(1)\n"))
+    # A child that holds its output does not hide that the program has ended.
+    assert "ended with status 1" in failure(program(WITH_A_CHILD + "sys.exit(1)\n"))
     assert_all_ended()
 
 
 @pytest.mark.parametrize(
-    ("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (1, signal.SIGKILL)]
+    ("workers", "number"),
+    [
+        (1, signal.SIGINT),
+        pytest.param(2, signal.SIGINT, marks=pytest.mark.slow),
+        pytest.param(1, signal.SIGKILL, marks=pytest.mark.slow),
+    ],
 )
 def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers, number):
     manager = program(WITH_A_CHILD + "time.sleep(600)\n")

@@ -236,6 +236,7 @@ def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path):
     assert (found.result, found.reason) == (adequacy.SURVIVED, "it no longer contradicts itself")
 
 
+@pytest.mark.slow
 def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_path, suave_copy):
     rule = 'own: Component(?c) ^ c_status(?c, "FALSE") ^ requiredBy(?c, ?fd) -> fd_realisability(?fd, false)'
     disabled = [each.name for each in KnowledgeBase.load().base.rules]

@@ -239,8 +239,13 @@ RULES = {
     "equal values": f"own: {OF_TWO.replace('?w', '?v')} -> fd_realisability(fd_spiral_high, false)",
 }
 
-TAKE_LONG = ("two attributes are compared", "equal values")
-"""Rules like "values of any two are compared", in which most values differ."""
+TAKE_LONG = (
+    "two attributes are compared",
+    "values of any two are compared",
+    "a value is compared with one of another property",
+    "equal values",
+)
+"""Rules by which most values differ."""
 
 
 def extended(tmp_path: Path, rule: str) -> KnowledgeBase:
