@@ -168,10 +168,10 @@ class Metacontrol(ManagingSubsystem):
             self.reasoning_time_s += latency_s
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded, None)  # they are met
-        # From now on a recovered component counts as never failed, unless what it makes possible was
-        # refused: then its status keeps the objective updatable, and the next cycle asks again.
-        # Otherwise it would make every objective updatable for ever, and in the exemplar's oldest
-        # files contradict the status UNGROUNDED of later objectives.
+        # From now on a recovered component counts as never failed, unless what it made possible was
+        # refused: its status keeps that objective updatable, so that the next cycle asks again.
+        # Kept for longer, it would make every objective updatable for ever, and in the exemplar's
+        # oldest files contradict the status UNGROUNDED of later objectives.
         is_refused = self._has_met_objective_without(grounded, reasoning.plan)
         for component in recovered:
             if not is_refused and self.components.get(component) == RECOVERED:
