@@ -342,7 +342,8 @@ class ExecManager(ManagingSubsystem):
         for line in lines:
             self.system.log("says", str(line))
         for function, mode in modes.items():
-            if not isinstance(mode, str) or not self.system.change_mode(function, mode):
+            is_accepted = isinstance(mode, str) and self.system.change_mode(function, mode)
+            if not is_accepted and mode not in self.system.modes.available_modes(function):
                 known = {
                     each: self.system.modes.available_modes(each)
                     for each in self.system.modes.nodes

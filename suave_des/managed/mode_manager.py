@@ -20,9 +20,9 @@ from suave_des.scenario.modes import Mode, ModeTable
 class ModeManager:
     """Offers change_mode and available_modes for the functions of a modes file.
 
-    A request is answered at once: True for any known mode, even the one that is already set, in
-    which case nothing happens. The effect comes later; effects on one function keep the order of
-    their requests.
+    A request is answered at once: True for any known mode, unless its function refuses it, and for
+    the one that is already set, in which case nothing happens. The effect comes later; effects on
+    one function keep the order of their requests.
 
     Attributes:
         latency_s: draws the time from a request to its effect.
@@ -32,7 +32,8 @@ class ModeManager:
         adaptations: changes from one mode to another of functions in use; neither a task's first
             mode of a function nor the fd_unground at its end counts.
         requests: requests for a mode that differs from the previous one.
-        refused: functions and modes whose requests were refused.
+        refused: functions and modes whose requests were refused, as there are none such.
+        refusals: requests that were refused by their function.
     """
 
     env: simpy.Environment
@@ -45,6 +46,7 @@ class ModeManager:
     adaptations: int = 0
     requests: int = 0
     refused: dict[tuple[str, str], None] = field(default_factory=dict)
+    refusals: int = 0
     _requested: dict[str, str] = field(default_factory=dict)
     _effect_due_s: dict[str, float] = field(default_factory=dict)
     _in_use: set[str] = field(default_factory=set)
@@ -69,7 +71,7 @@ class ModeManager:
 
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
         """Request a mode; False for a function or mode that the modes file does not have, or that
-        has no node here.
+        has no node here, and for a mode that the function does not accept now.
 
         Its effect comes after `latency_s`; None: after a latency that is drawn.
         """
@@ -79,6 +81,10 @@ class ModeManager:
         if chosen is None or function not in self.nodes:
             self.refused[function, mode] = None
             self.log("mode_manager", ModeRefused(function, mode))
+            return False
+        if not self.nodes[function].accepts(chosen):
+            self.refusals += 1
+            self.log("mode_manager", "refused", f"{function} -> {mode}")
             return False
         before, self._requested[function] = self._requested.get(function, ""), mode
         self.requests += 1

@@ -32,6 +32,10 @@ class FunctionNode:
     env: simpy.Environment
     active: bool = field(default=False, init=False)
 
+    def accepts(self, mode: Mode) -> bool:
+        """Say whether a request for a mode is accepted; where it is not, nothing changes."""
+        return True
+
     def apply(self, mode: Mode) -> None:
         """Change to a mode."""
         if mode.active:

@@ -115,7 +115,7 @@ class System:
         """Request a mode of a function, which takes effect after the scenario's latency.
 
         Returns:
-            Whether the modes file has such a mode.
+            Whether the modes file has such a mode, and the function accepts it.
         """
         return self.modes.change_mode(function, mode)
 

@@ -168,11 +168,13 @@ class Metacontrol(ManagingSubsystem):
             self.reasoning_time_s += latency_s
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded, None)  # they are met
-        # From now on a recovered component counts as never failed. Otherwise its status would make
-        # every objective updatable for ever, and in the exemplar's oldest files contradict the
-        # status UNGROUNDED of later objectives.
+        # From now on a recovered component counts as never failed, unless what it made possible was
+        # refused: its status keeps that objective updatable, so that the next cycle asks again.
+        # Kept for longer, it would make every objective updatable for ever, and in the exemplar's
+        # oldest files contradict the status UNGROUNDED of later objectives.
+        is_refused = self._has_met_objective_without(grounded, reasoning.plan)
         for component in recovered:
-            if self.components.get(component) == RECOVERED:
+            if not is_refused and self.components.get(component) == RECOVERED:
                 del self.components[component]
         if not self._is_event_triggered:
             return False
@@ -201,6 +203,17 @@ class Metacontrol(ManagingSubsystem):
                     self._log_decision("adaptation", f"{function}: {before} -> {design}", decision)
         self._without_design = plan.without_design
         return grounded
+
+    def _has_met_objective_without(self, grounded: Collection[str], plan: Plan) -> bool:
+        """Whether a design was chosen for an objective that is met, and is not among those in use.
+
+        One that is not met is asked for again by its own status.
+        """
+        return any(
+            self.objectives.get(each.function, UNGROUNDED) is None
+            for each in plan.decisions
+            if each.design is not None and each.function not in grounded
+        )
 
     def _log_decision(self, event: str, what: str, decision: Decision) -> None:
         if self.system.recorded:

@@ -8,8 +8,8 @@ import json
 import os
 import random
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, NamedTuple
 
@@ -17,44 +17,37 @@ from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
+from suave_des.scenario.exemplar_current import with_wave
+from suave_des.scenario.exemplar_files import EVENTS, PARAMETERS, Parameter, given_files
 from suave_des.scenario.exemplar_keys import (
     CAMPAIGN,
     DRAWN,
     EXPERIMENT,
     KEYS,
     LAUNCH,
-    NODES,
     PATHS,
     PERTURBED,
     REASONER,
     REVISIONS,
     RUNNER,
     WATER_CURRENT,
-    WAVE,
     Key,
     is_every_node,
     is_read,
-    node_of,
-    nodes_with,
     read_by,
     revision_of,
 )
 from suave_des.scenario.loader import LoadedScenario, load_scenario, value_at
 from suave_des.scenario.models import LONGEST_S, Real, Scenario, in_order
-from suave_des.scenario.modes import modes_of
-from suave_des.scenario.yamlfile import Layer, Location, read_yaml, validated
+from suave_des.scenario.yamlfile import Layer, Location, validated
 
-PARAMETERS = "ros__parameters"
 EXTENDED = "suave_extended"
 """The exemplar's mission with recharging."""
 TREES = {"suave_bt": "bt", "suave_bt_extended": "bt_extended"}
 """Manager by the name of the behaviour tree's executable."""
-_EVENTS: Final = "thruster_events"
 _VISIBILITY = "signals.water_visibility."
 _NO_COSINE = "not imported: the visibility of the base is no cosine"
 _NOT_NEEDED = "not needed here"
-_BATCHES = ("run_batch", "suave_cli")
-"""The exemplar's programs that run what a file of their own describes."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +95,11 @@ def import_config(
             several revisions, or a value cannot be right.
     """
     notes: list[str] = []
-    given = _given(files, notes)
+    given = given_files(files, notes)
     runner = _runner(given.parameters)
     _check_campaign(runner, campaign, runner_seed)
     experiments = [] if runner is None else list(_experiments(runner, notes))
-    revision, why = revision_of(given.telling(experiments), revision)
+    revision, why = revision_of(given.telling(each.launch for each in experiments), revision)
     base = REVISIONS[revision]
     plain = load_scenario(base)
     values = _values(given.parameters, revision, plain, notes)
@@ -165,208 +158,7 @@ def _only_in_a_campaign(runner: Runner) -> str:
     return f"{what}: {RUNNER}: {', '.join(listed)}"
 
 
-# The files.
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter in one of the user's files.
-
-    Attributes:
-        entry: the node as it is written in the file.
-        node: as in the table of keys; empty if it is none of them.
-    """
-
-    document: Layer
-    entry: str
-    name: str
-    value: Any
-    node: str
-
-    def line(self, *below: str | int) -> int:
-        """The line of its value, or of a part of that."""
-        return self.document.place((self.entry, PARAMETERS, self.name, *below)).line
-
-    @property
-    def keys(self) -> str:
-        """Node and parameter, for the user."""
-        return f"{self.entry.removeprefix('/')}.{self.name}"
-
-    @property
-    def place(self) -> str:
-        """File, line, node and parameter, for the user."""
-        return f"{self.document.path}: line {self.line()}, {self.keys}"
-
-    def error(self, problem: str, remedy: str) -> InputError:
-        """An error about it."""
-        place = f"line {self.line()}, {self.keys}"
-        return InputError(problem, file=self.document.path, place=place, remedy=remedy)
-
-    @property
-    def source(self) -> str:
-        """File and line, for a comment."""
-        return f"{self.document.path.name}, line {self.line()}"
-
-    @property
-    def rank(self) -> tuple[bool, bool]:
-        """The runner's count before those of a mission, a node's own before those of every node."""
-        return self.node != RUNNER, is_every_node(self.entry)
-
-    @property
-    def in_file(self) -> Any:
-        """The value as it is in the file."""
-        return self.document.data[self.entry][PARAMETERS][self.name]
-
-    @property
-    def entry_lines(self) -> list[int]:
-        """Lines of the entries of a list."""
-        return [self.line(index) for index in _full(self.in_file)]
-
-
-@dataclass
-class GivenFiles:
-    """What is in the files.
-
-    Attributes:
-        parameters: of known nodes, file by file.
-        modes: the System Modes file, if there is one.
-    """
-
-    documents: Sequence[Layer]
-    parameters: list[Parameter] = field(default_factory=list)
-    modes: Layer | None = None
-
-    def telling(self, experiments: Iterable[Experiment]) -> set[str]:
-        """Return the names that may tell the revision: nodes, node.parameters and packages."""
-        found = {each.entry.removeprefix("/") for each in self.parameters}
-        found |= {f"{each.node}.{each.name}" for each in self.parameters}
-        return found | {word for each in experiments for word in each.launch.split()[2:3]}
-
-
-def _given(files: Sequence[Path | Layer], notes: list[str]) -> GivenFiles:
-    """Read the files; notes about what is not known in them."""
-    documents = [each if isinstance(each, Layer) else read_yaml(each) for each in files]
-    given = GivenFiles(documents)
-    for document in documents:
-        if not _has_modes(document):
-            given.parameters += _parameters(document, notes)
-            continue
-        modes_of(document)
-        if given.modes is not None and given.modes.data != document.data:
-            raise InputError(
-                "there are two System Modes files", file=document.path, remedy="give one of them"
-            )
-        given.modes = given.modes or document
-    return given
-
-
-def _has_modes(document: Layer) -> bool:
-    """Whether a file is a System Modes file."""
-    contents = [each.get(PARAMETERS) for each in document.data.values() if isinstance(each, dict)]
-    types = [each.get("type") for each in contents if isinstance(each, dict)]
-    return "system" in types or "node" in types
-
-
-def _parameters(document: Layer, notes: list[str]) -> list[Parameter]:
-    """Return the parameters of known nodes in a file; notes about the rest.
-
-    Raises:
-        InputError: it is no configuration of nodes, or has none that is known.
-    """
-    contents = {entry: _content(document, entry) for entry in document.data}
-    is_runners = any(
-        node_of(entry, ()) == RUNNER or (is_every_node(entry) and "experiments" in content)
-        for entry, content in contents.items()
-    )
-    found = list[Parameter]()
-    is_ours = False
-    for entry, content in contents.items():
-        of_entry = list(_of_entry(document, entry, content, is_runners=is_runners))
-        found += of_entry
-        is_ours = is_ours or bool(of_entry) or bool(node_of(entry, content))
-        notes += _unread(document, entry, content, {each.name for each in of_entry})
-    if not is_ours:
-        first = next(iter(document.data), "")
-        remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
-        raise document.error("has nothing of SUAVE in it", (first,), remedy)
-    return found
-
-
-def _unread(
-    document: Layer, entry: str, given: Mapping[str, Any], read: Collection[str]
-) -> Iterator[str]:
-    """Yield notes about what no node gets of an entry with these parameters."""
-    place = f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
-    if beside := [other for other in document.data[entry] if other != PARAMETERS]:
-        yield f"{place}: not imported: {', '.join(beside)}: ROS 2 reads {PARAMETERS} alone"
-    names = ", ".join(name for name in given if name not in read)
-    if is_every_node(entry):
-        if names:
-            yield f"{place}: not imported: {names}: no node of this file has it"
-    elif not node_of(entry, given):
-        remedy = did_you_mean(entry.removeprefix("/"), NODES)
-        yield f"{place}: not imported: {names}: the node is not known ({remedy})"
-
-
-def _content(document: Layer, entry: str) -> dict[str, Any]:
-    """Return the parameters of a file's entry; an InputError if it is no node's."""
-    content = document.data[entry]
-    given = content.get(PARAMETERS, "") if isinstance(content, dict) else ""
-    if given is None or isinstance(given, dict):
-        return given or {}
-    words = f"{document.path.name} {' '.join(document.data)}"
-    batches = [each for each in _BATCHES if each in words]
-    if batches or "experiments" in document.data:
-        programs = " or ".join(batches or _BATCHES)
-        problem = f"describes several experiments, for the exemplar's {programs}"
-        remedy = (
-            "give the mission and runner files that they use, those of one experiment at a time"
-        )
-        raise document.error(problem, (entry,), remedy)
-    remedy = f"a configuration of the exemplar has NODE: {{{PARAMETERS}: {{KEY: VALUE}}}}"
-    raise document.error(f"{entry} has no mapping {PARAMETERS}", (entry,), remedy)
-
-
-def _of_entry(
-    document: Layer, entry: str, given: Mapping[str, Any], *, is_runners: bool
-) -> Iterator[Parameter]:
-    """Yield the parameters of an entry, each for every node that gets it.
-
-    What is given to every node of a mission's file is not given to the runner, which another file
-    configures.
-    """
-    for name, in_file in given.items():
-        value = _compact(in_file) if name == _EVENTS else in_file
-        if is_every_node(entry):
-            nodes = [node for node in nodes_with(name) if is_runners or node != RUNNER]
-        else:
-            nodes = [node for node in (node_of(entry, given),) if node]
-        for node in nodes:
-            yield Parameter(document, entry, name, value, node)
-
-
 # Thruster events, as text.
-
-
-def _compact(events: Any) -> Any:
-    """Return thruster events without spaces, and without empty ones, as ROS 2 writes an empty
-    list.
-    """
-    if not isinstance(events, list):
-        return events
-    full = [events[index] for index in _full(events)]
-    return ["".join(each.split()) if isinstance(each, str) else each for each in full]
-
-
-def _full(entries: Any) -> list[int]:
-    """Return the indices of a list's entries that are not empty texts."""
-    if not isinstance(entries, list):
-        return []
-    return [
-        index
-        for index, each in enumerate(entries)
-        if not isinstance(each, str) or each.strip() != ""
-    ]
 
 
 _BEFORE_START: Final = re.compile(
@@ -472,10 +264,10 @@ def _values(
     """
     reading = Reading.of(parameters, revision)
     given = _counted(_needed(parameters, reading, notes), notes)
-    given = _with_wave(given, parameters, reading, notes)
+    given = with_wave(given, parameters, reading.has_runner, notes)
     values = {
         path: SourcedValue(
-            _from_start(each.value) if path == _EVENTS else each.value,
+            _from_start(each.value) if path == EVENTS else each.value,
             f"{each.source}: {each.keys}",
             each,
         )
@@ -529,56 +321,6 @@ def _counted(parameters: Sequence[Parameter], notes: list[str]) -> dict[str, Par
         whose = "campaign" if first.rank[0] != parameter.rank[0] else "node"
         notes.append(f"{parameter.place}: not imported: the {whose}'s value counts ({first.place})")
     return {place: each for place, each in found.items() if not place.startswith(CAMPAIGN)}
-
-
-def _with_wave(
-    given: Mapping[str, Parameter],
-    parameters: Sequence[Parameter],
-    reading: Reading,
-    notes: list[str],
-) -> dict[str, Parameter]:
-    """Leave out the switch of HEAD's current, and the current where it is off.
-
-    Raises:
-        InputError: it is on, but cannot be read: a mission without this current, or with a part of
-            it, is another one.
-    """
-    wave = {path: each for path, each in given.items() if path.startswith(f"{WAVE}.")}
-    switch = given.get(WAVE)
-    if _is_on(switch, reading):
-        _check_wave(wave, switch, parameters)
-        notes += [f"{each.place}: read as {path}" for path, each in wave.items()]
-        return {path: each for path, each in given.items() if path != WAVE}
-    why = f"not imported: {RUNNER}.enable_water_current is not true"
-    notes += [f"{each.place}: {why}" for each in wave.values()]
-    return {path: each for path, each in given.items() if not path.startswith(WAVE)}
-
-
-def _is_on(switch: Parameter | None, reading: Reading) -> bool:
-    """Whether the current is on; without a switch, where no runner could switch it on."""
-    if switch is None:
-        return not reading.has_runner
-    if not isinstance(switch.value, bool):
-        raise switch.error(f"{shown(switch.value)} is not a boolean", "write true or false")
-    return switch.value
-
-
-def _check_wave(
-    wave: Collection[str], switch: Parameter | None, parameters: Sequence[Parameter]
-) -> None:
-    """Raise an InputError if the current has a key that is not known, or none at all."""
-    unread = [
-        each
-        for each in parameters
-        if each.node == WATER_CURRENT and (each.node, each.name) not in PATHS
-    ]
-    if switch is not None and not wave:
-        unread.append(switch)
-    if unread:
-        known = ", ".join(key.name for key in KEYS if key.node == WATER_CURRENT and key.path)
-        problem = f"the current cannot be read: known keys of {WATER_CURRENT} are {known}"
-        remedy = f"leave it out, with its switch, and give {WAVE} in the scenario"
-        raise unread[0].error(problem, remedy)
 
 
 def _defaults(
@@ -928,7 +670,7 @@ class Draw(NamedTuple):
     @property
     def is_event(self) -> bool:
         """Whether it is the time of a thruster event."""
-        return self.path.startswith(_EVENTS)
+        return self.path.startswith(EVENTS)
 
     def value(self, share: float) -> float:
         """The value at a share of the interval; a time before the start is the start."""
@@ -946,11 +688,11 @@ def _perturbations(runner: Runner, loaded: LoadedScenario, notes: list[str]) -> 
             continue
         around = _around(key.path.removeprefix(PERTURBED), runner, loaded)
         if not around:
-            notes.append(runner.note(key.name, f"shifts nothing: {RUNNER} has no {_EVENTS}"))
+            notes.append(runner.note(key.name, f"shifts nothing: {RUNNER} has no {EVENTS}"))
         for path, value in around.items():
             if value is None:
                 notes.append(runner.note(key.name, _NO_COSINE))
-            elif path.startswith(_EVENTS) and value + high < 0.0:
+            elif path.startswith(EVENTS) and value + high < 0.0:
                 notes.append(runner.note(key.name, f"{path} is always before the start, and so 0"))
             else:
                 source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {value:g}"
@@ -962,7 +704,7 @@ def _around(path: str, runner: Runner, loaded: LoadedScenario) -> dict[str, floa
     None if it has none, or the times of the runner's thruster events, which may be before the
     start.
     """
-    if path != _EVENTS:
+    if path != EVENTS:
         return {path: at(loaded, path)}
     if path not in runner.parameters:
         return {}

@@ -11,7 +11,8 @@ import yaml
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.scenario.exemplar import EXTENDED, PARAMETERS, TREES, at, import_config
+from suave_des.scenario.exemplar import EXTENDED, TREES, at, import_config
+from suave_des.scenario.exemplar_files import EVENTS, PARAMETERS
 from suave_des.scenario.exemplar_keys import (
     DRAWN,
     FIRST_WITH_BRINGUP,
@@ -29,7 +30,6 @@ from suave_des.scenario.yamlfile import Layer, Location, parse_yaml
 
 MISSION_FILE, RUNNER_FILE = "mission_config.yaml", "runner_config.yml"
 MANAGERS = ("none", "random", "metacontrol", *TREES.values())
-_EVENTS: Final = "thruster_events"
 _NOT_COMPARED = ("name", "description", "campaign", "scenario")
 _DIGITS: Final = 9
 """Decimals without rounding errors of differences."""
@@ -126,7 +126,7 @@ def _event_times_s(loaded: LoadedScenario, revision: str) -> dict[str, float]:
     before_s = 0.0
     for number, event in enumerate(loaded.scenario.thruster_events):
         time_s = max(0.0, mean(event.time_s))
-        path = f"{_EVENTS}.{number}.time_s"
+        path = f"{EVENTS}.{number}.time_s"
         if there == "after_start":
             before_s += time_s
             times_s[path] = before_s
@@ -183,7 +183,7 @@ def _drawn_events(
     """
     found = []
     for number, event in enumerate(loaded.scenario.thruster_events):
-        bounds = _bounds(drawn.get(f"{_EVENTS}.{number}.time_s"))
+        bounds = _bounds(drawn.get(f"{EVENTS}.{number}.time_s"))
         if bounds is None or not isinstance(event.time_s, float):
             return []
         found.append((event.time_s, *bounds))
@@ -227,7 +227,7 @@ def _nodes(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, Any]]:
 
 def _value(loaded: LoadedScenario, path: str, default: Any) -> Any:
     """A value of the scenario in the type of a default, as ROS 2 demands; None if it has none."""
-    if path == _EVENTS:
+    if path == EVENTS:
         events = loaded.scenario.thruster_events
         return _texts(events, [mean(each.time_s) for each in events])
     value = at(loaded, path)
@@ -266,7 +266,7 @@ def _intervals(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> dict[str, An
     found: dict[str, Any] = {}
     for key in DRAWN:
         path = key.path.removeprefix(PERTURBED)
-        if path != _EVENTS:
+        if path != EVENTS:
             value = at(loaded, path)
             bounds = _bounds(drawn.get(path))
             if isinstance(value, float) and bounds is not None:
@@ -274,7 +274,7 @@ def _intervals(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> dict[str, An
         elif (shift := _shift_of(loaded, drawn)) is not None:
             found[key.name] = list(shift.interval_s)
             if min(shift.times_s) < 0.0:
-                found[_EVENTS] = _texts(loaded.scenario.thruster_events, shift.times_s)
+                found[EVENTS] = _texts(loaded.scenario.thruster_events, shift.times_s)
     return found
 
 

@@ -124,9 +124,11 @@ class ManagerHost:
         times, modes = self._times, self.system.modes
         assert times is not None  # only times cause calls
         requests = modes.requests
+        refusals = modes.refusals
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:
-            times.go_on(modes.requests > requests, True)
+            # A call that was refused something would ask again.
+            times.go_on(modes.requests > requests, modes.refusals == refusals)
         elif isinstance(adaptation, Generator):
             over = partial(self._adapted, times, self.system.env.now)
             AdaptationCall(self.system.env, adaptation, over, self.error_of).resume()

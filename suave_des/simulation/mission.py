@@ -136,8 +136,11 @@ class Mission:
         elif until_s > now_s and not self.is_over:
             self._guarded(self.env.advance, until_s)
 
-    def change_mode(self, function: str, mode: str) -> None:
+    def change_mode(self, function: str, mode: str) -> bool:
         """Request a mode of a function, which takes effect after the scenario's latency.
+
+        Returns:
+            Whether the function accepts it.
 
         Raises:
             InputError: there is no such function or mode, or the mission has a manager.
@@ -147,8 +150,10 @@ class Mission:
             raise InputError(
                 "the mission has a manager, which changes modes", remedy="leave the manager out"
             )
-        if not self.mode_manager.change_mode(function, mode):
+        is_accepted = self.mode_manager.change_mode(function, mode)
+        if not is_accepted:
             self.check_mode(function, mode)
+        return is_accepted
 
     def check_mode(self, function: str, mode: str) -> None:
         """Check that a mode can be requested.
