@@ -76,6 +76,7 @@ def run_campaign(
     *,
     on_progress: OnProgress | None = None,
     settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]] = lambda managers: {},
+    executor: Executor = in_process,
     **options: Any,
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose
@@ -83,7 +84,8 @@ def run_campaign(
 
     The result is the same however often the campaign was interrupted and resumed. `on_progress` is
     called when missions are done; `settings_of` returns settings of the campaign's managers, which
-    a campaign file may name.
+    a campaign file may name; `executor` runs the missions, unless there are several workers or a
+    scheduler.
 
     Raises:
         CampaignInterrupted: Ctrl-C; finished missions are kept.
@@ -105,7 +107,7 @@ def run_campaign(
         )
     with ExitStack() as stack:
         checked = _checked(
-            stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded)
+            stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded), executor
         )
         return _finish(checked, _new(stack, checked), on_progress, is_new=True)
 
@@ -268,13 +270,17 @@ class _Checked:
         return f"suave-des campaign --resume {self.folder}"
 
 
-def _checked(stack: ExitStack, spec: CampaignSpec, read: Callable[[], Campaign]) -> _Checked:
+def _checked(
+    stack: ExitStack,
+    spec: CampaignSpec,
+    read: Callable[[], Campaign],
+    executor: Executor = in_process,
+) -> _Checked:
     """Read and check a campaign, while its workers start; `stack` ends them.
 
     Raises:
         InputError: something given cannot be used.
     """
-    executor: Executor = in_process
     spec.check()
     if spec.processes > 1 and spec.scheduler is None:
         executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes
