@@ -262,6 +262,7 @@ class Bridge:
             self._host,
             self.port,
             process_request=self._admit,
+            close_timeout=_FLUSH_S,
             compression=None,
             max_size=BODY_LIMIT_BYTES,
             logger=_logger,
@@ -304,14 +305,16 @@ class Bridge:
 
     async def _go(self) -> None:
         while not self._mission.is_over:
+            received = None
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_TICK_S):
+                    received = await self._inbox.get()
             if self._has_begun():
                 self._catch_up()
             else:
                 self._session.hold()
-            with suppress(TimeoutError):
-                async with asyncio.timeout(_TICK_S):
-                    client, text = await self._inbox.get()
-                    self._answer(client, text)
+            if received is not None:
+                self._answer(*received)
             for client in self._clients:
                 client.flush()
 

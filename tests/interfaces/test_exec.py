@@ -82,6 +82,74 @@ def test_what_it_says_stands_in_the_timeline():
     assert next(each.detail for each in events if each.event == "says") == "higher"
 
 
+THINKS = """
+answer = {"latency_s": 3.0}
+if message["type"] == "mission_started":
+    answer = {"period_s": 2.0}
+elif message["type"] == "adapt":
+    answer["modes"] = {"f_generate_search_path": "fd_spiral_high"}
+print(json.dumps(answer), flush=True)
+"""
+"""About everything, and ever about the same."""
+
+
+def times_s(manager: str, event: str, **options: object) -> list[float]:
+    """Return when something happens to the search in the first seconds of a mission."""
+    values = {"mission.time_limit_s": 20.0, "metrics": ["reasoning_time_s"]}
+    result = run_mission("release15", manager, 1, 1, values=values, **options)
+    return [
+        each.time_s
+        for each in result.events
+        if each.event == event and each.detail == "f_generate_search_path -> fd_spiral_high"
+    ]
+
+
+def test_mission_time_passes_while_it_thinks():
+    (at_once_s,) = times_s(program(THINKS.replace("3.0", "0.0")), "mode_requested")
+    only_then = THINKS.replace('{"latency_s": 3.0}', "{}").replace(
+        'answer["modes"]', 'answer["latency_s"] = 3.0; answer["modes"]'
+    )
+    (later_s,) = times_s(program(only_then), "mode_requested")
+    assert later_s == pytest.approx(at_once_s + 3.0, abs=1e-9)
+
+
+def test_it_thinks_of_one_message_after_the_other():
+    """The task's request and diagnostics before the first call come first."""
+    note = "open('messages', 'a').write(line)\n"
+    (requested_s,) = times_s(program(note + THINKS), "mode_requested")
+    types = [json.loads(line)["type"] for line in Path("messages").read_text().splitlines()]
+    before = types[: types.index("adapt")]
+    thought_of = sum(each != "mission_started" for each in before) + 1
+    first_s = json.loads(Path("messages").read_text().splitlines()[1])["time_s"]
+    assert thought_of > 1
+    assert requested_s == pytest.approx(first_s + 3.0 * thought_of, abs=1e-9)
+
+
+def test_thinking_before_adaptations_is_a_further_metric():
+    values = {"metrics": ["reasoning_time_s"]}
+    only_then = THINKS.replace('{"latency_s": 3.0}', "{}").replace(
+        'answer["modes"]', 'answer["latency_s"] = 3.0; answer["modes"]'
+    )
+    result = run_mission("seams2023", program(only_then), 1, 1, values=values)
+    changes = [each for each in result.events if each.detail.endswith("-> fd_spiral_high")]
+    assert result.further["reasoning_time_s"] == 3.0 * len(changes) > 0.0
+
+
+def test_wall_time_may_count_as_thinking():
+    slow = EVERY_PERIOD.replace("answer = {}", "answer = {}; time.sleep(0.02)", 1)
+    manager = program(slow)
+    values = {"metrics": ["reasoning_time_s"], "mission.time_limit_s": 60.0}
+    options = {"manager_options": {manager: {"real_thinking": 50.0}}}
+    further = run_mission("seams2023", manager, 1, 8, values=values, **options).further
+    assert further["reasoning_time_s"] >= 0.02 * 50.0
+
+
+def test_a_factor_of_thinking_that_is_none_is_bad_input():
+    manager = program(EVERY_PERIOD)
+    with pytest.raises(InputError, match="real_thinking: -1 is out of range"):
+        Mission("seams2023", manager, manager_options={manager: {"real_thinking": -1}})
+
+
 def test_it_is_told_what_happens():
     note = "open('messages', 'a').write(line)\n"
     run_mission("seams2023", program(note + EVERY_PERIOD), 1, 1)
@@ -122,6 +190,8 @@ def test_it_is_told_what_happens():
             "'fd_spiral_high'",
         ),
         ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
+        ("print('{\"latency_s\": -1}', flush=True)", "a latency_s of -1"),
+        ("print('{\"latency_s\": NaN}', flush=True)", "a latency_s of .nan"),
     ],
 )
 def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body, words):
