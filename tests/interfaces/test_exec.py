@@ -83,55 +83,48 @@ def test_what_it_says_stands_in_the_timeline():
 
 
 THINKS = """
-answer = {"latency_s": 3.0}
+answer = {}
 if message["type"] == "mission_started":
-    answer = {"period_s": 2.0}
+    answer = {"period_s": 2.0, "starts_s": 1.0, "subscribes_to": ["component_status"]}
 elif message["type"] == "adapt":
-    answer["modes"] = {"f_generate_search_path": "fd_spiral_high"}
+    answer = {"modes": {"f_generate_search_path": "fd_spiral_high"}, "latency_s": 3.0}
 print(json.dumps(answer), flush=True)
 """
-"""About everything, and ever about the same."""
 
 
-def times_s(manager: str, event: str, **options: object) -> list[float]:
-    """Return when something happens to the search in the first seconds of a mission."""
-    values = {"mission.time_limit_s": 20.0, "metrics": ["reasoning_time_s"]}
-    result = run_mission("release15", manager, 1, 1, values=values, **options)
+def requested_s(body: str) -> list[float]:
+    """Return when a program requests to search high."""
+    values = {"mission.time_limit_s": 20.0}
     return [
-        each.time_s
-        for each in result.events
-        if each.event == event and each.detail == "f_generate_search_path -> fd_spiral_high"
+        each.t_s
+        for each in run_mission("release15", program(body), 1, 1, values=values).events
+        if each.event == "mode_requested" and each.detail == HIGHER
     ]
 
 
+HIGHER = "f_generate_search_path -> fd_spiral_high"
+
+
 def test_mission_time_passes_while_it_thinks():
-    (at_once_s,) = times_s(program(THINKS.replace("3.0", "0.0")), "mode_requested")
-    only_then = THINKS.replace('{"latency_s": 3.0}', "{}").replace(
-        'answer["modes"]', 'answer["latency_s"] = 3.0; answer["modes"]'
-    )
-    (later_s,) = times_s(program(only_then), "mode_requested")
-    assert later_s == pytest.approx(at_once_s + 3.0, abs=1e-9)
+    assert requested_s(THINKS) == [1.0 + 3.0]
+
+
+def test_it_is_not_asked_to_adapt_while_it_thinks_of_it():
+    requested_s("open('messages', 'a').write(line)\n" + THINKS)
+    messages = [json.loads(line) for line in Path("messages").read_text().splitlines()]
+    asked_s = [each["time_s"] for each in messages if each["type"] == "adapt"]
+    assert asked_s[:3] == [1.0, 5.0, 9.0]
 
 
 def test_it_thinks_of_one_message_after_the_other():
-    """The task's request and diagnostics before the first call come first."""
-    note = "open('messages', 'a').write(line)\n"
-    (requested_s,) = times_s(program(note + THINKS), "mode_requested")
-    types = [json.loads(line)["type"] for line in Path("messages").read_text().splitlines()]
-    before = types[: types.index("adapt")]
-    thought_of = sum(each != "mission_started" for each in before) + 1
-    first_s = json.loads(Path("messages").read_text().splitlines()[1])["time_s"]
-    assert thought_of > 1
-    assert requested_s == pytest.approx(first_s + 3.0 * thought_of, abs=1e-9)
+    first = THINKS.replace("answer = {}", 'answer = {"latency_s": 2.5}')
+    assert requested_s(first) == [2.5 + 3.0]  # the task's request comes at t = 0
 
 
 def test_thinking_before_adaptations_is_a_further_metric():
     values = {"metrics": ["reasoning_time_s"]}
-    only_then = THINKS.replace('{"latency_s": 3.0}', "{}").replace(
-        'answer["modes"]', 'answer["latency_s"] = 3.0; answer["modes"]'
-    )
-    result = run_mission("seams2023", program(only_then), 1, 1, values=values)
-    changes = [each for each in result.events if each.detail.endswith("-> fd_spiral_high")]
+    result = run_mission("seams2023", program(THINKS), 1, 1, values=values)
+    changes = [each for each in result.events if each.detail == HIGHER]
     assert result.further["reasoning_time_s"] == 3.0 * len(changes) > 0.0
 
 
