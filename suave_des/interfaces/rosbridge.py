@@ -77,7 +77,9 @@ _MOST_CLIENTS: Final = 32
 _MOST_NAMES: Final = 100
 """Subscriptions, topics and services of one client, each."""
 _BACKLOG: Final = 500
-"""So many messages wait for a slow client; more that are published are not sent to it."""
+"""While so many messages wait for a slow client, it gets none that are published, and no answers."""
+_LOCK_STEP_BACKLOG: Final = 100_000
+"""The same, of what is published: what one advance publishes is to arrive whole."""
 _LONGEST_QUEUE: Final = 1000
 _LONGEST_NAME: Final = 200
 _IN_REAL_TIME: Final = "missions in real time do not repeat: wall time decides when a client acts"
@@ -129,9 +131,11 @@ class _Client:
         services: that it offers, by their whole name as it calls them.
         level: of status messages, none or not.
         out: what is sent to it.
+        most_waiting: of what is published.
     """
 
     connection: ServerConnection
+    most_waiting: int
     subscriptions: dict[str, _Subscription] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
     services: dict[str, str] = field(default_factory=dict)
@@ -151,7 +155,7 @@ class _Client:
         """Send what subscriptions hold, unless too much is waiting."""
         for subscription in self.subscriptions.values():
             for text in subscription.take():
-                if self.out.qsize() < _BACKLOG:
+                if self.out.qsize() < self.most_waiting:
                     self.out.put_nowait(text)
 
     async def write(self) -> None:
@@ -290,13 +294,13 @@ class Bridge:
         return None
 
     async def _handle(self, connection: ServerConnection) -> None:
-        client = _Client(connection)
+        client = _Client(connection, _BACKLOG if self._factor else _LOCK_STEP_BACKLOG)
         self._clients.append(client)
         writer = asyncio.create_task(client.write())
         with suppress(ConnectionClosed):
             async for text in connection:
                 await self._inbox.put((client, text))
-                while client.out.qsize() >= _BACKLOG:  # until it reads its answers
+                while client.out.qsize() >= _BACKLOG and not writer.done():
                     await asyncio.sleep(_TICK_S)
         self._clients.remove(client)
         writer.cancel()

@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 from suave_des import InputError, Mission
 from suave_des.campaign.campaign import run_campaign
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
-from tests.helpers.command import command_here
+from tests.helpers.command import command_here, wait_until
 
 SEARCH, MOTION = "f_generate_search_path", "f_maintain_motion"
 ADVANCE = "/suave_des/advance"
@@ -91,7 +91,7 @@ class Served:
     def _serve(self) -> None:
         given = {"scenario": "seams2023", "workers": 1, "runs": 1, "seed": 8, **self.options}
         with Bridge(port=0, real_time_factor=self.factor) as bridge:
-            self.port = bridge.port
+            self.port, self.bridge = bridge.port, bridge
             self._is_open.set()
             result = run_campaign(
                 managers=["client:test"], executor=bridge.outcomes, time_out_s=1e6, **given
@@ -211,6 +211,15 @@ def test_topics_have_their_rates_in_mission_time(client, topic, period_s):
     client.advance(2.0)
     client.send("unsubscribe", topic=topic)
     assert len(client.published) == pytest.approx(2.0 / period_s, abs=1)
+
+
+def test_all_that_a_long_step_publishes_arrives_before_its_answer():
+    with served(values=SHORT) as (_, client):
+        for topic in TOPICS:
+            client.send("subscribe", topic=topic)
+        client.advance(55.0)
+        clocks = [each["msg"]["clock"] for each in client.published if each["topic"] == "/clock"]
+    assert [each["sec"] * 10 + round(each["nanosec"] / 1e8) for each in clocks] == [*range(551)]
 
 
 def test_the_clock_and_the_pose_are_those_of_the_mission(simulator):
@@ -384,6 +393,20 @@ def test_a_client_that_reads_nothing_holds_nobody_up(client):
         one.send("subscribe", topic="/mavros/local_position/pose")
         client.advance(100.0)
         assert client.call(f"/{MOTION}/get_mode")
+
+
+def test_a_client_that_asks_and_reads_nothing_is_forgotten_when_it_leaves():
+    with served(values=SHORT) as (server, client):
+        with other(client, max_queue=1, close_timeout=0.1) as one:
+            for topic in ("/clock", "/large"):
+                one.send("subscribe", topic=topic, type=TOPICS.get(topic, "std_msgs/String"))
+            wait_until(lambda: any(each.subscriptions for each in server.bridge._clients))
+            for _ in range(150):  # more than sockets hold
+                client.send("publish", topic="/large", msg={"data": "x" * 90_000})
+            client.advance(55.0)
+            one.send("call_service", service=f"/{MOTION}/get_mode")
+            time.sleep(0.1)
+        wait_until(lambda: len(server.bridge._clients) == 1, 10.0)
 
 
 def test_clients_that_connect_twice_see_the_same_mission_and_each_other(client):
