@@ -76,7 +76,6 @@ def run_campaign(
     *,
     on_progress: OnProgress | None = None,
     settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]] = lambda managers: {},
-    executor: Executor = in_process,
     **options: Any,
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose
@@ -84,8 +83,7 @@ def run_campaign(
 
     The result is the same however often the campaign was interrupted and resumed. `on_progress` is
     called when missions are done; `settings_of` returns settings of the campaign's managers, which
-    a campaign file may name; `executor` runs the missions, unless there are several workers or a
-    scheduler.
+    a campaign file may name.
 
     Raises:
         CampaignInterrupted: Ctrl-C; finished missions are kept.
@@ -96,10 +94,37 @@ def run_campaign(
     names = None if managers is None else _names(managers)
     given = {"managers": names, "runs": runs, "seed": seed, "workers": workers, "out": out}
     spec = CampaignSpec.of(named, **given, **options)
+    return _begin(spec, loaded, on_progress, settings_of)
+
+
+def fly_campaign(
+    executor: Executor, scenario: str | Path, manager: str, **options: Any
+) -> CampaignResult:
+    """Run missions under one manager by an executor of one's own, otherwise as run_campaign.
+
+    Raises:
+        CampaignInterrupted, InputError, WorkerError, StoreError: as run_campaign.
+    """
+    spec = CampaignSpec.of(scenario, managers=[manager], workers=1, **options)
+    return _begin(spec, None, None, lambda managers: {}, executor)
+
+
+def _begin(
+    spec: CampaignSpec,
+    loaded: LoadedScenario | None,
+    on_progress: OnProgress | None,
+    settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]],
+    executor: Executor = in_process,
+) -> CampaignResult:
+    """Run a new campaign."""
     if spec.out is not None:
         _check_is_free(spec.out, overwrite=spec.overwrite)
     file = read_campaign_file(spec.scenario) if loaded is None else None
-    if file is not None and managers is None and "managers" in file.settings.model_fields_set:
+    if (
+        file is not None
+        and "managers" not in spec.model_fields_set
+        and "managers" in file.settings.model_fields_set
+    ):
         tell_code(file.path, file.settings.managers)
     if settings := settings_of(spec.with_file(file).managers):
         spec = spec.model_copy(

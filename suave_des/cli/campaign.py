@@ -5,6 +5,7 @@ summaries.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, islice
 from operator import itemgetter
@@ -363,6 +364,40 @@ def train(
     console.print(f"the training result is in {out}")
 
 
+@dataclass(frozen=True)
+class _Served:
+    """Options of a server; a field is named as its option."""
+
+    host: Annotated[str, typer.Option(help="Address.")] = "127.0.0.1"
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65535,
+            help="Port; 0 for any free one.",
+            show_default="3000; with --rosbridge 9090",
+        ),
+    ] = None
+    host_name: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A further name by which clients may call this machine."),
+    ] = None
+    real_time_factor: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            help="Mission seconds per second; 0: advance only on request.",
+            show_default="0; with --rosbridge 1",
+        ),
+    ] = None
+
+    def given(self, port: int) -> Given:
+        """Where to serve, as servers take it, with a default for the port."""
+        names = self.host_name or ()
+        given = port if self.port is None else self.port
+        return {"host": self.host, "port": given, "host_names": names}
+
+
 def serve(
     scenario: Scenario,
     *,
@@ -389,43 +424,21 @@ def serve(
             help="The client's name in results, client:NAME; with --rosbridge.", show_default="ros"
         ),
     ] = None,
-    host: Annotated[str, typer.Option(help="Address.")] = ("127.0.0.1"),
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=65535,
-            help="Port; 0 for any free one.",
-            show_default="3000; with --rosbridge 9090",
-        ),
-    ] = None,
     run_number: Annotated[
         int | None,
         typer.Option("--run", metavar="K", help="Run of the first mission.", show_default="1"),
     ] = None,
     seed: Seed = 1,
-    real_time_factor: Annotated[
-        float | None,
-        typer.Option(
-            metavar="X",
-            help="Mission seconds per second; 0: advance only on request.",
-            show_default="0; with --rosbridge 1",
-        ),
-    ] = None,
-    host_name: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="A further name by which clients may call this machine."),
-    ] = None,
+    served: _Served,
     files: Files,
 ) -> None:
     """Serve a mission over HTTP, as UPISAS expects it of an exemplar, or as SUAVE's topics and
     services by the rosbridge protocol.
     """
-    address: Given = {"host": host, "host_names": host_name or ()}
+    factor = served.real_time_factor
     if rosbridge:
         check_no_use({"--run": run_number}, "with --rosbridge, which flies runs 1 to --runs")
-        factor = 1.0 if real_time_factor is None else real_time_factor
-        address |= {"port": 9090 if port is None else port, "real_time_factor": factor}
+        address = {**served.given(9090), "real_time_factor": 1.0 if factor is None else factor}
         _serve_clients(
             scenario, name or "ros", address, {"seed": seed, **options, **files.replacements}
         )
@@ -435,20 +448,16 @@ def serve(
     from suave_des.scenario.loader import load_scenario
     from suave_des.simulation.simulator import Simulator
 
-    session = Session(
-        Simulator(load_scenario(scenario, **files.replacements)),
-        1 if run_number is None else run_number,
-        seed,
-        real_time_factor or 0.0,
-    )
-    with Server(session, port=3000 if port is None else port, **address) as server:
-        print(f"http://{host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
+    simulator = Simulator(load_scenario(scenario, **files.replacements))
+    session = Session(simulator, 1 if run_number is None else run_number, seed, factor or 0.0)
+    with Server(session, **served.given(3000)) as server:
+        print(f"http://{served.host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
         server.serve_forever(poll_interval=0.1)
 
 
 def _serve_clients(scenario: str, name: str, address: Given, options: Given) -> None:
     """Fly a campaign whose manager is a client."""
-    from suave_des.campaign.campaign import run_campaign
+    from suave_des.campaign.campaign import fly_campaign
 
     try:
         from suave_des.interfaces.rosbridge import Bridge
@@ -458,8 +467,6 @@ def _serve_clients(scenario: str, name: str, address: Given, options: Given) -> 
     with Bridge(**address) as bridge:
         print(f"ws://{address['host']}:{bridge.port}; Ctrl-C ends it", flush=True)
         settings = {"runs": 1, "time_out_s": _NEVER_S, "command": command_line(), **options}
-        result = run_campaign(
-            scenario, [f"client:{name}"], executor=bridge.outcomes, workers=1, **settings
-        )
+        result = fly_campaign(bridge.outcomes, scenario, f"client:{name}", **settings)
     _print_result(result)
     exit_telling_failures(result)

@@ -77,7 +77,7 @@ _MOST_CLIENTS: Final = 32
 _MOST_NAMES: Final = 100
 """Subscriptions, topics and services of one client, each."""
 _BACKLOG: Final = 500
-"""While so many messages wait for a slow client, it gets none that are published, and no answers."""
+"""While so many messages wait for a slow client, it gets none that are published, nor answers."""
 _LOCK_STEP_BACKLOG: Final = 100_000
 """The same, of what is published: what one advance publishes is to arrive whole."""
 _LONGEST_QUEUE: Final = 1000
@@ -198,7 +198,9 @@ class Bridge:
         real_time_factor: float = 1.0,
     ) -> None:
         check_factor(real_time_factor)
-        self._host, self.port, self._factor = host, port, real_time_factor
+        self._host = host
+        self.port = port
+        self._factor = real_time_factor
         self._senders = Senders((host, *host_names))
         self._runner = asyncio.Runner()
         self._clients: list[_Client] = []
@@ -282,9 +284,10 @@ class Bridge:
         await self._server.wait_closed()
 
     def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
-        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        headers = request.headers
+        address = connection.local_address[0]
         try:
-            self._senders.check(host, origin, connection.local_address[0])
+            self._senders.check(headers.get("Host", ""), headers.get("Origin"), address)
             if len(self._clients) >= _MOST_CLIENTS:
                 problem = f"{_MOST_CLIENTS} clients are connected"
                 raise RefusedError(HTTPStatus.SERVICE_UNAVAILABLE, problem)
@@ -446,7 +449,8 @@ class Bridge:
         self._publish(topic, lambda: message.get("msg", {}))
 
     def _subscribe(self, client: _Client, message: Json) -> None:
-        name, given = _text(message, "topic"), _kind(_text(message, "type", ""))
+        name = _text(message, "topic")
+        given = _kind(_text(message, "type", ""))
         topic = _whole(name)
         topics = {key: kind for each in self._clients for key, kind in each.topics.items()} | TOPICS
         if not given and topic not in topics:
@@ -457,11 +461,13 @@ class Bridge:
         if _text(message, "compression", "none") != "none":
             raise InputError("there is no compression here", remedy="leave it out")
         _check_room(client.subscriptions, name)
-        wish = _number(message, "throttle_rate") / 1e3, int(_number(message, "queue_length"))
         wanted_by = _text(message, "id", "")
         subscription = client.subscriptions.get(name) or _Subscription()
         _check_room(subscription.wishes, wanted_by)
-        subscription.wishes[wanted_by] = wish
+        subscription.wishes[wanted_by] = (
+            _number(message, "throttle_rate") / 1e3,
+            int(_number(message, "queue_length")),
+        )
         client.subscriptions[name] = subscription
 
     def _unsubscribe(self, client: _Client, message: Json) -> None:
@@ -474,15 +480,15 @@ class Bridge:
 
     def _call_service(self, client: _Client, message: Json) -> None:
         service = _text(message, "service")
+        values: Json | str
         try:
-            values, result = self._served(_whole(service), message.get("args") or {}), True
+            values = self._served(_whole(service), message.get("args") or {})
         except InputError as error:
-            values, result = str(error), False
-        client.send(
-            "service_response", service=service, values=values, result=result, **_id_of(message)
-        )
+            values = str(error)
+        answer = {"service": service, "values": values, "result": isinstance(values, dict)}
+        client.send("service_response", **answer, **_id_of(message))
 
-    def _served(self, service: str, given: Any) -> Json | str:
+    def _served(self, service: str, given: Any) -> Json:
         function, _, name = service[1:].rpartition("/")
         modes = self._mission.modes.get(function, ())
         if service == ADVANCE_SERVICE:
@@ -504,7 +510,8 @@ class Bridge:
         )
 
     def _change_mode(self, function: str, wanted: Json) -> Json:
-        mode, latency_s = _text(wanted, "mode_name"), seconds(wanted.get(LATENCY, 0.0))
+        mode = _text(wanted, "mode_name")
+        latency_s = seconds(wanted.get(LATENCY, 0.0))
         mission = self._mission
         request = partial(self._session.change_modes, {function: mode}, latency_s)
         if latency_s > 0.0:

@@ -340,8 +340,8 @@ class _Handler(BaseHTTPRequestHandler):
         path = self.path.partition("?")[0].rstrip("/") or "/"
         allowed = self.server.session.methods(path)
         try:
-            host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
-            self.server.senders.check(host, origin, self.connection.getsockname()[0])
+            sender = self.headers.get("Host", ""), self.headers.get("Origin")
+            self.server.senders.check(*sender, self.connection.getsockname()[0])
             if method not in allowed:
                 raise LookupError(path)
             content = self._content() if method != "GET" else None

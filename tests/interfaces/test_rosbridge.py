@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from suave_des import InputError, Mission
-from suave_des.campaign.campaign import run_campaign
+from suave_des.campaign.campaign import fly_campaign
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
 from tests.helpers.command import command_here, wait_until
 
@@ -89,13 +89,11 @@ class Served:
         assert self._is_open.wait(20.0)
 
     def _serve(self) -> None:
-        given = {"scenario": "seams2023", "workers": 1, "runs": 1, "seed": 8, **self.options}
+        given = {"scenario": "seams2023", "runs": 1, "seed": 8, **self.options}
         with Bridge(port=0, real_time_factor=self.factor) as bridge:
             self.port, self.bridge = bridge.port, bridge
             self._is_open.set()
-            result = run_campaign(
-                managers=["client:test"], executor=bridge.outcomes, time_out_s=1e6, **given
-            )
+            result = fly_campaign(bridge.outcomes, manager="client:test", time_out_s=1e6, **given)
         self.rows = [dict(zip(result.columns, row, strict=True)) for row in result.rows]
 
     def wait(self) -> None:
@@ -459,6 +457,12 @@ def test_a_campaign_without_a_server_says_what_flies_its_missions(tmp_path):
     words = "campaign", "seams2023", "--managers", "client:x", "--out", "x"
     done = command_here(*words, cwd=tmp_path)
     assert done.returncode == 2 and "suave-des serve SCENARIO --rosbridge" in done.stderr
+
+
+def test_without_websockets_it_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "suave_des.interfaces.rosbridge", None)
+    done = command_here("serve", "seams2023", "--rosbridge", cwd=tmp_path)
+    assert done.returncode == 2 and "pip install 'suave-des[rosbridge]'" in done.stderr
 
 
 @pytest.mark.parametrize(
