@@ -44,6 +44,7 @@ _BUILT_IN = {
 _FAMILIES = {
     "fixed": ("suave_des.managing.simple", "fixed_mode", "MODE"),
     "exec": ("suave_des.interfaces.exec", "exec_manager", "COMMAND"),
+    "client": ("suave_des.interfaces.client", "client_manager", "NAME"),
 }
 """Managers with an argument after a colon: module and function that make the class, and what the
 argument is.
@@ -53,8 +54,8 @@ _checked: WeakSet[type] = WeakSet()
 
 
 def is_built_in(name: str) -> bool:
-    """Whether a manager is the project's own code alone."""
-    return name in _BUILT_IN or name.startswith("fixed:")
+    """Whether a manager is the project's own code alone, in this process."""
+    return name in _BUILT_IN or name.startswith(("fixed:", "client:"))
 
 
 def takes_argument(name: str) -> bool:

@@ -94,10 +94,37 @@ def run_campaign(
     names = None if managers is None else _names(managers)
     given = {"managers": names, "runs": runs, "seed": seed, "workers": workers, "out": out}
     spec = CampaignSpec.of(named, **given, **options)
+    return _begin(spec, loaded, on_progress, settings_of)
+
+
+def fly_campaign(
+    executor: Executor, scenario: str | Path, manager: str, **options: Any
+) -> CampaignResult:
+    """Run missions under one manager by an executor of one's own, otherwise as run_campaign.
+
+    Raises:
+        CampaignInterrupted, InputError, WorkerError, StoreError: as run_campaign.
+    """
+    spec = CampaignSpec.of(scenario, managers=[manager], workers=1, **options)
+    return _begin(spec, None, None, lambda managers: {}, executor)
+
+
+def _begin(
+    spec: CampaignSpec,
+    loaded: LoadedScenario | None,
+    on_progress: OnProgress | None,
+    settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]],
+    executor: Executor = in_process,
+) -> CampaignResult:
+    """Run a new campaign."""
     if spec.out is not None:
         _check_is_free(spec.out, overwrite=spec.overwrite)
     file = read_campaign_file(spec.scenario) if loaded is None else None
-    if file is not None and managers is None and "managers" in file.settings.model_fields_set:
+    if (
+        file is not None
+        and "managers" not in spec.model_fields_set
+        and "managers" in file.settings.model_fields_set
+    ):
         tell_code(file.path, file.settings.managers)
     if settings := settings_of(spec.with_file(file).managers):
         spec = spec.model_copy(
@@ -105,7 +132,7 @@ def run_campaign(
         )
     with ExitStack() as stack:
         checked = _checked(
-            stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded)
+            stack, spec.with_file(file), lambda: inputs.read_campaign(spec, file, loaded), executor
         )
         return _finish(checked, _new(stack, checked), on_progress, is_new=True)
 
@@ -268,13 +295,17 @@ class _Checked:
         return f"suave-des campaign --resume {self.folder}"
 
 
-def _checked(stack: ExitStack, spec: CampaignSpec, read: Callable[[], Campaign]) -> _Checked:
+def _checked(
+    stack: ExitStack,
+    spec: CampaignSpec,
+    read: Callable[[], Campaign],
+    executor: Executor = in_process,
+) -> _Checked:
     """Read and check a campaign, while its workers start; `stack` ends them.
 
     Raises:
         InputError: something given cannot be used.
     """
-    executor: Executor = in_process
     spec.check()
     if spec.processes > 1 and spec.scheduler is None:
         executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes

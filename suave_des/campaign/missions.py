@@ -201,11 +201,24 @@ def reasoner_is_stuck() -> bool:
     return pellet is not None and bool(pellet.is_stuck())
 
 
-class MissionRunner:
-    """Runs missions of one campaign in this process."""
+Flight = Callable[["Simulator", str, int, int, bool], MissionResult]
+"""Flies a mission: takes its simulator, manager, run, seed and whether it is recorded."""
 
-    def __init__(self, campaign: Campaign) -> None:
+
+def _fly(simulator: Simulator, manager: str, run: int, seed: int, record: bool) -> MissionResult:
+    return simulator.run(manager, run, seed, record=record)
+
+
+class MissionRunner:
+    """Runs missions of one campaign in this process.
+
+    Args:
+        fly: flies each.
+    """
+
+    def __init__(self, campaign: Campaign, fly: Flight = _fly) -> None:
         self.campaign = campaign
+        self._fly = fly
         self._variation = campaign.variation
         if campaign.file is not None:
             look_beside(campaign.file.path)  # this may be a worker process
@@ -289,7 +302,7 @@ class MissionRunner:
         began_s = time.process_time()
         try:
             with _time_limit(spec.time_out_s):
-                result = simulator.run(manager, key.run, spec.seed, record=spec.record_knowledge)
+                result = self._fly(simulator, manager, key.run, spec.seed, spec.record_knowledge)
         except MissionError as error:
             lasting = not may_pass(error)
             return MissionFailure(

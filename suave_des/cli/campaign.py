@@ -5,6 +5,7 @@ summaries.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, islice
 from operator import itemgetter
@@ -49,6 +50,8 @@ _RUNS = 200
 _FAILURES_SHOWN = 20
 _BLOCKS = 10
 """Into which training missions are divided, for their means."""
+_NEVER_S = 1e6
+"""A time-out for missions whose time is the clients'."""
 _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
 _MAY_CHANGE = ("managers", "runs", "workers", "scheduler")
@@ -134,8 +137,9 @@ def _print_result(result: CampaignResult) -> None:
     if found:
         console.print()
         print_table(console, _differences(found, result.campaign.variation.sweep.parameters))
-    kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
-    console.print(f"{kept} in {result.folder}/runs.csv")
+    if result.folder is not None:
+        kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
+        console.print(f"{kept} in {result.folder}/runs.csv")
 
 
 def _summary(result: CampaignResult) -> Table:
@@ -360,33 +364,109 @@ def train(
     console.print(f"the training result is in {out}")
 
 
-def serve(
-    scenario: Scenario,
-    host: Annotated[str, typer.Option(help="Address.")] = ("127.0.0.1"),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")] = 3000,
-    run_number: Annotated[
-        int, typer.Option("--run", metavar="K", help="Run of the first mission.")
-    ] = 1,
-    seed: Seed = 1,
-    real_time_factor: Annotated[
-        float,
-        typer.Option(metavar="X", help="Mission seconds per second; 0: advance only on request."),
-    ] = 0.0,
+@dataclass(frozen=True)
+class _Served:
+    """Options of a server; a field is named as its option."""
+
+    host: Annotated[str, typer.Option(help="Address.")] = "127.0.0.1"
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65535,
+            help="Port; 0 for any free one.",
+            show_default="3000; with --rosbridge 9090",
+        ),
+    ] = None
     host_name: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="A further name by which clients may call this machine."),
-    ] = None,
+    ] = None
+    real_time_factor: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            help="Mission seconds per second; 0: advance only on request.",
+            show_default="0; with --rosbridge 1",
+        ),
+    ] = None
+
+    def given(self, port: int) -> Given:
+        """Where to serve, as servers take it, with a default for the port."""
+        names = self.host_name or ()
+        given = port if self.port is None else self.port
+        return {"host": self.host, "port": given, "host_names": names}
+
+
+def serve(
+    scenario: Scenario,
     *,
+    options: Annotated[
+        Given,
+        Fields(
+            ("runs", "out", "overwrite"),
+            {
+                "runs": "Missions, one after the other; with --rosbridge.",
+                "out": "Folder for result files; with --rosbridge.",
+            },
+            {"runs": "1"},
+        ),
+    ],
+    rosbridge: Annotated[
+        bool,
+        typer.Option(
+            "--rosbridge", help="Serve SUAVE's topics and services by the rosbridge protocol."
+        ),
+    ] = False,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            help="The client's name in results, client:NAME; with --rosbridge.", show_default="ros"
+        ),
+    ] = None,
+    run_number: Annotated[
+        int | None,
+        typer.Option("--run", metavar="K", help="Run of the first mission.", show_default="1"),
+    ] = None,
+    seed: Seed = 1,
+    served: _Served,
     files: Files,
 ) -> None:
-    """Serve a mission over HTTP, as UPISAS expects it of an exemplar."""
+    """Serve a mission over HTTP, as UPISAS expects it of an exemplar, or as SUAVE's topics and
+    services by the rosbridge protocol.
+    """
+    factor = served.real_time_factor
+    if rosbridge:
+        check_no_use({"--run": run_number}, "with --rosbridge, which flies runs 1 to --runs")
+        address = {**served.given(9090), "real_time_factor": 1.0 if factor is None else factor}
+        _serve_clients(
+            scenario, name or "ros", address, {"seed": seed, **options, **files.replacements}
+        )
+        return
+    check_no_use({"--name": name, **flags(options)}, "without --rosbridge")
     from suave_des.interfaces.serve import Server, Session
     from suave_des.scenario.loader import load_scenario
     from suave_des.simulation.simulator import Simulator
 
-    session = Session(
-        Simulator(load_scenario(scenario, **files.replacements)), run_number, seed, real_time_factor
-    )
-    with Server(session, host, port, host_name or ()) as server:
-        print(f"http://{host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
+    simulator = Simulator(load_scenario(scenario, **files.replacements))
+    session = Session(simulator, 1 if run_number is None else run_number, seed, factor or 0.0)
+    with Server(session, **served.given(3000)) as server:
+        print(f"http://{served.host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
         server.serve_forever(poll_interval=0.1)
+
+
+def _serve_clients(scenario: str, name: str, address: Given, options: Given) -> None:
+    """Fly a campaign whose manager is a client."""
+    from suave_des.campaign.campaign import fly_campaign
+
+    try:
+        from suave_des.interfaces.rosbridge import Bridge
+    except ImportError as error:
+        problem = f"--rosbridge needs websockets, which is not installed ({error})"
+        raise InputError(problem, remedy="pip install 'suave-des[rosbridge]'") from None
+    with Bridge(**address) as bridge:
+        print(f"ws://{address['host']}:{bridge.port}; Ctrl-C ends it", flush=True)
+        settings = {"runs": 1, "time_out_s": _NEVER_S, "command": command_line(), **options}
+        result = fly_campaign(bridge.outcomes, scenario, f"client:{name}", **settings)
+    _print_result(result)
+    exit_telling_failures(result)

@@ -19,17 +19,19 @@ import time
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import asdict
-from functools import cache
+from functools import cache, partial
 from itertools import chain
+from math import inf
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar, Final
 from weakref import WeakSet, finalize
 
+from suave_des.clock import call_at, until
 from suave_des.domain import Task
 from suave_des.errors import InputError, PassingError, did_you_mean, shown
 from suave_des.files import json_value
-from suave_des.managing.base import Dependencies, ManagingSubsystem, System
+from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 
@@ -38,6 +40,8 @@ PROTOCOL: Final = 1
 LINE_LIMIT_BYTES: Final = 1_000_000
 TIME_OUT_S: Final = 10.0
 """So long a program may take for an answer; the setting `time_out_s` changes it."""
+_LONGEST_S: Final = 1e6
+"""Of thinking."""
 _END_S: Final = 1.0
 _LOOK_S: Final = 1.0
 """Longest wait for a program: one that took twice as long was one in which this process was stopped.
@@ -51,7 +55,8 @@ KINDS: Final = {
     "distance": Kind.DISTANCE,
 }
 _NAMES: Final = {kind: name for name, kind in KINDS.items()}
-_ANSWER: Final = ("modes", "log")
+_ANSWER: Final = ("modes", "log", "latency_s")
+_OWN_SETTINGS: Final = ("time_out_s", "real_thinking")
 _FIRST_ANSWER: Final = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
 
 
@@ -225,6 +230,13 @@ class ExecManager(ManagingSubsystem):
         super().__init__(system)
         self._command = tuple(map(self._located, shlex.split(self.command)))
         self._time_out_s = float(system.settings.get("time_out_s", TIME_OUT_S))
+        self._real_thinking = float(system.settings.get("real_thinking", 0.0))
+        if not 0.0 <= self._real_thinking < inf:
+            raise InputError(
+                f"real_thinking: {self._real_thinking:g} is out of range",
+                remedy="give seconds of mission time per second of thinking",
+            )
+        self._thinks_until_s = 0.0
         self._depends_on: Dependencies | None = None
         self._begin: dict[str, Any] = {}
         self._program: _Program | None = None
@@ -242,7 +254,9 @@ class ExecManager(ManagingSubsystem):
     def recall(self, learned: Mapping[str, Any], training: bool) -> None:
         """Tell the program what there is, and take its settings."""
         system = self.system
-        settings = {name: value for name, value in system.settings.items() if name != "time_out_s"}
+        settings = {
+            name: value for name, value in system.settings.items() if name not in _OWN_SETTINGS
+        }
         answer = self._ask(
             "mission_started",
             protocol=PROTOCOL,
@@ -280,7 +294,7 @@ class ExecManager(ManagingSubsystem):
 
     def mission_started(self) -> None:
         """Send the program this message with the settings, and carry out its answer."""
-        self._carry_out(self._begin)
+        self._act(self._begin)
 
     def mission_ended(self, metrics: MissionMetrics) -> None:
         """Send the program the metrics, and leave it to another mission."""
@@ -289,33 +303,61 @@ class ExecManager(ManagingSubsystem):
 
     def task_requested(self, task: Task) -> None:
         """Send the program a task that begins."""
-        self._carry_out(self._ask("task_requested", task=task.name, functions=task.functions))
+        self._tell("task_requested", task=task.name, functions=task.functions)
 
     def task_cancelled(self, task: Task) -> None:
         """Send the program a task that is over; its functions are set to fd_unground first."""
         super().task_cancelled(task)
-        self._carry_out(self._ask("task_cancelled", task=task.name, functions=task.functions))
+        self._tell("task_cancelled", task=task.name, functions=task.functions)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Pass a diagnostic on."""
         kind = _NAMES.get(diagnostic.kind)
         if kind is not None:
-            self._carry_out(
-                self._ask("diagnostic", kind=kind, key=diagnostic.key, value=diagnostic.value)
-            )
+            self._tell("diagnostic", kind=kind, key=diagnostic.key, value=diagnostic.value)
 
-    def adapt(self) -> None:
+    def adapt(self) -> AdaptationProcess | None:
         """Let the program adapt, with all current measurements."""
         measured = self.system.measured
-        self._carry_out(
-            self._ask("adapt", measured={name: measured(name) for name in self.system.measurements})
+        answer = self._ask(
+            "adapt", measured={name: measured(name) for name in self.system.measurements}
         )
+        due_s = self._due_s(answer)
+        if due_s > self.system.now_s:
+            return self._adapt_at(due_s, answer)
+        self._carry_out(answer)
+        return None
+
+    def _adapt_at(self, due_s: float, answer: Mapping[str, Any]) -> AdaptationProcess:
+        yield until(self.system.env, due_s)
+        self._carry_out(answer)
+
+    def _tell(self, kind: str, /, **content: Any) -> None:
+        self._act(self._ask(kind, **content))
+
+    def _act(self, answer: Mapping[str, Any]) -> None:
+        """Carry out an answer when the program has thought of it."""
+        due_s = self._due_s(answer)
+        if due_s > self.system.now_s:
+            call_at(self.system.env, due_s, partial(self._carry_out, answer))
+        else:
+            self._carry_out(answer)
+
+    def _due_s(self, answer: Mapping[str, Any]) -> float:
+        """Return when the program has thought of an answer: it thinks of one after the other."""
+        latency_s = answer.get("latency_s", 0.0)
+        if type(latency_s) not in (int, float) or not 0.0 <= latency_s <= _LONGEST_S:
+            problem = f"answered a latency_s of {shown(latency_s)}"
+            raise self._error(f"{problem}; it is a number from 0 to {_LONGEST_S:g}")
+        self._thinks_until_s = max(self.system.now_s, self._thinks_until_s) + latency_s
+        return self._thinks_until_s
 
     def _ask(self, kind: str, /, **content: Any) -> dict[str, Any]:
         if self._program is None:
             self._program = program = _take(self._command)
             # A mission that does not end leaves it to another one when nobody refers to it any more.
             self._give_back = finalize(self, _give_back, self._command, program)
+        began_s = time.monotonic()
         try:
             answer = self._program.ask(
                 {"type": kind, "time_s": self.system.now_s, **content}, self._time_out_s
@@ -330,6 +372,9 @@ class ExecManager(ManagingSubsystem):
             raise self._error(
                 f"answered {shown(unknown[0])} to {kind}: {did_you_mean(unknown[0], known)}"
             )
+        if self._real_thinking and kind != "mission_started":  # whose time is the program's start
+            took_s = time.monotonic() - began_s
+            answer.setdefault("latency_s", took_s * self._real_thinking)
         return answer
 
     def _carry_out(self, answer: Mapping[str, Any]) -> None:
@@ -339,6 +384,7 @@ class ExecManager(ManagingSubsystem):
             raise self._error(
                 f"answered {shown(dict(answer))}; modes is an object, log a list of texts"
             )
+        requests = self.system.modes.requests
         for line in lines:
             self.system.log("says", str(line))
         for function, mode in modes.items():
@@ -350,6 +396,10 @@ class ExecManager(ManagingSubsystem):
                 }
                 near = did_you_mean(mode, known.get(function, known), "known")
                 raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
+        if self.system.modes.requests > requests:
+            self.reasoning_time_s += answer.get("latency_s", 0.0)
+        if answer.get("latency_s"):
+            self.system.state_changed()
 
     def _error(self, problem: str) -> ProgramError:
         return ProgramError(f"the program {problem}")

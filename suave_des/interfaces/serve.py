@@ -11,8 +11,8 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -33,13 +33,16 @@ _LENGTH_DIGITS: Final = 20
 _MOST_REPORTS: Final = 20
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _JSON: Final = "application/json"
-_ADVANCE: Final = "advance_s"
+ADVANCE, LATENCY = "advance_s", "latency_s"
 _LONGEST_S: Final = 1e6
+_FIRST_S: Final = 1e-9
+"""The mission time at which a client first sees it: the first task is requested at t = 0."""
 REQUESTS: Final = {
     "GET /": "this list",
     "GET /monitor": "what the mission's state is; null: not measured yet",
     "GET /monitor_schema": "JSON schema of the answer of /monitor, with what each name means",
-    "PUT /execute": "requests modes by function, then advances by advance_s; null: as it is",
+    "PUT /execute": "lets latency_s pass, requests modes by function, then advances by advance_s;"
+    " null: as it is",
     "GET /execute_schema": "JSON schema of the body of /execute",
     "GET /adaptation_options": "the modes of each function",
     "GET /adaptation_options_schema": "JSON schema of the answer of /adaptation_options",
@@ -65,26 +68,40 @@ Json = dict[str, Any]
 
 
 class Session:
-    """One mission at a time, as JSON.
+    """One mission at a time, which clients see and change, over HTTP or rosbridge.
+
+    Mission time advances when a client requests it, or as wall time passes.
 
     Args:
         run, seed: of the first mission.
         real_time_factor: seconds of mission time per second; 0: time advances only when a client
             requests it.
+        manager: name of the manager that stands for the client; None: the caller.
+        record: as of Mission.
+
+    Attributes:
+        mission: the current one.
     """
 
+    mission: Mission
+
     def __init__(
-        self, simulator: Simulator, run: int = 1, seed: int = 1, real_time_factor: float = 0.0
+        self,
+        simulator: Simulator,
+        run: int = 1,
+        seed: int = 1,
+        real_time_factor: float = 0.0,
+        manager: str | None = None,
+        record: bool = False,
     ) -> None:
-        if not 0.0 <= real_time_factor < inf:
-            raise InputError(
-                f"real-time factor: {real_time_factor:g} is out of range",
-                remedy="0, or a number above",
-            )
+        check_factor(real_time_factor)
         self._simulator = simulator
         self._factor = real_time_factor
         self._run = run
         self._seed = seed
+        self._manager = manager
+        self._record = record
+        self._thought_s = 0.0
         self._lock = threading.Lock()
         self._paths: dict[tuple[str, str], Callable[[Any], Json]] = {
             ("GET", "/"): lambda _: dict(REQUESTS),
@@ -96,9 +113,30 @@ class Session:
             ("GET", "/adaptation_options_schema"): lambda _: self._options_schema(),
             ("POST", "/advance"): self._advance,
             ("POST", "/start"): self._start,
-            ("GET", "/metrics"): lambda _: asdict(self._mission.metrics()),
+            ("GET", "/metrics"): lambda _: self._metrics(),
         }
         self._begin(run, seed)
+
+    def hold(self) -> None:
+        """Let wall time that has passed until now not count."""
+        self._seen_s = time.monotonic()  # up to when time has passed by itself
+
+    def due_s(self) -> float:
+        """Return the mission time that wall time demands: what has passed since it was asked last
+        or held, times the factor, from now on.
+        """
+        before_s = self._seen_s
+        self.hold()
+        return max(_FIRST_S, self.mission.now_s) + (self._seen_s - before_s) * self._factor
+
+    def change_modes(self, modes: Mapping[str, str], thought_s: float) -> None:
+        """Request modes by function, and count the mission time that it took to decide so."""
+        manager = self.mission.manager
+        requests = manager.system.modes.requests
+        for function, mode in modes.items():
+            manager.system.change_mode(function, mode)
+        if manager.system.modes.requests > requests:
+            manager.reasoning_time_s += thought_s
 
     def answer(self, method: str, path: str, content: Any) -> Json:
         """Answer a request.
@@ -108,7 +146,9 @@ class Session:
             InputError: the content is invalid.
         """
         with self._lock:  # several clients are served one after the other
-            self._catch_up()
+            before_s = self.mission.now_s
+            self.mission.advance(self.due_s())
+            self._thought_s = self.mission.now_s - before_s
             if (serve := self._paths.get((method, path))) is None:
                 raise LookupError(path)
             return serve(content)
@@ -118,21 +158,15 @@ class Session:
         return [method for method, known in self._paths if known == path]
 
     def _begin(self, run: int, seed: int) -> None:
-        self._mission = Mission(self._simulator, run=run, seed=seed)
-        self._mission.advance(1e-9)  # the first task is requested at t = 0
-        self._seen_s = time.monotonic()  # up to when time has passed by itself
-
-    def _catch_up(self) -> None:
-        before_s = self._seen_s
-        self._seen_s = time.monotonic()
-        if self._factor > 0.0 and not self._mission.is_over:
-            self._mission.advance(self._mission.now_s + (self._seen_s - before_s) * self._factor)
+        self.mission = Mission(
+            self._simulator, self._manager, run=run, seed=seed, record=self._record
+        )
+        self.hold()
 
     def _monitor(self) -> Json:
-        mission = self._mission
+        mission = self.mission
         found: Json = {
-            "time_s": round(mission.now_s, 6),
-            "is_over": mission.is_over,
+            **self.time(),
             "task": mission.task.name if mission.task else "",
             "distance_inspected_m": mission.distance_inspected_m,
         }
@@ -144,33 +178,42 @@ class Session:
 
     def _options(self) -> Json:
         return {
-            function: list(grounding_modes(modes))
-            for function, modes in self._mission.modes.items()
+            function: list(grounding_modes(modes)) for function, modes in self.mission.modes.items()
         }
 
     def _execute(self, content: Any) -> Json:
-        wanted = _object(content, (*self._mission.modes, _ADVANCE))
+        mission = self.mission
+        wanted = object_of(content, (*mission.modes, ADVANCE, LATENCY))
         # UPISAS sends every key of the schema: null leaves things as they are, like a key that is
         # not there.
         wanted = {key: value for key, value in wanted.items() if value is not None}
-        step_s = _seconds(wanted.pop(_ADVANCE, 0.0))
+        step_s, latency_s = (seconds(wanted.pop(key, 0.0)) for key in (ADVANCE, LATENCY))
         for function, mode in wanted.items():
-            self._mission.check_mode(function, mode)
-        if not self._mission.is_over:
-            for function, mode in wanted.items():
-                self._mission.change_mode(function, mode)
-            self._mission.advance(self._mission.now_s + step_s)
-        return {"time_s": round(self._mission.now_s, 6), "is_over": self._mission.is_over}
+            mission.check_mode(function, mode)
+        mission.advance(mission.now_s + latency_s)
+        if not mission.is_over:
+            self.change_modes(wanted, self._thought_s + latency_s)
+            mission.advance(mission.now_s + step_s)
+        return self.time()
+
+    def time(self) -> Json:
+        """Say what mission time it is."""
+        return {"time_s": round(self.mission.now_s, 6), "is_over": self.mission.is_over}
 
     def _advance(self, content: Any) -> Json:
-        wanted = _object(content, (_ADVANCE,))
-        self._mission.advance(self._mission.now_s + _seconds(wanted.get(_ADVANCE)))
+        wanted = object_of(content, (ADVANCE,))
+        self.mission.advance(self.mission.now_s + seconds(wanted.get(ADVANCE)))
         return self._monitor()
 
     def _start(self, content: Any) -> Json:
-        wanted = _object(content, ("run", "seed"))
+        wanted = object_of(content, ("run", "seed"))
         self._begin(wanted.get("run", self._run), wanted.get("seed", self._seed))
+        self.mission.advance(self.due_s())
         return self._monitor()
+
+    def _metrics(self) -> Json:
+        further = self.mission.result().further if self.mission.is_over else {}
+        return {**asdict(self.mission.metrics()), **further}
 
     def _monitor_schema(self) -> Json:
         number = {"type": "number"}
@@ -181,17 +224,14 @@ class Session:
         measured = {"type": ["number", "null"], "description": "measured; null: not yet"}
         status = text | {"description": "status of the thruster; empty: none was published"}
         mode = text | {"description": "mode of the function, requested last; empty: none"}
-        kinds |= dict.fromkeys(self._mission.manager.system.measurements, measured)
+        kinds |= dict.fromkeys(self.mission.manager.system.measurements, measured)
         kinds |= dict.fromkeys(THRUSTER_NAMES, status) | dict.fromkeys(self._options(), mode)
         return _schema({name: kinds[name] for name in self._monitor()}, required=True)
 
     def _execute_schema(self) -> Json:
-        modes = {
-            function: {"enum": [*each, None]} for function, each in self._mission.modes.items()
-        }
-        return _schema(
-            {**modes, _ADVANCE: {"type": ["number", "null"], "minimum": 0}}, required=False
-        )
+        modes = {function: {"enum": [*each, None]} for function, each in self.mission.modes.items()}
+        time_s = {"type": ["number", "null"], "minimum": 0}
+        return _schema({**modes, ADVANCE: time_s, LATENCY: time_s}, required=False)
 
     def _options_schema(self) -> Json:
         modes = {"type": "array", "items": {"type": "string"}}
@@ -208,7 +248,19 @@ def _schema(properties: Json, *, required: bool) -> Json:
     }
 
 
-def _object(content: Any, known: Sequence[str]) -> Json:
+def check_factor(factor: float) -> None:
+    """Check seconds of mission time per second.
+
+    Raises:
+        InputError: it is no such number.
+    """
+    if not 0.0 <= factor < inf:
+        raise InputError(
+            f"real-time factor: {factor:g} is out of range", remedy="0, or a number above"
+        )
+
+
+def object_of(content: Any, known: Sequence[str]) -> Json:
     """Return a copy of an object, which may have no other keys than the known ones."""
     if not isinstance(content, dict):
         raise InputError(
@@ -219,7 +271,8 @@ def _object(content: Any, known: Sequence[str]) -> Json:
     return dict(content)
 
 
-def _seconds(value: Any) -> float:
+def seconds(value: Any) -> float:
+    """Return a time that a client gave, as a number."""
     # true is an int, too, and nan in no range
     if type(value) not in (int, float) or not 0 <= value <= _LONGEST_S:
         raise InputError(
@@ -228,16 +281,50 @@ def _seconds(value: Any) -> float:
     return float(value)
 
 
-class _RefusedError(Exception):
+class RefusedError(Exception):
     """A request that does not reach the session: its status, and why."""
+
+
+class Senders:
+    """Who may use a server: requests that a web page on another site may have a browser send are
+    refused. A page can neither choose the address in Host, nor hide the one in Origin.
+
+    Args:
+        names: by which clients may call this machine, besides its address.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = {*_LOCAL, *map(str.lower, names)}
+        self._reported = set[str]()
+
+    def check(self, host: str, origin: str | None, address: str) -> None:
+        """Check the headers of a request, and the address of this machine that it has reached.
+
+        Raises:
+            RefusedError: it may come from somebody else's page.
+        """
+        is_known = False
+        with suppress(ValueError):
+            is_known = urlsplit(f"//{host}").hostname in {*self._names, address}
+        if not is_known:
+            problem = f"Host {shown(host)} is not this server's address (--host-name accepts it)"
+            raise RefusedError(HTTPStatus.MISDIRECTED_REQUEST, problem)
+        if origin is not None and origin != f"http://{host}":
+            raise RefusedError(
+                HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server"
+            )
+
+    def report(self, refusal: str) -> None:
+        """Print why a request was refused, once for each reason, and for few of them."""
+        if refusal not in self._reported and len(self._reported) < _MOST_REPORTS:
+            self._reported.add(refusal)
+            print(f"a request was refused: {refusal}", file=sys.stderr, flush=True)
 
 
 class _Handler(BaseHTTPRequestHandler):
     """Reads requests and writes answers; the session interprets them.
 
-    Requests that a web page on another site may have a browser send are refused: a page can neither
-    choose the address in Host, nor hide the one in Origin, nor send JSON without asking this server
-    first.
+    Nor can a web page on another site send JSON without asking this server first; see Senders.
     """
 
     server: Server
@@ -253,17 +340,18 @@ class _Handler(BaseHTTPRequestHandler):
         path = self.path.partition("?")[0].rstrip("/") or "/"
         allowed = self.server.session.methods(path)
         try:
-            self._check_sender()
+            sender = self.headers.get("Host", ""), self.headers.get("Origin")
+            self.server.senders.check(*sender, self.connection.getsockname()[0])
             if method not in allowed:
                 raise LookupError(path)
             content = self._content() if method != "GET" else None
             status = HTTPStatus.OK
             answer = self.server.session.answer(method, path, content)
-        except _RefusedError as error:
+        except RefusedError as error:
             self.close_connection = True  # a body would not be read
             status = error.args[0]
             answer = {"error": error.args[1]}
-            self.server.report(error.args[1])
+            self.server.senders.report(error.args[1])
         except LookupError:
             known = f": it answers {' and '.join(allowed)}" if allowed else ""
             status = HTTPStatus.METHOD_NOT_ALLOWED if allowed else HTTPStatus.NOT_FOUND
@@ -294,33 +382,18 @@ class _Handler(BaseHTTPRequestHandler):
         if self.command != "HEAD":
             self.wfile.write(body)
 
-    def _check_sender(self) -> None:
-        host = self.headers.get("Host", "")
-        origin = self.headers.get("Origin")
-        known = {*_LOCAL, *self.server.names, self.connection.getsockname()[0]}
-        is_known = False
-        with suppress(ValueError):
-            is_known = urlsplit(f"//{host}").hostname in known
-        if not is_known:
-            problem = f"Host {shown(host)} is not this server's address (--host-name accepts it)"
-            raise _RefusedError(HTTPStatus.MISDIRECTED_REQUEST, problem)
-        if origin is not None and origin != f"http://{host}":
-            raise _RefusedError(
-                HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server"
-            )
-
     def _content(self) -> Any:
         length = self.headers.get("Content-Length", "0")
         kind = self.headers.get_content_type()
         if not (length.isascii() and length.isdigit()) or self.headers.get("Transfer-Encoding"):
-            raise _RefusedError(
+            raise RefusedError(
                 HTTPStatus.BAD_REQUEST, "the body's length is not given (send a Content-Length)"
             )
         if len(length) > _LENGTH_DIGITS or int(length) > BODY_LIMIT_BYTES:
             problem = f"the body has more than {BODY_LIMIT_BYTES:,} bytes"
-            raise _RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, problem)
+            raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, problem)
         if kind != _JSON:
-            raise _RefusedError(
+            raise RefusedError(
                 HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
                 f"the body is {kind} (send Content-Type: {_JSON})",
             )
@@ -331,6 +404,18 @@ class _Handler(BaseHTTPRequestHandler):
             raise InputError(
                 f"the body is not JSON: {shown(body[:60].decode(errors='replace'))}"
             ) from None
+
+
+@contextmanager
+def usable(host: str, port: int) -> Iterator[None]:
+    """Say so, in an InputError, if an address cannot be used."""
+    try:
+        yield
+    except (OSError, OverflowError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{host}:{port} cannot be used: {why}", remedy="give another --host or --port"
+        ) from None
 
 
 class Server(ThreadingHTTPServer):
@@ -354,21 +439,9 @@ class Server(ThreadingHTTPServer):
         host_names: Sequence[str] = (),
     ) -> None:
         self.session = session
-        self.names = {host, *map(str.lower, host_names)}
-        self._reported = set[str]()
-        try:
+        self.senders = Senders((host, *host_names))
+        with usable(host, port):
             super().__init__((host, port), _Handler)
-        except (OSError, OverflowError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise InputError(
-                f"{host}:{port} cannot be used: {why}", remedy="give another --host or --port"
-            ) from None
-
-    def report(self, refusal: str) -> None:
-        """Print why a request was refused, once for each reason, and for few of them."""
-        if refusal not in self._reported and len(self._reported) < _MOST_REPORTS:
-            self._reported.add(refusal)
-            print(f"a request was refused: {refusal}", file=sys.stderr, flush=True)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Let clients leave in the middle of a request or an answer; report anything else."""

@@ -82,6 +82,67 @@ def test_what_it_says_stands_in_the_timeline():
     assert next(each.detail for each in events if each.event == "says") == "higher"
 
 
+THINKS = """
+answer = {}
+if message["type"] == "mission_started":
+    answer = {"period_s": 2.0, "starts_s": 1.0, "subscribes_to": ["component_status"]}
+elif message["type"] == "adapt":
+    answer = {"modes": {"f_generate_search_path": "fd_spiral_high"}, "latency_s": 3.0}
+print(json.dumps(answer), flush=True)
+"""
+
+
+def requested_s(body: str) -> list[float]:
+    """Return when a program requests to search high."""
+    values = {"mission.time_limit_s": 20.0}
+    return [
+        each.t_s
+        for each in run_mission("release15", program(body), 1, 1, values=values).events
+        if each.event == "mode_requested" and each.detail == HIGHER
+    ]
+
+
+HIGHER = "f_generate_search_path -> fd_spiral_high"
+
+
+def test_mission_time_passes_while_it_thinks():
+    assert requested_s(THINKS) == [1.0 + 3.0]
+
+
+def test_it_is_not_asked_to_adapt_while_it_thinks_of_it():
+    requested_s("open('messages', 'a').write(line)\n" + THINKS)
+    messages = [json.loads(line) for line in Path("messages").read_text().splitlines()]
+    asked_s = [each["time_s"] for each in messages if each["type"] == "adapt"]
+    assert asked_s[:3] == [1.0, 5.0, 9.0]
+
+
+def test_it_thinks_of_one_message_after_the_other():
+    first = THINKS.replace("answer = {}", 'answer = {"latency_s": 2.5}')
+    assert requested_s(first) == [2.5 + 3.0]  # the task's request comes at t = 0
+
+
+def test_thinking_before_adaptations_is_a_further_metric():
+    values = {"metrics": ["reasoning_time_s"]}
+    result = run_mission("seams2023", program(THINKS), 1, 1, values=values)
+    changes = [each for each in result.events if each.detail == HIGHER]
+    assert result.further["reasoning_time_s"] == 3.0 * len(changes) > 0.0
+
+
+def test_wall_time_may_count_as_thinking():
+    slow = EVERY_PERIOD.replace("answer = {}", "answer = {}; time.sleep(0.02)", 1)
+    manager = program(slow)
+    values = {"metrics": ["reasoning_time_s"], "mission.time_limit_s": 60.0}
+    options = {"manager_options": {manager: {"real_thinking": 50.0}}}
+    further = run_mission("seams2023", manager, 1, 8, values=values, **options).further
+    assert further["reasoning_time_s"] >= 0.02 * 50.0
+
+
+def test_a_factor_of_thinking_that_is_none_is_bad_input():
+    manager = program(EVERY_PERIOD)
+    with pytest.raises(InputError, match="real_thinking: -1 is out of range"):
+        Mission("seams2023", manager, manager_options={manager: {"real_thinking": -1}})
+
+
 def test_it_is_told_what_happens():
     note = "open('messages', 'a').write(line)\n"
     run_mission("seams2023", program(note + EVERY_PERIOD), 1, 1)
@@ -122,6 +183,8 @@ def test_it_is_told_what_happens():
             "'fd_spiral_high'",
         ),
         ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
+        ("print('{\"latency_s\": -1}', flush=True)", "a latency_s of -1"),
+        ("print('{\"latency_s\": NaN}', flush=True)", "a latency_s of .nan"),
     ],
 )
 def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body, words):

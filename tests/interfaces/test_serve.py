@@ -15,7 +15,7 @@ from http.client import HTTPConnection
 import jsonschema
 import pytest
 
-from suave_des import InputError, Mission
+from suave_des import InputError, Mission, load_scenario
 from suave_des.interfaces.serve import Server, Session
 from suave_des.simulation.simulator import Simulator
 
@@ -123,6 +123,27 @@ def test_time_stands_still_until_a_client_says_so(port):
     assert status == 200 and json.loads(body)["time_s"] == 2.5
 
 
+def test_thinking_time_that_a_client_tells_passes_before_its_request():
+    values = {"metrics": ["reasoning_time_s"], "mission.time_limit_s": 60.0}
+    with served(Simulator(load_scenario("seams2023", values=values))) as port:
+        request(port, "PUT", "/execute", {"advance_s": 10.0})
+        thought = {SEARCH: "fd_spiral_high", "latency_s": 3.0, "advance_s": 1.0}
+        assert json.loads(request(port, "PUT", "/execute", thought)[1])["time_s"] == 14.0
+        request(port, "PUT", "/execute", {"latency_s": 2.0, SEARCH: "fd_spiral_high"})  # no change
+        request(port, "POST", "/advance", {"advance_s": 100.0})
+        assert json.loads(request(port, "GET", "/metrics")[1])["reasoning_time_s"] == 3.0
+
+
+def test_time_that_has_passed_by_itself_before_a_request_is_thinking_time():
+    values = {"metrics": ["reasoning_time_s"], "mission.time_limit_s": 60.0}
+    session = Session(Simulator(load_scenario("seams2023", values=values)), real_time_factor=100.0)
+    session.answer("GET", "/monitor", None)
+    time.sleep(0.05)
+    session.answer("PUT", "/execute", {SEARCH: "fd_spiral_high"})
+    session.answer("POST", "/advance", {"advance_s": 100.0})
+    assert session.answer("GET", "/metrics", None)["reasoning_time_s"] >= 5.0
+
+
 def test_time_may_pass_by_a_factor_of_real_time(simulator):
     session = Session(simulator, real_time_factor=1e6)
     time.sleep(0.01)
@@ -149,6 +170,7 @@ def test_time_may_pass_by_a_factor_of_real_time(simulator):
         ("PUT", "/execute", {"f_search": "x"}, 400, "unknown key 'f_search'"),
         ("PUT", "/execute", {SEARCH: ["x"]}, 400, "no mode"),
         ("PUT", "/execute", {"advance_s": -1}, 400, "is not a time in seconds"),
+        ("PUT", "/execute", {"latency_s": True}, 400, "is not a time in seconds"),
         ("POST", "/advance", {}, 400, "is not a time in seconds"),
         ("POST", "/advance", {"by": 1}, 400, "unknown key"),
         ("POST", "/start", {"seed": -3}, 400, "seed"),

@@ -1,0 +1,55 @@
+"""The manager that stands for a client of `suave-des serve --rosbridge` in a mission."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from suave_des.domain import Task
+from suave_des.errors import InputError
+from suave_des.managing.simple import NoManager
+
+if TYPE_CHECKING:
+    from suave_des.scenario.loader import LoadedScenario
+
+REQUEST_TASK: Final = "/task/request"
+CANCEL_TASK: Final = "/task/cancel"
+
+
+class ClientManager(NoManager):
+    """client:NAME: a client of `suave-des serve --rosbridge`.
+
+    A task begins with the default modes of its functions unless a client offers /task/request, and
+    ends with fd_unground unless one offers /task/cancel.
+    """
+
+    call: ClassVar[Callable[[str, Task], bool] | None] = None
+    """Calls a service that a client offers, or returns False; set while a bridge serves."""
+
+    @classmethod
+    def check(cls, loaded: LoadedScenario) -> None:
+        """Check that a bridge serves."""
+        if cls.call is None:
+            raise InputError(
+                "managers client:NAME are clients of a server",
+                remedy="fly their missions by suave-des serve SCENARIO --rosbridge",
+            )
+
+    def task_requested(self, task: Task) -> None:
+        """Pass a task that begins on, or set its modes."""
+        if not self._pass_on(REQUEST_TASK, task):
+            super().task_requested(task)
+
+    def task_cancelled(self, task: Task) -> None:
+        """Pass a task that is over on, or set its functions to fd_unground."""
+        if not self._pass_on(CANCEL_TASK, task):
+            super().task_cancelled(task)
+
+    def _pass_on(self, service: str, task: Task) -> bool:
+        call = type(self).call
+        return call is not None and call(service, task)
+
+
+def client_manager(name: str) -> type[ClientManager]:
+    """Return the class of the manager `client:NAME`, whatever its name: results have it."""
+    return ClientManager
