@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property, lru_cache
 from math import isfinite
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -35,7 +36,7 @@ from suave_des.knowledge.state import (
     grounding_name,
     objective_name,
 )
-from suave_des.resources import find
+from suave_des.resources import find, shipped_folder
 from suave_des.scenario.models import Distribution, Period, Strict
 from suave_des.scenario.yamlfile import parse_yaml, validated
 
@@ -208,7 +209,7 @@ class DecisionTable:
                 design = None if then == NONE_LEFT else then
                 yield Decision(function, design, f"line {line} of {self.path.name}")
 
-    @property
+    @cached_property
     def _regions(self) -> Regions:
         numbers = {number for scale in self.attributes.values() for number in scale.numbers}
         return Regions(tuple(sorted(numbers)), ())
@@ -271,13 +272,19 @@ def _representatives(
 # Reading.
 
 
-def is_table(name: str | Path) -> bool:
-    """Whether a name is that of a table: a CSV file, or a shipped one."""
-    path = Path(name)
-    try:
-        return path.suffix == ".csv" or find(path, SHIPPED).suffix == ".csv"
-    except InputError:
-        return False
+def manager_of(name: Path) -> str | None:
+    """The manager that decides by the table of a name, which is a CSV file or shipped; None: it is
+    something else.
+    """
+    if name.suffix == ".csv":
+        return f"table:{name}"
+    is_shipped = (shipped_folder(SHIPPED) / f"{name}.csv").is_file() and not name.exists()
+    return str(name) if is_shipped else None
+
+
+def find_table(name: str | Path) -> DecisionTable:
+    """Read the table of a file, or a shipped one; raises as find and read_table do."""
+    return read_table(find(name, SHIPPED))
 
 
 def read_table(path: Path, changes: Mapping[str, object] | None = None) -> DecisionTable:
@@ -364,7 +371,7 @@ def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSetting
     regions = []
     for name in _attributes(cells):
         try:
-            regions.append(tuple(_parts(cells[name].strip())))
+            regions.append(_parts(cells[name].strip()))
         except InputError as error:
             raise InputError(
                 error.problem, file=path, place=f"line {line}, {name}", remedy=error.remedy
@@ -385,14 +392,17 @@ def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSetting
     return _Row(line, tuple(regions), reports, now, then)
 
 
-def _parts(text: str) -> Iterator[TestedRegion]:
+@lru_cache(maxsize=4096)  # a table has the same few thousands of times
+def _parts(text: str) -> tuple[TestedRegion, ...]:
     """Read the regions in a cell, such as "not measured or < 1.25"; none: whatever it is."""
+    found = []
     for part in filter(None, text.split(" or ")):
         region = _MEASURED if part == _ANY else parse_region(part)
         if region is None:
             number = exact(part)
             region = ((">=", number), ("<=", number))
-        yield region
+        found.append(region)
+    return tuple(found)
 
 
 def _reports(path: Path, line: int, text: str, settings: TableSettings) -> Reports | None:
@@ -425,7 +435,7 @@ def _cells(
     found: dict[str, dict[tuple[int, ...], _Cell]] = {}
     number = 0
     for row in rows:
-        inside = [list(_places(*each)) for each in zip(row.regions, scales, strict=True)]
+        inside = [_places(*each) for each in zip(row.regions, scales, strict=True)]
         for places, (function, then) in itertools.product(
             itertools.product(*inside), row.then.items()
         ):
@@ -446,11 +456,14 @@ def _cells(
     return found
 
 
-def _places(regions: Sequence[TestedRegion], scale: Scale) -> Iterator[int]:
-    for place in range(len(scale)):
-        value = scale.value(place)
-        if not regions or any(is_in(region, value) for region in regions):
-            yield place
+@lru_cache(maxsize=4096)
+def _places(regions: Sequence[TestedRegion], scale: Scale) -> tuple[int, ...]:
+    values = [scale.value(place) for place in range(len(scale))]
+    return tuple(
+        place
+        for place, value in enumerate(values)
+        if not regions or any(is_in(region, value) for region in regions)
+    )
 
 
 def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
