@@ -37,7 +37,7 @@ from suave_des.knowledge.state import (
     objective_name,
 )
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.models import Distribution, Period, Strict
+from suave_des.scenario.models import DelayDistribution, Period, Strict
 from suave_des.scenario.yamlfile import parse_yaml, validated
 
 _NOW, _THEN, _COMPONENTS, _AGAIN = "_now", "_then", "components", "again"
@@ -58,7 +58,7 @@ class TableSettings(Strict):
     """When it decides: at ticks of a period, or when a task, component or measured value changes."""
     period_s: Period | None = None
     """Time between decisions; by default managers.metacontrol.reasoning_period_s."""
-    latency_s: Distribution = 0.0
+    latency_s: DelayDistribution = 0.0
     """Time from a decision to its requests; by default latencies.inference_s."""
     order: tuple[str, ...] = ()
     """Functions in the order of their requests; the others follow by name."""
