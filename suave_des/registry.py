@@ -40,11 +40,14 @@ _BUILT_IN = {
     "bt_extended": "suave_des.managing.bt:ExtendedBehaviourTree",
     "threshold": "suave_des.managing.simple:Threshold",
     "oracle": "suave_des.managing.simple:Oracle",
+    "rosa": "suave_des.interfaces.table:Rosa",
+    "planta": "suave_des.interfaces.table:Planta",
 }
 _FAMILIES = {
     "fixed": ("suave_des.managing.simple", "fixed_mode", "MODE"),
     "exec": ("suave_des.interfaces.exec", "exec_manager", "COMMAND"),
     "client": ("suave_des.interfaces.client", "client_manager", "NAME"),
+    "table": ("suave_des.interfaces.table", "table_manager", "FILE.csv"),
 }
 """Managers with an argument after a colon: module and function that make the class, and what the
 argument is.
@@ -55,7 +58,7 @@ _checked: WeakSet[type] = WeakSet()
 
 def is_built_in(name: str) -> bool:
     """Whether a manager is the project's own code alone, in this process."""
-    return name in _BUILT_IN or name.startswith(("fixed:", "client:"))
+    return name in _BUILT_IN or name.startswith(("fixed:", "client:", "table:"))
 
 
 def takes_argument(name: str) -> bool:

@@ -17,6 +17,7 @@ _KINDS = {
     "scenarios": ".yaml",
     "scenarios/revisions": ".yaml",
     "scenarios/vehicles": ".yaml",
+    "scenarios/managers": ".csv",
     "scenarios/published": ".csv",
     "scenarios/ensembles": ".csv",
 }

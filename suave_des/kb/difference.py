@@ -1,5 +1,5 @@
 """Compare two knowledge bases: their axioms and rules as text, what they decide in every state, and
-the same missions.
+the same missions; or decision tables.
 
 Campaigns and statistics are imported when missions are compared: a knowledge base needs neither.
 """
@@ -7,19 +7,21 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import rdflib
 from rdflib.term import Node
 
-from suave_des.errors import InputError, number_of
+from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
 from suave_des.estimates import Estimate
+from suave_des.kb.decision_table import DecisionTable
 from suave_des.kb.matching import Probes
-from suave_des.kb.situations import Decide, Situation, compare
-from suave_des.kb.space import PolicySpace, States, add_decisions
+from suave_des.kb.situations import Decide, OnCount, Situation, compare
+from suave_des.kb.space import PolicySpace, States, add_decisions, decide_all
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import (
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     import pandas
 
     from suave_des.campaign.progress import OnProgress
+    from suave_des.kb.knowledge_base import KnowledgeBase
 
 #: Metrics of missions that are always compared; others are where they differ.
 COMPARED_METRICS: Final = (SEARCH_TIME, DISTANCE)
@@ -186,10 +189,55 @@ class PolicyDifference:
             yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(number, 'state')}"
 
 
-def compare_decisions(
-    states: States, one: Decide, other: Decide, no_proof: tuple[str, ...]
+def compare_deciders(
+    knowledge: KnowledgeBase,
+    both: Sequence[KnowledgeBase | DecisionTable],
+    max_failed: int,
+    on_count: OnCount,
 ) -> PolicyDifference:
-    """Compare what two knowledge bases decide in all of some states; see PolicyDifference."""
+    """Compare what two tables, or a table and a knowledge base, decide in every state that either
+    can tell apart.
+
+    Args:
+        knowledge: has the tasks and designs of the states.
+        max_failed, on_count: as of KnowledgeBase.policy.
+
+    Raises:
+        InputError: there would be too many states, or a table has no row for one of them, or a
+            design that the knowledge base does not have.
+        KnowledgeError: the reasoner takes too long for one of them.
+    """
+    space = reduce(PolicySpace.common, (each.space for each in both), knowledge.space)
+    states = States.of(knowledge.base, knowledge.settings, max_failed, space)
+    decide: list[Decide] = []
+    for each in both:
+        if isinstance(each, DecisionTable):
+            _check_designs(each, knowledge.base)
+            decide.append(each.outcome)
+        else:
+            decide.append(decide_all(each.base, states, each.outcome, on_count))
+    bases = [each.base for each in both if not isinstance(each, DecisionTable)]
+    no_proof = dict.fromkeys(reason for base in bases for reason in regions_of(base).reasons)
+    return compare_decisions(states, decide[0], decide[1], tuple(no_proof), infer=False)
+
+
+def _check_designs(table: DecisionTable, base: Ontology) -> None:
+    for function, designs in table.designs.items():
+        for design, line in designs.items():
+            if design not in base.designs(function):
+                problem = f"the ontology has no design {shown(design)} of {function}"
+                remedy = did_you_mean(design, base.designs(function))
+                raise line_error(table.path, line, problem, remedy)
+
+
+def compare_decisions(
+    states: States, one: Decide, other: Decide, no_proof: tuple[str, ...], *, infer: bool = True
+) -> PolicyDifference:
+    """Compare what two knowledge bases decide in all of some states; see PolicyDifference.
+
+    Args:
+        infer: whether both infer statuses, which are compared then.
+    """
     decided, reported = [], 0
     for situation, before, after in compare(one, other, map(Situation, states)):
         if any(
@@ -197,7 +245,7 @@ def compare_decisions(
             for each in situation.state.objectives
         ):
             decided.append((situation.state, before, after))
-        elif before.statuses != after.statuses:
+        elif infer and before.statuses != after.statuses:
             reported += states.reports[situation.state.components]
     differing = [state for state, _, _ in decided]
     cells = states.frame(differing)
@@ -248,16 +296,18 @@ def compare_missions(
     one: Replacements,
     other: Replacements,
     *,
+    managers: Sequence[str] = (_MANAGER, _MANAGER),
     seed: int = 1,
     workers: int = 1,
     on_progress: OnProgress | None = None,
 ) -> MissionDifference:
-    """Run the same missions with two knowledge bases, and compare them pair by pair.
+    """Run the same missions with two knowledge bases or tables, and compare them pair by pair.
 
     Args:
         scenario: name or path.
         runs: number of missions with each knowledge base.
         one, other: ontologies, rules and values of the scenario, as load_scenario takes them.
+        managers: the manager with each.
 
     Raises:
         InputError: something cannot be used, or missions fail.
@@ -265,11 +315,11 @@ def compare_missions(
     from suave_des.campaign.campaign import run_campaign
 
     frames = []
-    for replacements in (one, other):
+    for manager, replacements in zip(managers, (one, other), strict=True):
         result = run_campaign(
-            scenario, [_MANAGER], runs, seed, workers, on_progress=on_progress, **replacements
+            scenario, [manager], runs, seed, workers, on_progress=on_progress, **replacements
         )
-        frames.append(result.frame().set_index("run"))
+        frames.append(result.frame().drop(columns="manager").set_index("run"))
     before, after = frames
     common = before.index.intersection(after.index)
     if len(common) < runs:

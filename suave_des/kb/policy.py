@@ -38,8 +38,8 @@ class Policy:
             scale; the `components` that report; how many `states` it stands for; of each function
             the grounding `_now` and what happens to it `_then`, empty where the function has no
             objective; inferred `statuses`; `marks`, which are any of "inconsistent", "none left"
-            and "flip-flop"; the `problem` of an inconsistent state; and as objects one such
-            `state`, its `reports` in words and the functions that are `flipping`.
+            and "flip-flop"; the `problem` of an inconsistent state; functions whose mode is requested
+            `again` although it stays; and as objects one such `state`, its `reports` in words and the functions that are `flipping`.
         functions: that have an objective in a state.
         without_effect: measured attributes that no rule and no design refers to.
         no_proof: why rules may do more than compare; if there are any reasons, the ranges are
@@ -122,6 +122,7 @@ def make_policy(
         decide(Situation(state)).contradiction if outcome.reasoning is None else ""
         for state, outcome in zip(every, outcomes, strict=True)
     ]
+    cases["again"] = ["; ".join(_again(outcome)) for outcome in outcomes]
     words = {reports: _in_words(reports, states.space) for reports in states.reports}
     cases["state"] = every
     cases["reports"] = [words[state.components] for state in every]
@@ -137,6 +138,15 @@ def make_policy(
         regions_of(base).reasons,
         max_failed,
     )
+
+
+def _again(outcome: Outcome) -> Iterator[str]:
+    """Functions that are decided on, and keep their design: its mode is requested again."""
+    if outcome.reasoning is not None:
+        for decision in outcome.reasoning.plan.decisions:
+            grounded = outcome.reasoning.inference.state.grounded(decision.function)
+            if decision.design is not None and decision.design == grounded:
+                yield decision.function
 
 
 def _marks(outcome: Outcome, flipping: Sequence[str]) -> str:

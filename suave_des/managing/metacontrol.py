@@ -7,13 +7,13 @@ kas-lab/suave with its reasoner, 4 February 2023 to 1.5.0.
 """
 
 from collections.abc import Callable, Collection, Hashable
+from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Protocol
 from weakref import WeakKeyDictionary
 
 from suave_des.clock import call_at, call_next, tick_at_or_after
 from suave_des.domain import UNGROUND_MODE, Task
-from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import (
     NO_GROUNDING,
     UNGROUNDED,
@@ -26,9 +26,50 @@ from suave_des.knowledge.state import (
 )
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
-from suave_des.scenario.models import MetacontrolRevision, draw, support
+from suave_des.scenario.models import AnyDistribution, MetacontrolRevision, draw, support
 
-_cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
+
+class Decider(Protocol):
+    """What the loop asks for decisions: the knowledge base's reasoner, or a decision table."""
+
+    def analyze(self, state: KnowledgeState) -> Inference:
+        """Infer what follows in a state."""
+
+    def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
+        """Choose function designs."""
+
+    @property
+    def thresholds(self) -> tuple[float, ...] | None:
+        """The numbers with which measured values are compared; None: it may do more than that."""
+
+    def distinguished(self, measured: Collection[float]) -> Hashable:
+        """What can be distinguished in measured values."""
+
+    @property
+    def expected_attributes(self) -> frozenset[str]:
+        """The quality attributes to wait for."""
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """What the loop works with.
+
+    Attributes:
+        revision: how tasks and diagnostics reach it.
+        period_s: None: cycles begin with events.
+        latency_s: time from the beginning of a cycle to its requests.
+        forgets_recovered: whether a component that has recovered counts as one that never failed
+            once a plan is executed.
+    """
+
+    decider: Decider
+    revision: MetacontrolRevision
+    period_s: float | None
+    latency_s: AnyDistribution
+    forgets_recovered: bool = True
+
+
+_cached: WeakKeyDictionary[Decider, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
     WeakKeyDictionary()
 )
 """What follows and is planned, by symbolic state: missions of one scenario go through the same few
@@ -62,9 +103,10 @@ class Metacontrol(ManagingSubsystem):
 
     def __init__(self, system: System) -> None:
         super().__init__(system)
-        scenario, revision = system.scenario, system.scenario.revision.metacontrol
-        self._revision = revision
-        self._reasoner = system.knowledge()
+        scenario, settings = system.scenario, self.loop_settings()
+        self._settings = settings
+        self._revision = revision = settings.revision
+        self._reasoner = settings.decider
         # In a derived class analyze and plan may depend on more than the state, so their results
         # are not cached.
         methods = type(self).analyze, type(self).plan
@@ -88,17 +130,32 @@ class Metacontrol(ManagingSubsystem):
             else frozenset[str]()
         )
         self._awaited = expected.intersection(system.measurements, scenario.signals)
-        self._longest_s = support(scenario.latencies.inference_s)[1]
-        self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.first_tick_s("metacontrol", self.period_s)
+        self._longest_s = support(settings.latency_s)[1]
+        self.period_s = settings.period_s
+        if self.period_s is not None:
+            self.starts_s = self.first_cycle_s(self.period_s)
         bridge_s = revision.task_bridge_period_s
         self._bridge_phase_s = (
             system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
         )
         self._has_objectives_from_launch = bool(system.functions)
         self._add_objectives((*system.functions, *revision.objectives_at_launch))
-        may_depend_on_more = system.recorded or type(self) is not Metacontrol
+        may_depend_on_more = system.recorded or "depends_on" not in vars(type(self))
         self._is_event_triggered = not may_depend_on_more and self.depends_on is not None
+
+    def loop_settings(self) -> LoopSettings:
+        """Return what the loop works with; called once, before the mission."""
+        scenario = self.system.scenario
+        return LoopSettings(
+            self.system.knowledge(),
+            scenario.revision.metacontrol,
+            scenario.managers.metacontrol.reasoning_period_s,
+            scenario.latencies.inference_s,
+        )
+
+    def first_cycle_s(self, period_s: float) -> float:
+        """Draw when the first cycle begins; called once, before the mission."""
+        return self.system.first_tick_s("metacontrol", period_s)
 
     # The loop.
 
@@ -109,7 +166,7 @@ class Metacontrol(ManagingSubsystem):
             return None
         self._cancelled.clear()
         reasoning = self._analyze_and_plan()
-        if self.system.recorded:
+        if self.system.recorded and self.needs_knowledge:
             self.system.log_state(reasoning.inference.state)
         if self._changes_nothing(reasoning):
             return None
@@ -117,11 +174,11 @@ class Metacontrol(ManagingSubsystem):
 
     def _latency_s(self, began_s: float) -> float:
         """Draw how long the cycle that began at a mission time takes to infer."""
-        latency = self.system.scenario.latencies.inference_s
-        if isinstance(latency, float):
-            return latency
+        latency_s = self._settings.latency_s
+        if isinstance(latency_s, float):
+            return latency_s
         # From the cycle's own stream: a recorded mission goes through more cycles.
-        return draw(latency, self.system.stream(f"metacontrol/inference/{began_s}"))
+        return draw(latency_s, self.system.stream(f"metacontrol/inference/{began_s}"))
 
     def monitor(self) -> None:
         """Read the measured values; components report by themselves, see `diagnostic`."""
@@ -155,9 +212,7 @@ class Metacontrol(ManagingSubsystem):
         """Request the plan's modes after the reasoner's latency; return whether another cycle would
         change nothing.
         """
-        recovered = [
-            component for component, status in self.components.items() if status == RECOVERED
-        ]
+        recovered = self._to_be_forgotten()
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
             for line in sorted(reasoning.inference.statuses - self._recorded_statuses):
@@ -180,6 +235,11 @@ class Metacontrol(ManagingSubsystem):
             return False
         self.monitor()
         return not self.objectives or self._changes_nothing(self._analyze_and_plan())
+
+    def _to_be_forgotten(self) -> list[str]:
+        """Components that have recovered, if they are forgotten."""
+        forgets = self._settings.forgets_recovered
+        return [name for name, status in self.components.items() if forgets and status == RECOVERED]
 
     def _request_modes(self, plan: Plan) -> dict[str, str]:
         """Request the mode of each design of a plan, but for functions that no longer have an
@@ -278,6 +338,7 @@ class Metacontrol(ManagingSubsystem):
         nothing are left out (see `depends_on`), so the plan is made here; what has changed
         since the cycle began counts as well.
         """
+        assert self.period_s is not None  # revisions have metacontrol's
         env, passed_s = self.system.env, self.system.now_s - self.starts_s
         began_s = self.starts_s + passed_s // self.period_s * self.period_s
         ends_s = began_s + self._latency_s(began_s)
@@ -342,7 +403,8 @@ class Metacontrol(ManagingSubsystem):
         """Return whether executing a plan would change nothing, and record nothing."""
         # A latency of a period or more must pass even so: cycles that come due meanwhile are
         # skipped.
-        if RECOVERED in self.components.values() or self._longest_s >= self.period_s:
+        is_late = self.period_s is not None and self._longest_s >= self.period_s
+        if is_late or self._to_be_forgotten():
             return False
         if self.system.recorded:
             if reasoning.inference.statuses - self._recorded_statuses:

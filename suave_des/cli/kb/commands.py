@@ -6,6 +6,7 @@ What reads ontologies or starts Java is imported when a command runs, so that he
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -19,6 +20,7 @@ from suave_des.cli.kb.options import KnowledgeOptions, MaxFailed, ReasonerOption
 from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet, Seed, Workers
 
 if TYPE_CHECKING:
+    from suave_des.kb.difference import MissionDifference
     from suave_des.knowledge.ontology import Ontology
     from suave_des.knowledge.rules import Rule
 
@@ -210,51 +212,48 @@ def diff(
     options: ReasonerOptions,
     mission_options: MissionOptions,
     one: Annotated[
-        Path, typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add.")
+        Path,
+        typer.Argument(
+            metavar="A",
+            help="An ontology, a .swrl file of rules to add, or a decision table: a .csv file, rosa, planta.",
+        ),
     ],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
     max_failed: MaxFailed = 2,
 ) -> None:
-    """Compare two ontologies, or two sets of rules: axioms, decisions, missions.
+    """Compare two ontologies, sets of rules or decision tables: axioms, decisions, missions.
 
     --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
     scenario's. Decisions are compared in every state; missions with the same number use common
     random numbers.
     """
-    from suave_des.kb.difference import compare_axioms, compare_missions, firing_states
-    from suave_des.knowledge.pellet import TimeLimit
+    from suave_des.kb.decision_table import find_table, manager_of
+    from suave_des.kb.difference import compare_axioms, compare_deciders
 
-    both = [options.with_file(file) for file in (one, other)]
+    managers = [manager_of(file) for file in (one, other)]
+    both = [
+        options.with_file(file) if manager is None else options
+        for file, manager in zip((one, other), managers, strict=True)
+    ]
     before, after = (each.knowledge() for each in both)
-    removed, added = compare_axioms(before.base, after.base)
+    removed, added = list[str](), list[str]()
     with counted("states", errors()) as on_count:
-        difference = before.diff(after, max_failed, on_count)
+        if managers == [None, None]:
+            removed, added = compare_axioms(before.base, after.base)
+            difference = before.diff(after, max_failed, on_count)
+        else:
+            base = after if managers[1] is None else before
+            deciders = [
+                knowledge if manager is None else find_table(file)
+                for file, manager, knowledge in zip(
+                    (one, other), managers, (before, after), strict=True
+                )
+            ]
+            difference = compare_deciders(base, deciders, max_failed, on_count)
     missions = None
     last = list[str]()
     if mission_options.missions is not None:
-        replaced = [each.replacements | {"modes_file": mission_options.modes} for each in both]
-        label = "missions with A, then with B"
-        with progress.shown(label, quiet=mission_options.quiet) as on_progress:
-            missions = compare_missions(
-                both[0].scenario,
-                mission_options.missions,
-                *replaced,
-                seed=mission_options.seed,
-                workers=mission_options.workers,
-                on_progress=on_progress,
-            )
-        last = [*missions.lines()]
-        if not missions.changed:
-            firing, states = firing_states(
-                both[0].scenario,
-                mission_options.missions,
-                *replaced,
-                seed=mission_options.seed,
-                limit=TimeLimit(both[0].time_limit, "--time-limit"),
-            )
-            last = [
-                f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"
-            ]
+        missions, last = _compared_missions(both, managers, mission_options)
     if removed or added:
         print(f"axioms and rules: {len(removed)} removed, {len(added)} added")
         print(*(f"  - {text}" for text in removed), *(f"  + {text}" for text in added), sep="\n")
@@ -263,6 +262,42 @@ def diff(
         print()
         print(shown(missions.table(difference)))
         print(*last, sep="\n")
+
+
+def _compared_missions(
+    both: Sequence[ReasonerOptions], tables: Sequence[str | None], options: MissionOptions
+) -> tuple[MissionDifference, list[str]]:
+    """Run the missions of a comparison; return what differs, and last lines about it."""
+    from suave_des.kb.difference import compare_missions, firing_states
+    from suave_des.knowledge.pellet import TimeLimit
+
+    assert options.missions is not None
+    one, other = (each.replacements | {"modes_file": options.modes} for each in both)
+    with progress.shown("missions with A, then with B", quiet=options.quiet) as on_progress:
+        missions = compare_missions(
+            both[0].scenario,
+            options.missions,
+            one,
+            other,
+            managers=[name or "metacontrol" for name in tables],
+            seed=options.seed,
+            workers=options.workers,
+            on_progress=on_progress,
+        )
+    if missions.changed:
+        return missions, [*missions.lines()]
+    if any(tables):
+        return missions, ["no mission differs"]
+    firing, states = firing_states(
+        both[0].scenario,
+        options.missions,
+        one,
+        other,
+        seed=options.seed,
+        limit=TimeLimit(both[0].time_limit, "--time-limit"),
+    )
+    fire = f"rules that only A or B has fire in {firing} of their {states} states"
+    return missions, [f"no mission differs; {fire}"]
 
 
 class _Commands(CommandsUnderHeadings):

@@ -1,0 +1,222 @@
+"""Managers that are decision tables: `table:FILE.csv`, and the shipped ones.
+
+Metacontrol's loop with a table in place of the knowledge base. Form of the files:
+docs/guides/managers.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from functools import cache, lru_cache
+from itertools import product
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, ClassVar
+
+import yaml
+
+from suave_des.domain import BATTERY_LEVEL, THRUSTER_NAMES, WATER_VISIBILITY
+from suave_des.errors import InputError, did_you_mean, line_error, shown
+from suave_des.kb.decision_table import SHIPPED, DecisionTable, read_table
+from suave_des.kb.space import component_reports
+from suave_des.knowledge.state import (
+    NO_GROUNDING,
+    UNGROUNDED,
+    KnowledgeState,
+    ObjectiveState,
+)
+from suave_des.managing.base import AdaptationProcess, ManagingSubsystem, System
+from suave_des.managing.metacontrol import LoopSettings, Metacontrol
+from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, Kind
+from suave_des.resources import find
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import MetacontrolRevision
+
+_AT_ONCE = MetacontrolRevision(
+    task_bridge_period_s=0.0,
+    objectives_at_launch=(),
+    waits_for_first_measurement=False,
+    always_improve=(),
+    improve_when_exceeded=False,
+    ignores_diagnostics_without_objective=False,
+)
+
+
+class TableManager(Metacontrol):
+    """table:FILE.csv: decides as the rows of a table say."""
+
+    needs_knowledge: ClassVar[bool] = False
+    name: ClassVar[str]
+    """The manager's name: table:FILE.csv, or that of a shipped table."""
+
+    @classmethod
+    def _file(cls) -> str:
+        return cls.name.removeprefix("table:")
+
+    @classmethod
+    def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
+        """The table, unless it is shipped."""
+        return () if cls.name == cls._file() else (cls._file(),)
+
+    @classmethod
+    def check(cls, loaded: LoadedScenario) -> None:
+        """Check that the table decides every state that missions can come to."""
+        file = cls._file()
+        path = find(file, SHIPPED) if cls.name == file else loaded.manager_file(cls.name, file)
+        table = opened(path, loaded.manager_settings(cls.name))
+        _check_names(table, loaded)
+        for function in loaded.scenario.needed_functions():
+            for state in _states(table, function, loaded):
+                table.rule(function, state)
+
+    def __init__(self, system: System) -> None:
+        file = self._file()
+        path = find(file, SHIPPED) if self.name == file else system.file(file)
+        self._table = opened(path, system.settings)
+        self._is_event_driven = self._table.settings.trigger == "event"
+        self._subscribes_to = (
+            (Kind.COMPONENT_STATUS, Kind.QA_STATUS)
+            if self._is_event_driven
+            else (Kind.COMPONENT_STATUS,)
+        )
+        self._is_deciding = self._is_due = False
+        super().__init__(system)
+
+    def loop_settings(self) -> LoopSettings:
+        """Return what the loop works with: the table."""
+        scenario, settings = self.system.scenario, self._table.settings
+        revision = scenario.revision.metacontrol if settings.as_metacontrol else _AT_ONCE
+        period_s = settings.period_s or scenario.managers.metacontrol.reasoning_period_s
+        is_given = "latency_s" in settings.model_fields_set
+        if self._is_event_driven:
+            revision = revision.model_copy(update={"executes_plans_of_removed_objectives": False})
+        return LoopSettings(
+            self._table,
+            revision,
+            None if self._is_event_driven else period_s,
+            settings.latency_s if is_given else scenario.latencies.inference_s,
+            settings.forgets_recovered,
+        )
+
+    def first_cycle_s(self, period_s: float) -> float:
+        """Draw when the first decision is made."""
+        timer = "metacontrol" if self._table.settings.as_metacontrol else "table"
+        return self.system.first_tick_s(timer, period_s)
+
+    # Decisions at events; the loop makes the others.
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Update a component's status."""
+        super().diagnostic(diagnostic)
+        self._decide()
+
+    def _add_objectives(self, functions: tuple[str, ...]) -> None:
+        super()._add_objectives(functions)
+        self._decide()
+
+    def _decide(self) -> None:
+        """Decide, if it is at events: now, or when the decision under way is executed."""
+        if self._is_event_driven:
+            self._is_due = True
+            if not self._is_deciding:
+                self._is_deciding = True
+                self.system.env.process(self._deciding())
+
+    def _deciding(self) -> AdaptationProcess:
+        while self._is_due:
+            self._is_due = False
+            if (adaptation := self.adapt()) is not None:
+                yield from adaptation
+        self._is_deciding = False
+
+
+@cache
+def table_manager(file: str) -> type[ManagingSubsystem]:
+    """Make the class of the manager `table:FILE.csv`."""
+    return _named("TableManager", f"table:{file}")
+
+
+def _named(kind: str, name: str) -> type[ManagingSubsystem]:
+    own = {
+        "name": name,
+        "depends_on": Metacontrol.depends_on,  # only the class that defines it is asked
+        "subscribes_to": property(attrgetter("_subscribes_to")),
+        "__doc__": f"{name}: decides as the rows of a table say.",
+    }
+    return type(kind, (TableManager,), own)
+
+
+Rosa = _named("Rosa", "rosa")
+Planta = _named("Planta", "planta")
+
+
+def opened(path: Path, settings: Mapping[str, Any]) -> DecisionTable:
+    """Read a table, once for all missions as long as it is the same.
+
+    Raises:
+        InputError: as read_table.
+    """
+    found = path.stat()
+    return _opened(path, found.st_mtime_ns, found.st_size, yaml.safe_dump(dict(settings)))
+
+
+@lru_cache(maxsize=8)
+def _opened(path: Path, mtime_ns: int, size: int, settings: str) -> DecisionTable:
+    return read_table(path, yaml.safe_load(settings))
+
+
+def _check_names(table: DecisionTable, loaded: LoadedScenario) -> None:
+    """Check that a scenario has what a table names."""
+    modes = loaded.modes
+    for function, designs in table.designs.items():
+        for design, line in designs.items():
+            if function not in modes.functions:
+                remedy = did_you_mean(function, modes.functions)
+                raise line_error(
+                    table.path, line, f"there is no function {shown(function)}", remedy
+                )
+            if design not in modes.modes(function):
+                problem = f"{function} has no mode {shown(design)}"
+                remedy = did_you_mean(design, modes.modes(function))
+                raise line_error(table.path, line, problem, remedy)
+    known = sorted({*loaded.scenario.signals, WATER_VISIBILITY, BATTERY_LEVEL})
+    for name in table.attributes:
+        if name not in known:
+            remedy = did_you_mean(name, known, "measured")
+            raise InputError(f"nothing measures {shown(name)}", file=table.path, remedy=remedy)
+
+
+def _states(
+    table: DecisionTable, function: str, loaded: LoadedScenario
+) -> Iterator[KnowledgeState]:
+    """Yield the states of missions on which the decision on a function can depend."""
+    from suave_des.scenario_knowledge import measured_attributes
+
+    measured = measured_attributes(loaded.scenario)
+    values = [
+        [(name, scale.value(place)) for place in range(len(scale) if name in measured else 1)]
+        for name, scale in table.attributes.items()
+    ]
+    groups = [each for each in table.settings.interchangeable if set(each) <= table.components]
+    failing = {each.thruster for each in loaded.scenario.thruster_events if each.event == "failure"}
+    # one failure, and recovering reports every thruster
+    most = len(THRUSTER_NAMES) if failing else 0
+    reports = [
+        each
+        for each in component_reports(groups, (FAILED, RECOVERED), most)
+        if [status for _, status in each].count(FAILED) <= len(failing)
+    ]
+    related = table.related(function)
+    designs = [(NO_GROUNDING, *table.designs.get(name, ())) for name in related]
+    for known, reported, now in product(product(*values), reports, product(*designs)):
+        groundings = {
+            name: design
+            for name, design in zip(related, now, strict=True)
+            if design != NO_GROUNDING
+        }
+        yield KnowledgeState.of(
+            [ObjectiveState(name, UNGROUNDED) for name in related],
+            groundings=groundings,
+            components=dict(reported),
+            measurements={name: value for name, value in known if value is not None},
+        )

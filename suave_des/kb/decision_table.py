@@ -1,0 +1,488 @@
+"""Decision tables: on the left of each row measured values, reports of components and designs in
+use, on the right designs; as `kb policy --csv` writes them.
+
+A file may begin with lines of YAML, each after a `#`: the settings. Form: docs/guides/managers.md.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cached_property, lru_cache
+from math import isfinite
+from pathlib import Path
+from typing import Final, Literal, NamedTuple
+
+from suave_des.domain import THRUSTER_NAMES
+from suave_des.errors import InputError, line_error, shown
+from suave_des.files import decode, read_bytes
+from suave_des.kb.scale import Scale, TestedRegion, is_in, parse_region
+from suave_des.kb.situations import INCONSISTENT, Outcome, Situation
+from suave_des.kb.space import PolicySpace, Reports
+from suave_des.knowledge.reasoner import Regions
+from suave_des.knowledge.state import (
+    NO_GROUNDING,
+    NONE_LEFT,
+    STAYS,
+    Decision,
+    Inference,
+    KnowledgeState,
+    Plan,
+    Reasoning,
+    exact,
+    grounding_name,
+    objective_name,
+)
+from suave_des.resources import find, shipped_folder
+from suave_des.scenario.models import DelayDistribution, Period, Strict
+from suave_des.scenario.yamlfile import parse_yaml, validated
+
+_NOW, _THEN, _COMPONENTS, _AGAIN = "_now", "_then", "components", "again"
+_ANY: Final = "any"
+_NO_RESULT: Final = ("states", "statuses", "marks", "problem")
+"""Columns of a policy that decide nothing."""
+_LIMIT_BYTES: Final = 100_000_000
+_MOST_CELLS: Final = 2_000_000
+_MEASURED: Final[TestedRegion] = ((">", Decimal("-Infinity")),)
+SHIPPED: Final = "scenarios/managers"
+"""Kind of file of the shipped tables."""
+
+
+class TableSettings(Strict):
+    """The settings at the beginning of a table."""
+
+    trigger: Literal["period", "event"] = "period"
+    """When it decides: at ticks of a period, or when a task, component or measured value changes."""
+    period_s: Period | None = None
+    """Time between decisions; by default managers.metacontrol.reasoning_period_s."""
+    latency_s: DelayDistribution = 0.0
+    """Time from a decision to its requests; by default latencies.inference_s."""
+    order: tuple[str, ...] = ()
+    """Functions in the order of their requests; the others follow by name."""
+    functions_at_a_time: int | None = None
+    """How many functions a decision changes; the others wait for the next one."""
+    interchangeable: tuple[tuple[str, ...], ...] = (THRUSTER_NAMES,)
+    """Groups of components of which only the number with each status counts."""
+    forgets_recovered: bool = True
+    """Whether a component that has recovered counts as one that never failed after the decision."""
+    as_metacontrol: bool = True
+    """Whether tasks and reports reach it as they reach metacontrol in the scenario's revision, and
+    its period begins like metacontrol's; else it has them at once, and any phase.
+    """
+
+
+class _Rule(NamedTuple):
+    """What a row says of one function: `others` are the designs of other functions that it asks
+    for.
+    """
+
+    others: Mapping[str, str]
+    then: str
+    line: int
+
+
+#: What components report, and the design in use, "" where there is no objective; None: any.
+_Asked = tuple[Reports | None, str | None]
+#: By what is asked: rules that differ in other functions' designs.
+_Cell = dict[_Asked, list[_Rule]]
+
+
+class _Row(NamedTuple):
+    line: int
+    regions: tuple[tuple[TestedRegion, ...], ...]
+    """Of each attribute; empty: whatever it is."""
+    reports: Reports | None
+    now: Mapping[str, str]
+    then: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class DecisionTable:
+    """A decision table, with which metacontrol's loop can work in place of a reasoner.
+
+    Attributes:
+        attributes: quality attributes with the places of their values.
+        components: those of which reports count.
+        designs: that are in a row, with its line, by function.
+    """
+
+    path: Path
+    settings: TableSettings
+    attributes: Mapping[str, Scale]
+    components: frozenset[str]
+    designs: Mapping[str, Mapping[str, int]]
+    _cells: Mapping[str, Mapping[tuple[int, ...], _Cell]]
+
+    def reports(self, components: Iterable[tuple[str, str]]) -> Reports:
+        """What components report, with the first of each group in the place of any other."""
+        return _representatives(self.settings.interchangeable, components, self.components)
+
+    def related(self, function: str) -> tuple[str, ...]:
+        """Functions on whose designs the decisions on a function depend: itself, and maybe others."""
+        rules = itertools.chain.from_iterable(
+            itertools.chain.from_iterable(each.values())
+            for each in self._cells.get(function, {}).values()
+        )
+        others = {name for rule in rules for name in rule.others}
+        return function, *sorted(others - {function})
+
+    def rule(self, function: str, state: KnowledgeState) -> tuple[str, int]:
+        """What happens to a function's design in a state, with the line that says so.
+
+        Raises:
+            InputError: no row says so.
+        """
+        if function not in self._cells:
+            remedy = f"add a column {function}{_THEN}"
+            raise InputError(f"no row decides {function}", file=self.path, remedy=remedy)
+        measured = dict(state.measurements)
+        places = [scale.place(measured.get(name)) for name, scale in self.attributes.items()]
+        found = self._found(function, state, places)
+        if found is not None:
+            return found.then, found.line
+        values = zip(self.attributes.items(), places, strict=True)
+        words = [f"{name} {scale.text(place)}" for (name, scale), place in values]
+        reports = "; ".join(f"{name}={status}" for name, status in self.reports(state.components))
+        words += [f"components {reports or 'without a report'}"] if self.components else []
+        nows = (
+            f"{name} now {_now(state, name) or '(not needed)'}" for name in self.related(function)
+        )
+        beside = sorted(self._beside(function, state, places))
+        raise InputError(
+            f"no row decides {function} where {', '.join([*nows, *words])}",
+            file=self.path,
+            place=f"beside line {' and '.join(map(str, beside[:2]))}" if beside else None,
+            remedy="add one, or let another cover this; of a knowledge base kb policy --max-failed 6"
+            " writes all rows",
+        )
+
+    def _found(self, function: str, state: KnowledgeState, places: Sequence[int]) -> _Rule | None:
+        cell = self._cells[function].get(tuple(places), {})
+        reports, now = self.reports(state.components), _now(state, function)
+        for asked in itertools.product((reports, None), (now, None)):
+            for rule in cell.get(asked, ()):
+                if all(_now(state, name) == design for name, design in rule.others.items()):
+                    return rule
+        return None
+
+    def _beside(self, function: str, state: KnowledgeState, places: Sequence[int]) -> Iterator[int]:
+        """Lines that decide in the ranges next to a place."""
+        for number, step in itertools.product(range(len(places)), (-1, 1)):
+            other = list(places)
+            other[number] += step
+            if (found := self._found(function, state, other)) is not None:
+                yield found.line
+
+    # As metacontrol's loop asks a reasoner.
+
+    def analyze(self, state: KnowledgeState) -> Inference:
+        """Infer nothing."""
+        objectives = {name: objective_name(name) for name, *_ in state.objectives}
+        groundings = {design: grounding_name(design) for _, design in state.groundings}
+        return Inference(state, lambda _: frozenset(), frozenset(), objectives, groundings)
+
+    def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
+        """Look the decisions up: as many as are made at a time."""
+        decisions, changes = [], 0
+        for decision in self._decisions(inference.state):
+            if decision.design not in (None, inference.state.grounded(decision.function)):
+                changes += 1
+                if changes > (self.settings.functions_at_a_time or changes):
+                    continue
+            decisions.append(decision)
+        return Plan(tuple(decisions))
+
+    def outcome(self, situation: Situation) -> Outcome:
+        """All that is decided in a situation."""
+        decisions = tuple(self._decisions(situation.state))
+        return Outcome(Reasoning(self.analyze(situation.state), Plan(decisions)))
+
+    def _decisions(self, state: KnowledgeState) -> Iterator[Decision]:
+        order = {name: place for place, name in enumerate(self.settings.order)}
+        asked = [each.function for each in state.objectives]
+        for function in sorted(asked, key=lambda name: (order.get(name, len(order)), name)):
+            then, line = self.rule(function, state)
+            if then != STAYS:
+                design = None if then == NONE_LEFT else then
+                yield Decision(function, design, f"line {line} of {self.path.name}")
+
+    @cached_property
+    def _regions(self) -> Regions:
+        numbers = {number for scale in self.attributes.values() for number in scale.numbers}
+        return Regions(tuple(sorted(numbers)), ())
+
+    @property
+    def thresholds(self) -> tuple[float, ...]:
+        """The numbers with which measured values are compared."""
+        return self._regions.bounds[1:-1]
+
+    def distinguished(self, measured: Collection[float]) -> tuple[object, ...]:
+        """What can be distinguished in measured values."""
+        if not all(map(isfinite, measured)):
+            return tuple(measured)
+        return tuple(map(self._regions.around, measured))
+
+    @property
+    def expected_attributes(self) -> frozenset[str]:
+        """The quality attributes that it asks for."""
+        return frozenset(self.attributes)
+
+    @property
+    def space(self) -> PolicySpace:
+        """What it tells apart, for a comparison with others."""
+        groups = [each for each in self.settings.interchangeable if set(each) & self.components]
+        alone = sorted(self.components.difference(*groups))
+        statuses = {
+            status
+            for cells in self._cells.values()
+            for cell in cells.values()
+            for reports, _ in cell
+            for _, status in reports or ()
+        }
+        return PolicySpace(
+            tuple(sorted(self.attributes)),
+            self._regions.thresholds,
+            (*groups, *((name,) for name in alone)),
+            tuple(sorted(statuses)),
+            tuple(sorted(self._cells)),
+        )
+
+
+def _now(state: KnowledgeState, function: str) -> str:
+    """The design in use, as tables have it: "" for a function without objective."""
+    if all(each.function != function for each in state.objectives):
+        return ""
+    return state.grounded(function) or NO_GROUNDING
+
+
+def _representatives(
+    groups: Iterable[Sequence[str]], components: Iterable[tuple[str, str]], known: Collection[str]
+) -> Reports:
+    reported = {name: status for name, status in components if name in known}
+    found = dict[str, str]()
+    for group in groups:
+        statuses = sorted(reported.pop(name) for name in group if name in reported)
+        found |= dict(zip(group, statuses, strict=False))
+    return tuple(sorted((found | reported).items()))
+
+
+# Reading.
+
+
+def manager_of(name: Path) -> str | None:
+    """The manager that decides by the table of a name, which is a CSV file or shipped; None: it is
+    something else.
+    """
+    if name.suffix == ".csv":
+        return f"table:{name}"
+    is_shipped = (shipped_folder(SHIPPED) / f"{name}.csv").is_file() and not name.exists()
+    return str(name) if is_shipped else None
+
+
+def find_table(name: str | Path) -> DecisionTable:
+    """Read the table of a file, or a shipped one; raises as find and read_table do."""
+    return read_table(find(name, SHIPPED))
+
+
+def read_table(path: Path, changes: Mapping[str, object] | None = None) -> DecisionTable:
+    """Read a table, with some of its settings changed.
+
+    Raises:
+        InputError: with the line: the file is no table, or two of its rows decide one state
+            differently.
+    """
+    text = decode(path, read_bytes(path, _LIMIT_BYTES))
+    lines = text.splitlines(keepends=True)
+    head = list(itertools.takewhile(lambda line: line.startswith("#"), lines))
+    settings = _settings(path, head, changes or {})
+    header, rows = _content(path, lines[len(head) :], len(head))
+    read = [
+        _row(path, line, dict(zip(header, cells, strict=True)), settings) for line, cells in rows
+    ]
+    if not read:
+        remedy = "write a row for each region, as suave-des kb policy --csv does"
+        raise line_error(path, len(head) + 1, "has no rows below its header", remedy)
+    attributes = {}
+    for number, name in enumerate(_attributes(header)):
+        ends = {end for row in read for region in row.regions[number] for _, end in region}
+        attributes[name] = Scale(tuple(sorted(filter(Decimal.is_finite, ends))))
+    named = {name for row in read for name, _ in row.reports or ()}
+    groups = [each for each in settings.interchangeable if set(each) & named]
+    return DecisionTable(
+        path,
+        settings,
+        attributes,
+        frozenset(named.union(*groups)),
+        _designs(read),
+        _cells(path, read, list(attributes.values())),
+    )
+
+
+def _settings(path: Path, head: Sequence[str], changes: Mapping[str, object]) -> TableSettings:
+    text = "".join(line[1:].removeprefix(" ") for line in head)
+    if any(line.strip() and not line.startswith("#") for line in text.splitlines()):
+        layer = parse_yaml(text, path)
+    else:
+        layer = parse_yaml("{}", path)
+    layer.data.update(changes)
+    return validated(layer, TableSettings)
+
+
+def _content(
+    path: Path, lines: Sequence[str], above: int
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header, and the rows with their lines."""
+    reader = csv.reader(lines, strict=True)
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        rows = [(above + reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except csv.Error as error:
+        remedy = "write cells with commas between them"
+        raise line_error(
+            path, above + reader.line_num, f"is not valid CSV: {error}", remedy
+        ) from None
+    for name in header:
+        if header.count(name) > 1 or not name:
+            problem = f"the column {shown(name)} is there twice" if name else "a column has no name"
+            raise line_error(path, above + 1, problem, "give each column a name of its own")
+    if not any(name.endswith(_THEN) for name in header):
+        problem = "no column says what is decided"
+        raise line_error(path, above + 1, problem, f"add one such as f_maintain_motion{_THEN}")
+    for line, row in rows:
+        if len(row) != len(header):
+            problem = f"has {len(row)} cells, but there are {len(header)} columns"
+            raise line_error(path, line, problem, "write a cell, if only an empty one, for each")
+    return header, rows
+
+
+def _attributes(header: Iterable[str]) -> list[str]:
+    others = (_COMPONENTS, _AGAIN, *_NO_RESULT)
+    return [name for name in header if name not in others and not name.endswith((_NOW, _THEN))]
+
+
+def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSettings) -> _Row:
+    def by_function(ending: str) -> dict[str, str]:
+        found = {name: cell.strip() for name, cell in cells.items() if name.endswith(ending)}
+        return {name.removesuffix(ending): cell for name, cell in found.items() if cell != _ANY}
+
+    regions = []
+    for name in _attributes(cells):
+        try:
+            regions.append(_parts(cells[name].strip()))
+        except InputError as error:
+            raise InputError(
+                error.problem, file=path, place=f"line {line}, {name}", remedy=error.remedy
+            ) from None
+    then = {name: design for name, design in by_function(_THEN).items() if design}
+    if not then:
+        remedy = f"write a design, {STAYS} or {shown(NONE_LEFT)} in a column that ends in {_THEN}"
+        raise line_error(path, line, "decides nothing", remedy)
+    for function, design in then.items():
+        if design in (INCONSISTENT, NO_GROUNDING):
+            problem = f"{function}: {shown(design)} is no decision"
+            raise line_error(path, line, problem, f"write a design, {STAYS} or {shown(NONE_LEFT)}")
+    reports = _reports(path, line, cells.get(_COMPONENTS, _ANY), settings)
+    now = by_function(_NOW)
+    for function in map(str.strip, cells.get(_AGAIN, "").split(";")):
+        if then.get(function) == STAYS and function in now:
+            then[function] = now[function]
+    return _Row(line, tuple(regions), reports, now, then)
+
+
+@lru_cache(maxsize=4096)  # a table has the same few thousands of times
+def _parts(text: str) -> tuple[TestedRegion, ...]:
+    """Read the regions in a cell, such as "not measured or < 1.25"; none: whatever it is."""
+    found = []
+    for part in filter(None, text.split(" or ")):
+        region = _MEASURED if part == _ANY else parse_region(part)
+        if region is None:
+            number = exact(part)
+            region = ((">=", number), ("<=", number))
+        found.append(region)
+    return tuple(found)
+
+
+def _reports(path: Path, line: int, text: str, settings: TableSettings) -> Reports | None:
+    if text.strip() == _ANY:
+        return None
+    pairs = [part.partition("=") for part in filter(None, map(str.strip, text.split(";")))]
+    for name, sign, status in pairs:
+        if not (name and sign and status):
+            remedy = (
+                "write for instance c_thruster_1=FALSE; c_thruster_2=RECOVERED, any, or nothing"
+            )
+            raise line_error(path, line, f"components: {shown(text)} is no report", remedy)
+    reported = [(name.strip(), status.strip()) for name, _, status in pairs]
+    known = [name for name, _ in reported]
+    return _representatives(settings.interchangeable, reported, known)
+
+
+def _designs(rows: Iterable[_Row]) -> dict[str, dict[str, int]]:
+    found: dict[str, dict[str, int]] = {}
+    for row in rows:
+        for function, design in (*row.then.items(), *row.now.items()):
+            if design not in ("", STAYS, NONE_LEFT, NO_GROUNDING):
+                found.setdefault(function, {}).setdefault(design, row.line)
+    return found
+
+
+def _cells(
+    path: Path, rows: Iterable[_Row], scales: Sequence[Scale]
+) -> dict[str, dict[tuple[int, ...], _Cell]]:
+    found: dict[str, dict[tuple[int, ...], _Cell]] = {}
+    number = 0
+    for row in rows:
+        inside = [_places(*each) for each in zip(row.regions, scales, strict=True)]
+        for places, (function, then) in itertools.product(
+            itertools.product(*inside), row.then.items()
+        ):
+            number += 1
+            if number > _MOST_CELLS:
+                remedy = "compare measured values with fewer numbers"
+                raise line_error(path, row.line, f"more than {_MOST_CELLS:,} cells", remedy)
+            others = {name: now for name, now in row.now.items() if name != function}
+            cell = found.setdefault(function, {}).setdefault(places, {})
+            asked = row.reports, row.now.get(function)
+            cell.setdefault(asked, []).append(_Rule(others, then, row.line))
+    for function, cells in found.items():
+        for cell in cells.values():
+            _check_overlaps(path, function, cell)
+            for asked, rules in cell.items():
+                if len({rule.then for rule in rules}) == 1:  # whatever the others are
+                    cell[asked] = [rules[0]._replace(others={})]
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _places(regions: Sequence[TestedRegion], scale: Scale) -> tuple[int, ...]:
+    values = [scale.value(place) for place in range(len(scale))]
+    return tuple(
+        place
+        for place, value in enumerate(values)
+        if not regions or any(is_in(region, value) for region in regions)
+    )
+
+
+def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
+    """Check that no two rows decide one state differently."""
+    for one, rules in cell.items():
+        wider = set(itertools.product({one[0], None}, {one[1], None}))
+        if None in one:  # (any, design) and (reports, any) have states in common, too
+            wider |= {each for each in cell if _agree(one, each)}
+        for rule, other in itertools.product(
+            rules, itertools.chain.from_iterable(cell.get(each, ()) for each in wider)
+        ):
+            if rule.then == other.then:
+                continue
+            if all(other.others.get(name, now) == now for name, now in rule.others.items()):
+                first, second = sorted((rule, other), key=lambda each: each.line)
+                problem = f"{function}: {second.then} here, and {first.then} in line {first.line}, for one state"
+                remedy = "let the two rows differ in what they ask for; components that count alone are missing from the setting interchangeable"
+                raise line_error(path, second.line, problem, remedy)
+
+
+def _agree(one: _Asked, other: _Asked) -> bool:
+    return all(a is None or b is None or a == b for a, b in zip(one, other, strict=True))
