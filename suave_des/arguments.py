@@ -10,14 +10,14 @@ import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, Final, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from suave_des.errors import InputError, shown, unknown
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
-_KINDS: Final[Mapping[str, tuple[Any, str]]] = {
+_KINDS: Mapping[str, tuple[Any, str]] = {
     "int": (Integral, "a whole number"),
     "float": (Real, "a number"),
     "bool": (bool, "True or False"),

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import rdflib
 from rdflib.namespace import RDFS
@@ -43,9 +43,9 @@ from suave_des.scenario_knowledge import open_base
 if TYPE_CHECKING:  # or every command of kb would load the parser
     from rdflib.plugins.sparql.sparql import Query
 
-_UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
-_MODEL_NAME: Final = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
-_PREFIXES: Final = {
+_UNNAMED = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
+_MODEL_NAME = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
+_PREFIXES = {
     name: PREFIXES[name]
     for name in ("suave", "tomasys", "mros", "rdf", "rdfs", "owl", "xsd", "swrl")
 }
@@ -245,8 +245,7 @@ class KnowledgeBase:
         Raises:
             KnowledgeError: as infer.
         """
-        heads = (atom for rule in self.base.content.enabled_rules for atom in rule.head)
-        if not any(atom.predicate in IDENTITIES for atom in heads):
+        if not any(atom.predicate in IDENTITIES for atom in self.base.content.conclusions):
             return ()
         given = self.base.assertions(state)
 

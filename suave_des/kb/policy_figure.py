@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from itertools import chain, cycle
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from suave_des.errors import InputError
 from suave_des.kb.policy import FLIP_FLOP, Policy, function_table
@@ -17,17 +17,17 @@ from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publica
 from suave_des.tables import Table
 
 #: Units of measured values; those of a user's own attributes are not known.
-_UNITS: Final = {"water_visibility": "m", "battery_level": "share of a full battery"}
-_FIXED: Final = {
+_UNITS = {"water_visibility": "m", "battery_level": "share of a full battery"}
+_FIXED = {
     **MODE_COLOURS,
     INCONSISTENT: "#B00020",
     NONE_LEFT: "#D9D9D9",
     NO_GROUNDING: "#FFFFFF",
 }
-_LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
-_ROW_IN: Final = 0.26
-_MOST_ROWS: Final = 60
-_LABEL_LETTERS: Final = 52
+_LEGEND = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
+_ROW_IN = 0.26
+_MOST_ROWS = 60
+_LABEL_LETTERS = 52
 
 
 def draw_policy(policy: Policy, path: Path) -> None:

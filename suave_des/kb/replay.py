@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.explain import Tracer
@@ -20,7 +20,7 @@ from suave_des.knowledge.state import NONE_LEFT, STAYS, KnowledgeState
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 
-_UNCHANGED: Final = dict.fromkeys((STAYS, NONE_LEFT), "no change")
+_UNCHANGED = dict.fromkeys((STAYS, NONE_LEFT), "no change")
 
 
 FIRES, DECIDES, CONTRADICTS = "fires", "decides", "contradicts"

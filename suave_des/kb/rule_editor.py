@@ -15,7 +15,6 @@ import stat
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 from xml.parsers import expat
 
 from lxml import etree
@@ -40,13 +39,13 @@ from suave_des.knowledge.rdf import (
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
-_TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
-_MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
-_PREFIXES: Final = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
+_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
+_MARK = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
+_PREFIXES = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
 _DESCRIPTION, _END = f"{{{RDF}}}Description", "</rdf:Description>"
 _TYPE, _VARIABLE, _BUILTIN = f"{{{RDF}}}type", SWRL + "Variable", SWRL + "Builtin"
-_NODE_ID: Final = f"{{{RDF}}}nodeID"
-_LANGUAGE: Final = "{http://www.w3.org/XML/1998/namespace}lang"
+_NODE_ID = f"{{{RDF}}}nodeID"
+_LANGUAGE = "{http://www.w3.org/XML/1998/namespace}lang"
 _Span = tuple[int, int]
 
 

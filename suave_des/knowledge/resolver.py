@@ -20,7 +20,6 @@ import posixpath
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 from urllib.parse import urldefrag, urljoin, urlsplit
 from urllib.request import url2pathname
 
@@ -39,11 +38,11 @@ from suave_des.knowledge.ontology_file import (
 from suave_des.knowledge.rdf import MROS, TOMASYS, local_name
 from suave_des.resources import shipped_folder
 
-_ENDINGS: Final = (".owl", ".rdf", ".xml", *TURTLE_ENDINGS)
-_CATALOG: Final = "catalog-v001.xml"
-_CATALOG_ENTRY: Final = "{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"
-_SHIPPED: Final = ("tomasys", "mros", "suave", "suave_extended")
-_BESIDE: Final = "give the imported ontology's file too, or put it beside this one"
+_ENDINGS = (".owl", ".rdf", ".xml", *TURTLE_ENDINGS)
+_CATALOG = "catalog-v001.xml"
+_CATALOG_ENTRY = "{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"
+_SHIPPED = ("tomasys", "mros", "suave", "suave_extended")
+_BESIDE = "give the imported ontology's file too, or put it beside this one"
 
 
 @dataclass(frozen=True)

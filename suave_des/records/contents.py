@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Self, TypeVar, get_type_hints
+from typing import Annotated, Any, Self, TypeVar, get_type_hints
 
 from pydantic import (
     BaseModel,
@@ -27,7 +27,7 @@ from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import problem_and_remedy
 
-GREATEST: Final = 1e12
+GREATEST = 1e12
 """Of numbers, as in scenarios."""
 _Model = TypeVar("_Model", bound=BaseModel)
 

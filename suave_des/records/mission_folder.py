@@ -18,7 +18,7 @@ from dataclasses import astuple, dataclass, field, fields
 from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -47,8 +47,8 @@ from suave_des.scenario.models import Scenario
 if TYPE_CHECKING:
     import pandas
 
-KNOWLEDGE_FILE: Final = "knowledge.jsonl"
-CAMPAIGN_KNOWLEDGE_FILE: Final = "knowledge_states.jsonl"
+KNOWLEDGE_FILE = "knowledge.jsonl"
+CAMPAIGN_KNOWLEDGE_FILE = "knowledge_states.jsonl"
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
 EVENT_COLUMNS = tuple(field.name for field in fields(Event))
 TRAJECTORY_COLUMNS = tuple(

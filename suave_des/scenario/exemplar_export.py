@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -29,9 +29,9 @@ from suave_des.scenario.yamlfile import Layer, Location, parse_yaml
 
 MISSION_FILE, RUNNER_FILE = "mission_config.yaml", "runner_config.yml"
 MANAGERS = ("none", "random", "metacontrol", *TREES.values())
-_EVENTS: Final = "thruster_events"
+_EVENTS = "thruster_events"
 _NOT_COMPARED = ("name", "description", "campaign", "scenario")
-_DIGITS: Final = 9
+_DIGITS = 9
 """Decimals without rounding errors of differences."""
 
 

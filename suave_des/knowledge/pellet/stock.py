@@ -12,7 +12,7 @@ import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import Any
 
 import owlready2
 import owlready2.reasoning
@@ -35,14 +35,14 @@ from suave_des.knowledge.rdf import (
     term_of,
 )
 
-_PLAIN: Final = RDF_IRI + "PlainLiteral"
-_STATE_IRI: Final = "urn:suave-des:state"
+_PLAIN = RDF_IRI + "PlainLiteral"
+_STATE_IRI = "urn:suave-des:state"
 #: Literals of N-Triples, and IRIs that come back otherwise from Pellet's output, which owlready2
 #: reads: there Pellet writes apostrophes and characters beyond U+FFFF with escapes.
-_LITERAL_OR_ODD_IRI: Final = re.compile(
+_LITERAL_OR_ODD_IRI = re.compile(
     r"""("(?:[^"\\]|\\.)*")|<([^<>]*['\U00010000-\U0010ffff][^<>]*)>"""
 )
-_STAND_IN: Final = "urn:suave-des:name:"
+_STAND_IN = "urn:suave-des:name:"
 
 
 class StockPellet:
