@@ -156,8 +156,8 @@ def read_json(path: Path) -> Any:
     return parse_json(decode(path, read_bytes(path)), path)
 
 
-def parse_json(text: str, path: Path, place: str | None = None) -> Any:
-    """Return what a JSON text stands for, which is from a file or a place in it.
+def parse_json(text: str, path: Path) -> Any:
+    """Return what a JSON text stands for, which is from a file.
 
     Raises:
         InputError: it is not JSON, or has a number that is not finite.
@@ -166,7 +166,7 @@ def parse_json(text: str, path: Path, place: str | None = None) -> Any:
         return json_value(text, _finite)
     except ValueError as error:
         raise InputError(
-            f"is not JSON: {error}", file=path, place=place, remedy="restore it, or make it anew"
+            f"is not JSON: {error}", file=path, remedy="restore it, or make it anew"
         ) from None
 
 
@@ -345,13 +345,10 @@ def _check_family(folder: Path, family: str, entries: Collection[str]) -> None:
 def _check_replaced(folder: Path, family: str, entries: Collection[str], noted: Noted) -> None:
     """Check that all that would be replaced in a folder is the project's, and unchanged."""
     listing = LISTINGS[family]
-    own = own_files(folder, listing, noted)
-    about: Any = {LISTED: {}}
-    if listing in entries:
-        about = read_json(folder / listing)
+    about = read_json(folder / listing) if listing in entries else {LISTED: {}}
     problem = f"has {listing}, which suave-des did not write"
     if isinstance(about, dict) and LISTED in about:
-        known = (*own, *DERIVED, listing, "campaign.sqlite")
+        known = (*own_files(folder, listing, noted), *DERIVED, listing, "campaign.sqlite")
         others = [name for name in FAMILIES[family] if name in entries and name not in known]
         if not others:
             return

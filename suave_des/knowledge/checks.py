@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import chain
+from itertools import chain, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +44,7 @@ from suave_des.knowledge.rules.files import (
     about_rule,
     looked_up,
     rule_problems,
+    variable_uses,
 )
 from suave_des.resources import shipped_folder, shown_name
 
@@ -180,6 +181,10 @@ class Material:
         ontologies = self.subject.ontologies or [self.base.sources[0].path]
         given = {path.resolve() for path in (*ontologies, *self.subject.rules)}
         return rule.file.resolve() in given and not self.is_of_metamodel(rule)
+
+    def measures(self, attribute: str) -> bool:
+        """Whether missions measure a quality attribute, or that is not checked."""
+        return self.subject.measured is None or attribute in self.subject.measured
 
     def about(self, level: Level, name: str, message: str, remedy: str | None = None) -> Finding:
         """Make a finding about the thing of a name."""
@@ -413,12 +418,9 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
 
 def values_that_are_not_used(material: Material) -> Iterator[Finding]:
     """Find values that ontologies give of measurements, in whose place missions have others."""
-    measured = material.subject.measured
-    if measured is None:
-        return
     valued = rdf.subjects(material.content.triples, rdf.HAS_VALUE)
     for name, iri in material.base.model.measurements.items():
-        if iri in valued and name not in measured:
+        if iri in valued and not material.measures(name):
             problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
             yield material.about(Level.WARN, local_name(iri), problem, "measure it in the scenario")
 
@@ -451,14 +453,10 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
                 yield material.about(
                     Level.NOTE, name, f"{nothing}, so it has none in missions", remedy
                 )
-    expected = _expected(material.base.model)
-    for name in sorted(
-        expected.difference(expected if subject.measured is None else subject.measured)
-    ):
-        problem = (
-            f"missions do not measure {name}, so what designs expect of it is compared with nothing"
-        )
-        yield material.about(Level.NOTE, name, problem)
+    for name in sorted(_expected(material.base.model)):
+        if not material.measures(name):
+            problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+            yield material.about(Level.NOTE, name, problem)
 
 
 def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
@@ -682,7 +680,6 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
         return
     of_groundings = _without_value_in_groundings(material)
     stated = {attribute for _, attribute in rdf.links(content.triples, rdf.IS_QA_TYPE)}
-    measured = material.subject.measured
     for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
         for atom, attribute in attributes_asked(rule):
@@ -690,7 +687,7 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
             if atom.arguments[0] in held:
                 if name in of_groundings:
                     yield rule, atom, *of_groundings[name]
-            elif measured is not None and name not in measured and attribute not in stated:
+            elif not material.measures(name) and attribute not in stated:
                 problem = f"missions do not measure {name}, and no ontology has a value of it"
                 yield rule, atom, problem, None
 
@@ -703,7 +700,6 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
     if rdf.HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
         return {}
     estimated = frozenset().union(*model.estimated.values())
-    measured = model.attributes if material.subject.measured is None else material.subject.measured
     found: dict[str, tuple[str, str | None]] = {}
     for name in model.attributes:
         if name not in estimated:
@@ -711,7 +707,7 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
                 f"no function design has an estimate of {name}, so no grounding has a value of it"
             )
             found[name] = problem, f"add a hasQAestimation of type {name} to a design"
-        elif name not in measured:
+        elif not material.measures(name):
             problem = f"missions do not measure {name}, so no grounding has a value of it"
             found[name] = problem, None
     return found
@@ -806,25 +802,23 @@ def misspelt_variables(material: Material) -> Iterator[Finding]:
     for rule in material.rules:
         places: dict[str, list[Place | None]] = defaultdict(list)
         values: dict[str, set[bool]] = defaultdict(set)
-        for atom in rule.atoms:
-            for number, term in enumerate(atom.arguments):
-                if isinstance(term, Variable):
-                    values[term.name].add(atom.takes_value(number))
-                    places[term.name].append(atom.place(number))
-        earlier: list[str] = []
-        for name, where in places.items():
-            if len(where) == 1:
-                near = [each for each in places if values[each] & values[name]]
-                often = [each for each in near if len(places[each]) > 1]
-                # One that occurs more often, else one that occurs before.
-                meant = _near(name, often) or _near(
-                    name, (each for each in earlier if each in near)
-                )
-                if meant is not None:
-                    problem = f"?{name} occurs only here, and is another variable than ?{meant}"
-                    remedy = f"did you mean ?{meant}?"
-                    yield material.suspicious(rule, where[0], problem, remedy)
-            earlier.append(name)
+        for atom, number, name in variable_uses(rule.atoms):
+            values[name].add(atom.takes_value(number))
+            places[name].append(atom.place(number))
+        for name, (place, *more) in places.items():
+            alike = {each: places[each] for each in places if values[each] & values[name]}
+            meant = None if more else _meant(name, alike)
+            if meant is not None:
+                problem = f"?{name} occurs only here, and is another variable than ?{meant}"
+                yield material.suspicious(rule, place, problem, f"did you mean ?{meant}?")
+
+
+def _meant(name: str, alike: Mapping[str, Sequence[Place | None]]) -> str | None:
+    """The variable, of some with their places, whose name one is probably a misspelling of: one
+    that occurs more often, else one that occurs before.
+    """
+    often = (each for each, places in alike.items() if len(places) > 1)
+    return _near(name, often) or _near(name, takewhile(name.__ne__, alike))
 
 
 def _near(name: str, names: Iterable[str]) -> str | None:

@@ -21,7 +21,7 @@ from typing import NamedTuple, TypeVar
 from rdflib import Literal, URIRef
 from rdflib.term import Node
 
-from suave_des.knowledge.state import Fact, Value
+from suave_des.knowledge.state import Fact, Value, plain_text
 
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
@@ -124,7 +124,7 @@ WHOLE = terms(
 EXACT = WHOLE | {XSD + "decimal"}
 #: Datatypes of numbers.
 NUMERIC = EXACT | {XSD + "float", XSD + "double"}
-_DECIMAL = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
+_DECIMAL = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*")
 _WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,400}")
 _FLOAT = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
 #: How values of a datatype are written; rdflib, which takes more for them, knows the other
@@ -216,10 +216,8 @@ def canonical(value: _Term) -> _Term:
     if isinstance(value, str):
         return value
     text = value.text.strip()
-    if value.datatype == XSD + "decimal" and (found := _DECIMAL.fullmatch(text)):
-        sign, whole, part = found.groups()
-        text = (whole.lstrip("0") or "0") + (f".{part.rstrip('0')}" if part.rstrip("0") else "")
-        return Lit(f"-{text}" if sign == "-" and text != "0" else text, value.datatype)
+    if value.datatype == XSD + "decimal" and _DECIMAL.fullmatch(text):
+        return Lit(plain_text(Decimal(text) or Decimal(0)), value.datatype)
     if value.datatype in EXACT and _WHOLE_NUMBER.fullmatch(text):
         return Lit(str(int(text)), XSD + "integer")
     if value.datatype in (XSD + "double", XSD + "float") and _FLOAT.fullmatch(text):
@@ -235,7 +233,7 @@ def for_pellet(value: Lit) -> Lit:
     Pellet compares the texts of decimals, and takes one without a decimal place for an integer.
     Stock owlready2 gives it these forms, too.
     """
-    if value.datatype != XSD + "decimal" or _DECIMAL.fullmatch(value.text.strip()) is None:
+    if value.datatype != XSD + "decimal" or not _DECIMAL.fullmatch(value.text.strip()):
         return value
     text = canonical(value).text
     return Lit(text if "." in text else f"{text}.0", value.datatype)

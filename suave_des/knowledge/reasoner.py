@@ -181,11 +181,14 @@ def _reasons_of(rule: Rule, carriers: Collection[str]) -> Iterator[str]:
             yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
         if atom.kind == "range" or atom.expression:
             yield f"rule {rule.name} asks for a datatype or a class expression"
-    asking = [atom for atom in rule.body if atom.predicate in carriers]
-    measured = {term for atom in asking for term in atom.arguments[1:]}
     for name in sorted({name for atom in rule.head for name in atom.variables()}):
-        if Variable(name) in measured:
+        if _is_measured(name, rule, carriers):
             yield f"rule {rule.name} copies the value ?{name} to its head"
+
+
+def _is_measured(name: str, rule: Rule, carriers: Collection[str]) -> bool:
+    asking = (atom for atom in rule.body if atom.predicate in carriers)
+    return any(Variable(name) in atom.arguments[1:] for atom in asking)
 
 
 # Plan: choose a function design for each objective that needs one (the third step of the MAPE-K

@@ -50,8 +50,13 @@ def exact(number: NumberLike) -> Decimal:
         raise KnowledgeError(f"{number!r} is not a number") from error
     if not value.is_finite() or abs(value.adjusted()) > MAX_EXPONENT:
         raise KnowledgeError(f"{number!r} is not a finite number of ordinary size")
-    text = format(value, "f")
-    return Decimal(text.rstrip("0").rstrip(".") if "." in text else text)
+    return Decimal(plain_text(value))
+
+
+def plain_text(number: Decimal) -> str:
+    """Write a number without exponent, and without zeros at the end of its decimals."""
+    text = format(number, "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def _text(name: str, value: object) -> str:

@@ -168,9 +168,8 @@ class MissionLine(Recorded):
             is_there = isinstance(index, int) and 0 <= index < len(self.states)
             if isinstance(t_s, str) or not is_there:
                 raise ValueError("a cycle has no time, or none of the states")
-            if len(values) != len(self.states[int(index)].measured) or not all(
-                isinstance(value, str) for value in values
-            ):
+            are_texts = all(isinstance(value, str) for value in values)
+            if not are_texts or len(values) != len(self.states[int(index)].measured):
                 raise ValueError("a cycle has other values than its state")
         return self
 
@@ -212,8 +211,8 @@ class Manifest(Recorded):
 # Reading
 
 
-def checked(model: type[_Model], content: Any, file: Path, remedy: str, place: str = "") -> _Model:
-    """Check what was read from a JSON file, or from a place in it.
+def checked(model: type[_Model], content: Any, file: Path, remedy: str) -> _Model:
+    """Check what was read from a JSON file, or from a line of it.
 
     Raises:
         InputError: a value is missing, or of another type.
@@ -223,8 +222,8 @@ def checked(model: type[_Model], content: Any, file: Path, remedy: str, place: s
     except ValidationError as error:
         data = dict(content) if isinstance(content, Mapping) else {}
         keys, problem, _ = problem_and_remedy(error, data, model)
-        where = ": ".join(filter(None, (place, ".".join(map(str, keys)))))
-        raise InputError(problem, file=file, place=where or None, remedy=remedy) from None
+        place = ".".join(map(str, keys)) or None
+        raise InputError(problem, file=file, place=place, remedy=remedy) from None
 
 
 def read(model: type[_Model], file: Path, remedy: str) -> _Model:

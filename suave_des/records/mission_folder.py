@@ -14,6 +14,7 @@ import json
 import platform
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import astuple, dataclass, field, fields
 from importlib.metadata import version
 from operator import attrgetter
@@ -378,7 +379,7 @@ def read_missions(path: Path) -> Iterator[RecordedKnowledge]:
 
 
 def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> RecordedKnowledge:
-    at_point = json.loads(json.dumps(scenario))
+    at_point = deepcopy(dict(scenario))
     for key_path, value in recorded.swept.items():
         holder, key = holder_of(at_point, key_path)
         holder[key] = value

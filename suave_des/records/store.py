@@ -141,10 +141,11 @@ class Store:
             self._connect()
         except BaseException as error:
             is_damaged = isinstance(error, InputError) and error.file == str(path)
-            if not was_there or (replace and is_damaged):
+            is_replaced = replace and is_damaged
+            if is_replaced or not was_there:
                 for each in own:
                     each.unlink(missing_ok=True)
-            if not (replace and is_damaged):
+            if not is_replaced:
                 raise
             self._connect()
 
@@ -182,7 +183,7 @@ class Store:
         """Whether no campaign was begun in it; one that was killed at its very start leaves that,
         too.
         """
-        return bool(self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,))
+        return not _has_tables(self._db)
 
     def reading(self) -> AbstractContextManager[None]:
         """Turn whatever is unexpected while what is stored is used into one error about the store,
@@ -380,9 +381,13 @@ def has_campaign(folder: Path) -> bool:
         return False
     try:
         with closing(_connected(path, "ro")) as db:
-            return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
+            return _has_tables(db)
     except (SuaveDesError, sqlite3.Error, UnicodeDecodeError):  # SQLite quotes what is damaged
         return True
+
+
+def _has_tables(db: sqlite3.Connection) -> bool:
+    return db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
 
 
 def read_written(folder: Path) -> Noted:

@@ -232,10 +232,8 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
     except JavaError as error:
         take_warnings()  # they are about what failed, not about what is loaded next
         reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
-        problem, remedy = (
-            f"Pellet cannot use the ontologies: {reason}",
-            "suave-des kb check may say where",
-        )
+        problem = f"Pellet cannot use the ontologies: {reason}"
+        remedy = "suave-des kb check may say where"
         raise KnowledgeError(problem, file=_files(ontology), remedy=remedy) from error
 
 
@@ -394,10 +392,8 @@ class InProcessPellet:
             if named := _RULE.search(warning):
                 rule = self._ontology.content.rules[int(named[1])]
                 reason = _RULE.sub(rule.name, warning.rpartition("): ")[2])
-                problem, remedy = (
-                    f"Pellet does not use rule {rule.name}: {reason}",
-                    f"the rule is: {rule.text}",
-                )
+                problem = f"Pellet does not use rule {rule.name}: {reason}"
+                remedy = f"the rule is: {rule.text}"
                 raise KnowledgeError(
                     problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy
                 )
@@ -430,8 +426,8 @@ def dropped_rules(ontology: Ontology) -> dict[Rule, str]:
         load_n_triples(ontology.content.n_triples()).isConsistent()
         found: dict[Rule, str] = {}
         for warning in take_warnings():
-            for number in _RULE.findall(warning)[:1]:
-                rule = ontology.content.rules[int(number)]
+            for number in _numbers_of([warning]):
+                rule = ontology.content.rules[number]
                 reason = warning.rpartition("): ")[2].replace(f"{RULE_IRI}{number}", rule.name)
                 found.setdefault(rule, f"Pellet does not use it: {reason}")
         return found
@@ -507,18 +503,9 @@ def contradiction(
     given = "".join(map(n_triple, (*assertions, *sorted(more))))
     text = ontology.content.n_triples() + given
     reason, axioms = trace_contradiction(text)
-    numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
-    involved = [ontology.rules[number] for number in numbers]
-    rules = sorted(
-        f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})"
-        for each in involved
-    )
-    stated = [
-        str(fact)
-        for triple in assertions
-        if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
-        for fact in facts_of([triple], ontology.names)
-    ]
+    rules = sorted(_with_place(ontology.rules[number]) for number in _numbers_of(axioms))
+    used = [(s, p, o) for s, p, o in assertions if _has_start(f"prop({p},{s},", axioms)]
+    stated = list(map(str, facts_of(used, ontology.names)))
     if '"()"' not in text:
         reason = reason.replace('"()"', '""')  # as Pellet shows no text
     problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), reason)
@@ -531,6 +518,20 @@ def contradiction(
         "change a rule, so that no two of these hold at once" if rules else "correct the ontology"
     )
     return ContradictionError(problem, file=_files(ontology), remedy=remedy)
+
+
+def _numbers_of(axioms: Iterable[str]) -> set[int]:
+    """The numbers of the rules among some axioms."""
+    return {int(found[1]) for found in map(_RULE.search, axioms) if found}
+
+
+def _with_place(rule: Rule) -> str:
+    line = f", line {rule.line}" if rule.line else ""
+    return f"{rule.name} ({rule.file.name}{line})"
+
+
+def _has_start(start: str, texts: Iterable[str]) -> bool:
+    return any(text.startswith(start) for text in texts)
 
 
 def _files(ontology: Ontology) -> str:

@@ -115,7 +115,11 @@ class Atom:
 
     def variables(self) -> Iterator[str]:
         """Names of the variables among the arguments."""
-        return (term.name for term in self.arguments if isinstance(term, Variable))
+        return _variables_in(self.arguments)
+
+
+def _variables_in(terms: Iterable[Term]) -> Iterator[str]:
+    return (term.name for term in terms if isinstance(term, Variable))
 
 
 @dataclass(frozen=True)
@@ -235,7 +239,7 @@ def computed(atom: Atom, bound: Collection[str]) -> frozenset[str]:
     first, *others = atom.arguments
     if not isinstance(first, Variable):
         return frozenset()
-    still_open = {term.name for term in others if isinstance(term, Variable)}.difference(bound)
+    still_open = {*_variables_in(others)}.difference(bound)
     is_both_ways = atom.predicate in _BOTH_WAYS
     if first.name in bound:
         return frozenset(still_open if is_both_ways else ())

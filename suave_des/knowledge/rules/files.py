@@ -275,7 +275,7 @@ def _predicate_problem(
     atom: Atom, name: str, vocabulary: Vocabulary, *, is_head: bool
 ) -> Problem | None:
     """Check that a class, property or datatype can hold of something, and is used as declared."""
-    if atom.kind == "" or not atom.predicate:
+    if "" in (atom.kind, atom.predicate):
         words = "an atom without a kind that SWRL knows, or without a name"
         return Problem(atom.place(), words, None)
     if atom.kind == "range":
@@ -398,7 +398,7 @@ def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Probl
         yield Problem(atom.place(), words, remedy)
 
 
-def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
+def variable_uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
     """(atom, number of the argument, name) of each variable."""
     for atom in atoms:
         for number, term in enumerate(atom.arguments):
@@ -410,7 +410,7 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
     """Find unbound variables, and variables that stand for both an individual and a value."""
     individuals: dict[str, Place | None] = {}
     values: dict[str, Place | None] = {}
-    for atom, number, name in _uses(rule.atoms):
+    for atom, number, name in variable_uses(rule.atoms):
         places = values if atom.takes_value(number) else individuals
         places.setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
@@ -418,11 +418,11 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         yield Problem(place, f"?{name} stands for an individual and for a value", None)
     bound = _bound_in(rule)
     testing = [atom for atom in rule.body if atom.kind in ("builtin", "range")]
-    for atom, number, name in _uses(testing):
+    for atom, number, name in variable_uses(testing):
         if name not in bound:
             words = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
             yield Problem(atom.place(number), words, nearest(name, bound))
-    for atom, number, name in _uses(rule.head):
+    for atom, number, name in variable_uses(rule.head):
         if name not in bound:
             words = f"?{name} occurs in the head, but the body does not bind it"
             yield Problem(atom.place(number), words, nearest(name, bound))
