@@ -274,7 +274,7 @@ def csv_pieces(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> Iter
         part = list(islice(rest, _PIECE_ROWS))
 
 
-def json_text(content: Mapping[str, Any]) -> str:
+def json_text(content: Mapping[str, object]) -> str:
     """Return a JSON file that people can read, too."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
@@ -404,7 +404,7 @@ def make_output_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
 
 
-def listed_files(folder: Path, listing: str) -> dict[str, Any]:
+def listed_files(folder: Path, listing: str) -> dict[str, object]:
     """Return what a folder's listing, a JSON file that may come from elsewhere, has under
     `files_sha256`: the SHA-256 of files by their names.
     """

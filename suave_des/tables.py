@@ -284,7 +284,7 @@ class Written(ABC):
         """Write all of it; numbers with all their digits, null where there is none."""
         return json.dumps(self._content(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
-    def _content(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, object]:
         about = {"conclusion": self.conclusion, "notes": self.notes}
         return about | {name: rows_of(frame) for name, frame in self.frames().items()}
 

@@ -218,7 +218,7 @@ class StateContent(BaseModel):
     components: dict[str, str | bool] = {}
     measurements: dict[str, int | float | bool | str] = {}
 
-    def parts(self) -> Iterator[tuple[str, str, Any, KeyPath]]:
+    def parts(self) -> Iterator[tuple[str, str, object, KeyPath]]:
         """Yield kind, name, value and key path of each part."""
         for kind in _NOUNS:
             content = getattr(self, kind)
@@ -284,7 +284,9 @@ class StateBuilder:
 
     base: Ontology
     settings: ManagingSettings
-    parts: dict[str, dict[str, Any]] = field(default_factory=lambda: {kind: {} for kind in _NOUNS})
+    parts: dict[str, dict[str, object]] = field(
+        default_factory=lambda: {kind: {} for kind in _NOUNS}
+    )
 
     def add(self, kind: str, name: str, value: Any) -> None:
         """Add one part: one of the objectives, groundings, components or measurements.

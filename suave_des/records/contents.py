@@ -88,7 +88,7 @@ _WRITTEN: TypeAdapter[dict[str, list[str]]] = TypeAdapter(
 )
 
 
-def row_of(cells: list[Any]) -> tuple[Cell, ...]:
+def row_of(cells: list[object]) -> tuple[Cell, ...]:
     """Check the cells of a row of runs.csv, with what a campaign keeps besides; a ValueError if
     one has another type.
     """
@@ -96,12 +96,12 @@ def row_of(cells: list[Any]) -> tuple[Cell, ...]:
     return *_OWN_CELLS.validate_python(own), *_FURTHER_CELLS.validate_python(cells[len(own) :])
 
 
-def failure_of(cells: list[Any]) -> tuple[str, int, float | None, str, bool, int]:
+def failure_of(cells: list[object]) -> tuple[str, int, float | None, str, bool, int]:
     """Check what a campaign keeps of a mission that failed; a ValueError likewise."""
     return _FAILURE.validate_python(tuple(cells))
 
 
-def written_of(noted: Any) -> dict[str, list[str]]:
+def written_of(noted: object) -> dict[str, list[str]]:
     """Check what a campaign keeps of the files that it wrote: SHA-256 by name; a ValueError
     likewise.
     """
@@ -188,8 +188,8 @@ class MissionCounts(Recorded):
 class RecordedSweep(Recorded):
     """What a sweep varies, by name."""
 
-    grid: dict[str, Any] = {}
-    zip: dict[str, Any] = {}
+    grid: dict[str, object] = {}
+    zip: dict[str, object] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -202,7 +202,7 @@ class Manifest(Recorded):
 
     missions: MissionCounts | None = None
     sweep: RecordedSweep = RecordedSweep()
-    perturbations: dict[str, Any] = {}
+    perturbations: dict[str, object] = {}
     runs_per_draw: Annotated[int, Field(ge=1, le=GREATEST)] = 1
     campaign_sha256: str | None = None
     command: list[FileName] = []
@@ -211,7 +211,7 @@ class Manifest(Recorded):
 # Reading
 
 
-def checked(model: type[_Model], content: Any, file: Path, remedy: str) -> _Model:
+def checked(model: type[_Model], content: object, file: Path, remedy: str) -> _Model:
     """Check what was read from a JSON file, or from a line of it.
 
     Raises:
@@ -220,7 +220,7 @@ def checked(model: type[_Model], content: Any, file: Path, remedy: str) -> _Mode
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        data = dict(content) if isinstance(content, Mapping) else {}
+        data = content if isinstance(content, Mapping) else {}
         keys, problem, _ = problem_and_remedy(error, data, model)
         place = ".".join(map(str, keys)) or None
         raise InputError(problem, file=file, place=place, remedy=remedy) from None

@@ -191,7 +191,7 @@ class Store:
         """
         return store_read(self.path)
 
-    def begin(self, about: Mapping[str, Any]) -> None:
+    def begin(self, about: Mapping[str, object]) -> None:
         """Begin a new campaign, in place of an earlier one, with what is noted about it, by name;
         atomic.
 
@@ -233,7 +233,7 @@ class Store:
         with self.reading():
             return _about(self._db, self.path, name, default)
 
-    def note(self, name: str, value: Any) -> None:
+    def note(self, name: str, value: object) -> None:
         """Note something about the campaign, at once and durably."""
         with self.reading():
             self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
@@ -486,7 +486,7 @@ def _damaged(path: Path | None, what: object) -> InputError:
     return InputError(f"is damaged: {what}", file=path, remedy=remedy)
 
 
-def _note(name: str, value: Any) -> tuple[str, str, int]:
+def _note(name: str, value: object) -> tuple[str, str, int]:
     text = json.dumps(value)
     return name, text, _crc(name, text)
 
@@ -520,7 +520,7 @@ def _crc(*parts: object) -> int:
 
 def write_campaign(
     store: Store,
-    about: Mapping[str, Any],
+    about: Mapping[str, object],
     files: Mapping[str, FileContent],
     suave: Mapping[str, FileContent],
 ) -> None:
@@ -581,7 +581,7 @@ def check_replaceable(folder: Path, noted: Noted) -> None:
     check_unchanged(folder, [RUNS_FILE, SUMMARY_FILE, *sorted(known), MANIFEST_FILE], own)
 
 
-def _digest(content: Any) -> str:
+def _digest(content: object) -> str:
     """Return the SHA-256, in hex, of what a manifest says, but for the files that it lists, as more
     are added when pages are made of them.
     """

@@ -13,7 +13,7 @@ import csv
 import json
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from suave_des.errors import InputError, shown, unknown
 
@@ -67,7 +67,7 @@ class Key(NamedTuple):
     node: str
     name: str
     path: str
-    default: Any
+    default: object
     meaning: str
     since: str
     until: str

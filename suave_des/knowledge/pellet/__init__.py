@@ -33,7 +33,7 @@ _PATIENCE = 10
 #: So many times its limit the next work waits for what was abandoned.
 _AGAIN = 3
 _abandoned: list[str] = []
-_stuck: set[Future[Any]] = set()
+_stuck: set[Future[object]] = set()
 
 
 def times_abandoned() -> int:
@@ -119,7 +119,7 @@ class TimeLimit:
             raise ReasonerTimeoutError(f"the reasoner is still {earlier.doing}", remedy=remedy)
         self._abandoned = None
 
-    def _wait(self, future: Future[Any], doing: str, limit_s: float) -> None:
+    def _wait(self, future: Future[_Result], doing: str, limit_s: float) -> None:
         """Wait until work is done; a ReasonerTimeoutError after the limit.
 
         Each wait counts as long as it was to be, however long the process was stopped in it.

@@ -43,6 +43,8 @@ with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy
 # is mostly older. A virtual machine cannot be restarted, and a process that is forked after its
 # start hangs: workers must be spawned, and each has one of its own.
 
+#: An object of Java, whose classes say here what attributes it has.
+JavaObject = Any
 #: What Java throws, in Python.
 JavaError = jpype.JException
 _OPTION_VARIABLES = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
@@ -61,7 +63,7 @@ _OPTIONS = (
 _lock = threading.RLock()
 _warnings: list[str] = []
 _started_in: list[int] = []
-_kept: list[Any] = []  # what Java holds by weak references only
+_kept: list[JavaObject] = []  # what Java holds by weak references only
 
 
 def launcher_environment() -> dict[str, str]:
@@ -153,7 +155,7 @@ def _is_running() -> bool:
     return bool(_started_in)
 
 
-def java_class(name: str) -> Any:
+def java_class(name: str) -> JavaObject:
     """Return a Java class by its full name; starts the virtual machine."""
     start()
     return jpype.JClass(name)
@@ -183,7 +185,7 @@ def _capture_log() -> None:
     @jpype.JImplements("java.util.logging.Filter")
     class Keep:
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def isLoggable(self, record: Any) -> bool:  # noqa: N802 - the interface's name
+        def isLoggable(self, record: JavaObject) -> bool:  # noqa: N802 - the interface's name
             _warnings.append(str(record.getMessage()))
             return False  # nothing more is done with it
 
@@ -208,7 +210,7 @@ _UNSUPPORTED = "Unsupported axiom: "
 one_at_a_time = threading.RLock()
 
 
-def load_n_triples(text: str, *, explain: bool = False) -> Any:
+def load_n_triples(text: str, *, explain: bool = False) -> JavaObject:
     """Load a Pellet knowledge base; call this with the lock held."""
     model = java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
     if "\\U" in text:
@@ -316,7 +318,7 @@ class InProcessPellet:
             take_warnings()
             return found
 
-    def _with(self, assertions: Sequence[Triple]) -> tuple[Any, frozenset[Triple]]:
+    def _with(self, assertions: Sequence[Triple]) -> tuple[JavaObject, frozenset[Triple]]:
         """A copy of the knowledge base with assertions, which is consistent, and what was asserted
         besides: what follows and must be given back (see Content), until nothing new follows.
         """
@@ -330,7 +332,7 @@ class InProcessPellet:
                 return copy, more
             more |= following
 
-    def _following(self, knowledge_base: Any) -> frozenset[Triple]:
+    def _following(self, knowledge_base: JavaObject) -> frozenset[Triple]:
         """What follows of the properties to give back."""
         return frozenset(
             triple
@@ -338,7 +340,9 @@ class InProcessPellet:
             for triple in _values(knowledge_base.getPropertyValues(term).entrySet(), name)
         )
 
-    def _copy(self, base: Any, assertions: Sequence[Triple], more: Collection[Triple]) -> Any:
+    def _copy(
+        self, base: JavaObject, assertions: Sequence[Triple], more: Collection[Triple]
+    ) -> JavaObject:
         """A copy of a knowledge base with assertions, which is consistent."""
         copy = base.copy()
         for subject, predicate, value in (*assertions, *sorted(more)):
@@ -347,7 +351,9 @@ class InProcessPellet:
             raise contradiction(self._ontology, assertions, more)
         return copy
 
-    def _add(self, knowledge_base: Any, subject: str, predicate: str, value: str | Lit) -> None:
+    def _add(
+        self, knowledge_base: JavaObject, subject: str, predicate: str, value: str | Lit
+    ) -> None:
         individual = self._term(subject)
         knowledge_base.addIndividual(individual)
         if isinstance(value, Lit):
@@ -363,7 +369,9 @@ class InProcessPellet:
             knowledge_base.addIndividual(self._term(value))
             knowledge_base.addPropertyValue(self._term(predicate), individual, self._term(value))
 
-    def _read(self, knowledge_base: Any, known: Sequence[Any] | None = None) -> Iterator[Triple]:
+    def _read(
+        self, knowledge_base: JavaObject, known: Sequence[JavaObject] | None = None
+    ) -> Iterator[Triple]:
         """Read values and members, without those in the collections of a smaller knowledge base."""
         for number, (collection, (name, _)) in enumerate(
             zip(self._collections(knowledge_base), [*self._properties, *self._classes], strict=True)
@@ -372,7 +380,7 @@ class InProcessPellet:
                 collection.removeAll(known[number])  # in Java, so that few cross to Python
             yield from (_values if number < len(self._properties) else _members)(collection, name)
 
-    def _collections(self, knowledge_base: Any) -> list[Any]:
+    def _collections(self, knowledge_base: JavaObject) -> list[JavaObject]:
         """The (subject, values) entries of each property to read, and the members of each class to
         read.
         """
@@ -403,7 +411,7 @@ class InProcessPellet:
                 )
 
 
-def _values(entries: Any, name: str) -> Iterator[Triple]:
+def _values(entries: JavaObject, name: str) -> Iterator[Triple]:
     """Read the values of a property from Pellet's (subject, values) entries."""
     for entry in entries:
         subject = _name(entry.getKey())
@@ -411,7 +419,7 @@ def _values(entries: Any, name: str) -> Iterator[Triple]:
             yield subject, name, _read_term(value)
 
 
-def _members(individuals: Any, name: str) -> Iterator[Triple]:
+def _members(individuals: JavaObject, name: str) -> Iterator[Triple]:
     return ((_name(each), RDF_TYPE, name) for each in individuals)
 
 
@@ -538,12 +546,12 @@ def _files(ontology: Ontology) -> str:
     return ", ".join(map(str, ontology.files))
 
 
-def _name(term: Any) -> str:
+def _name(term: JavaObject) -> str:
     """Return the IRI that a term of Pellet stands for; as text it would have escapes."""
     return str(term.getName())
 
 
-def _read_term(term: Any) -> str | Lit:
+def _read_term(term: JavaObject) -> str | Lit:
     """Read one of Pellet's terms: an IRI, or a literal of text, language and datatype."""
     if term.getArity() != 3:
         return _name(term)
