@@ -205,9 +205,7 @@ def decode(path: Path, content: bytes) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(
-            "is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8"
-        ) from None
+        raise line_error(path, line, "is not UTF-8 text", "save it as UTF-8") from None
 
 
 def read_csv(

@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache, partial
+from itertools import chain, islice
 from typing import NamedTuple, TypeVar
 
 from suave_des.errors import KnowledgeError, number_of
@@ -549,28 +550,30 @@ def mutate(
     results: dict[Mutant, MutantResult] = {}
     quick_first = sorted(tests, key=lambda test: len(test.situations))
     every = _Mutants(knowledge, mutants)
+    left: list[Mutant] = []
     for mutant in mutants:
-        if (killer := every.killer(mutant, quick_first)) is not None:
+        killer = every.killer(mutant, quick_first)
+        if killer is None:
+            left.append(mutant)
+        else:
             results[mutant] = MutantResult(mutant, KILLED, killer)
             on_result()
-    left = [mutant for mutant in mutants if mutant not in results]
     if not left:
         return list(results.values()), 0
     space = knowledge.space
     for mutant in left:  # which may depend on more than the original does
         space = space.common(PolicySpace.of(mutant.applied(knowledge.base), knowledge.settings))
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
-    of_tests = dict.fromkeys(situation for test in tests for situation in test.situations)
+    of_tests = dict.fromkeys(chain.from_iterable(test.situations for test in tests))
     situations = [*of_tests, *map(Situation, states)]
     few = _Mutants(knowledge, left)  # the policy has many more states than the tests
     for mutant in left:
+        results[mutant] = MutantResult(
+            mutant, EQUIVALENT, f"nothing differs in {len(states)} kinds of states"
+        )
         touched = filter(partial(few.touches, mutant), situations)
-        found = next(compare(few.unchanged, few.deciding(mutant), touched), None)
-        if found is None:
-            reason = f"nothing differs in {len(states)} kinds of states"
-            results[mutant] = MutantResult(mutant, EQUIVALENT, reason)
-        else:
-            situation, before, after = found
+        found = compare(few.unchanged, few.deciding(mutant), touched)
+        for situation, before, after in islice(found, 1):
             reason = difference(before, after)
             if situation in of_tests:
                 reason += ", in a state of a test that does not expect it"

@@ -96,14 +96,15 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
     """
     if Named(measured) in _terms_of(rule) or rule.speaks_of_identity:
         return True
-    for term in {atom.arguments[0] for atom in rule.body if atom.kind in FACT_KINDS}:
-        asking = [atom for atom in rule.body if term in atom.arguments]
-        is_subject = isinstance(term, Variable) and all(
-            each.arguments[0] == term for each in asking
-        )
-        if is_subject and all(_could_hold(each, attribute, classes) for each in asking):
-            return True
-    return False
+    subjects = {atom.arguments[0] for atom in rule.body if atom.kind in FACT_KINDS}
+    return any(_can_be(term, rule, attribute, classes) for term in subjects)
+
+
+def _can_be(term: Term, rule: Rule, attribute: str, classes: set[str]) -> bool:
+    asking = [atom for atom in rule.body if term in atom.arguments]
+    return isinstance(term, Variable) and all(
+        atom.arguments[0] == term and _could_hold(atom, attribute, classes) for atom in asking
+    )
 
 
 def _terms_of(*rules: Rule) -> set[Term]:
@@ -161,7 +162,7 @@ def regions_by_attribute(base: Ontology, attributes: tuple[str, ...]) -> dict[st
     known = base.model.attributes
     if not known.keys() >= {*attributes} or not regions_of(base).is_sound or not _is_plain(base):
         return None
-    measured = {known[name] for name in attributes}
+    measured = set(map(known.__getitem__, attributes))
     numbers = {iri: set(_values(base, iri)) for iri in measured}
     for one, other in itertools.chain.from_iterable(map(_compared, base.content.enabled_rules)):
         concerned = _concerned(one, other, measured)

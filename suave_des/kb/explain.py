@@ -480,15 +480,16 @@ class RuleQuestions:
             return WhyNot(rule.name, never)
         binding, failing = matching.nearest_match(rule, facts, start)
         if rule in firing and not (failing and start):
-            said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
-            how = (
-                "" if failing else with_bindings(matching.shown_bindings(binding, self.base.names))
-            )
-            return WhyNot(rule.name, f"it fires{how}, and concludes {said}", fires=True)
+            bindings = () if failing else matching.shown_bindings(binding, self.base.names)
+            return self._firing(rule, binding, with_bindings(bindings))
         if not failing:
             words = "it does not fire, though each atom of its body holds"
             return WhyNot(rule.name, words, failing=len(rule.body))
         return self._failing(rule, binding, failing, facts)
+
+    def _firing(self, rule: Rule, binding: Binding, how: str) -> WhyNot:
+        said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
+        return WhyNot(rule.name, f"it fires{how}, and concludes {said}", fires=True)
 
     def _why_never(self, rule: Rule) -> str | None:
         """Why a rule fires in no state, by the first problem in its text; None: there is none."""

@@ -89,7 +89,7 @@ def shown_bindings(binding: Binding, names: Names) -> Bound:
     return tuple((name, value_of(binding[name], names)) for name in sorted(binding))
 
 
-def with_bindings(bindings: Bound) -> str:
+def with_bindings(bindings: Iterable[tuple[str, Value]]) -> str:
     """Write the values of variables after something that holds with them."""
     words = ", ".join(f"?{name} = {value_text(value)}" for name, value in bindings)
     return f" with {words}" if words else ""

@@ -162,9 +162,12 @@ class _Trial:
             one, other = (_UNCHANGED.get(each, each) for each in choices)
             if one != other:
                 yield DECIDES, f"{name}: {other} instead of {one}"
+        yield from ((FIRES, words) for words in self._firings(state))
+
+    def _firings(self, state: KnowledgeState) -> Iterator[str]:
+        """What the tried rules conclude, and the individuals that their variables stand for."""
         tracer = Tracer(self.with_rule, state, self.pellet)
         for bindings, facts in (firing for rule in self.rules for firing in tracer.firings(rule)):
-            bound = with_bindings(
-                tuple(each for each in bindings if not isinstance(each[1], Decimal))
-            )
-            yield FIRES, f"{', '.join(map(str, facts))}{bound or ' with nothing bound'}"
+            individuals = [each for each in bindings if not isinstance(each[1], Decimal)]
+            bound = with_bindings(individuals) or " with nothing bound"
+            yield f"{', '.join(map(str, facts))}{bound}"

@@ -264,8 +264,9 @@ def _tasks(
 ) -> Iterator[KnowledgeState]:
     solvable = [name for name in base.functions if base.designs(name) or name in space.functions]
     lasting = tuple(filter(solvable.__contains__, LASTING))
-    others = [name for name in solvable if name not in lasting]
-    for asked in [(*lasting, name) for name in others] or [lasting]:
+    others: list[tuple[str, ...]] = [(name,) for name in solvable if name not in lasting]
+    for other in others or [()]:
+        asked = (*lasting, *other)
         for designs in itertools.product(*(("", *base.designs(name)) for name in asked)):
             grounded = filter(operator.itemgetter(1), zip(asked, designs, strict=True))
             yield settings.state(dict.fromkeys(asked), dict(grounded))

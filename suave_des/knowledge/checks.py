@@ -679,7 +679,7 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
     if rdf.IS_QA_TYPE in content.concluded:
         return
     of_groundings = _without_value_in_groundings(material)
-    stated = {attribute for _, attribute in rdf.links(content.triples, rdf.IS_QA_TYPE)}
+    stated = rdf.values(content.triples, rdf.IS_QA_TYPE)
     for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
         for atom, attribute in attributes_asked(rule):

@@ -409,11 +409,11 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     """
     triples = content.triples
     used = {
-        "Function": {function for _, function in rdf.links(triples, _SOLVES_F)},
+        "Function": rdf.values(triples, _SOLVES_F),
         "FunctionDesign": rdf.subjects(triples, _SOLVES_F),
         "Component": rdf.subjects(triples, rdf.MROS + "requiredBy")
         | rdf.subjects(triples, rdf.C_STATUS),
-        "QualityAttributeType": {kind for _, kind in rdf.links(triples, rdf.IS_QA_TYPE)},
+        "QualityAttributeType": rdf.values(triples, rdf.IS_QA_TYPE),
     }
     by_name = {
         kind: _by_name(_members(triples, kind) | iris, kind, sources) for kind, iris in used.items()
@@ -543,11 +543,7 @@ def _estimated(
     triples: Sequence[rdf.Triple], designs: Mapping[str, str]
 ) -> dict[str, dict[str, Decimal | None]]:
     """Return the smallest expected value of each quality attribute, by the design's name."""
-    numbers = {
-        subject: Decimal(value.text.strip())
-        for subject, predicate, value in triples
-        if predicate == rdf.HAS_VALUE and _is_decimal(value)
-    }
+    numbers = {iri: Decimal(value.text.strip()) for iri, value in _decimals(triples)}
     types = {subject: local_name(kind) for subject, kind in rdf.links(triples, rdf.IS_QA_TYPE)}
     found: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
     for design, value in rdf.links(triples, _HAS_QA_ESTIMATION):
@@ -557,6 +553,10 @@ def _estimated(
             known = (each for each in given if each is not None)
             found[name][types[value]] = min(known, default=None)
     return {name: dict(sorted(values.items())) for name, values in found.items()}
+
+
+def _decimals(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, Lit]]:
+    return ((s, o) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o))
 
 
 def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:

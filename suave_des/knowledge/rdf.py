@@ -164,6 +164,11 @@ def both_ways(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return [*known, *((other, one) for one, other in known)]
 
 
+def values(triples: Iterable[Triple], predicate: str) -> set[str]:
+    """Return the values of a property that are no literals."""
+    return {value for _, value in links(triples, predicate)}
+
+
 def numbered_nodes(
     triples: Iterable[Triple], start: str, names: Mapping[str | Lit, str] = {}
 ) -> Iterator[Triple]:

@@ -282,8 +282,9 @@ class _Cells:
         limit_s = self._numbers(TIME_LIMIT, least=0.0) if TIME_LIMIT in self.text else None
         search_time_s = self._search_times_s(limit_s)
         values: dict[str, Any] = dict.fromkeys(COLUMNS, math.nan) | {"scenario": "", "seed": ""}
-        further = [name for name in map(str, self.text) if name not in ("", FOUND)]
-        values |= {name: self._converted(name) for name in further}
+        values |= {
+            name: self._converted(name) for name in map(str, self.text) if name not in ("", FOUND)
+        }
         values[SEARCH_TIME] = search_time_s
         values[DISTANCE] = self._numbers(DISTANCE, least=0.0)
         values[FOUND] = self._found(search_time_s, limit_s)

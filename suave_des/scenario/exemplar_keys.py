@@ -115,12 +115,12 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
         return name, "as requested"
     fitting = list(REVISIONS)
     telling = ""
-    given = [each for each in _TELLING if each in found]
+    given = list(filter(found.__contains__, _TELLING))
     for each in given:
-        left = [revision for revision in fitting if _has(revision, each)]
-        if len(left) < len(fitting):
+        before = fitting
+        fitting = [revision for revision in before if _has(revision, each)]
+        if fitting != before:
             telling = each
-        fitting = left
     if len(fitting) == 1:
         return fitting[0], f"only revision {fitting[0]} has {telling}"
     if not fitting:

@@ -143,13 +143,18 @@ def load_scenario(
         scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, rules
     )
     loaded = _set(loaded, replacements.get("values") or {}, "--set")
-    if options := replacements.get("manager_options"):
-        managers = loaded.scenario.managers.model_dump(mode="json")
-        managers |= {
-            name: {**managers.get(name, {}), **settings} for name, settings in options.items()
-        }
-        loaded = _set(loaded, {"managers": managers}, "--manager-option")
-    return loaded
+    options = replacements.get("manager_options")
+    return _with_options(loaded, options) if options else loaded
+
+
+def _with_options(
+    loaded: LoadedScenario, options: Mapping[str, Mapping[str, object]]
+) -> LoadedScenario:
+    """Set what options say about managers over the settings of the scenario."""
+    managers = loaded.scenario.managers.model_dump(mode="json")
+    for name, settings in options.items():
+        managers[name] = {**managers.get(name, {}), **settings}
+    return _set(loaded, {"managers": managers}, "--manager-option")
 
 
 def _knowledge_files(
