@@ -10,14 +10,14 @@ import os
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, Final, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 from suave_des.errors import InputError, shown, unknown
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
-_KINDS: Final[Mapping[str, tuple[Any, str]]] = {
+_KINDS: Mapping[str, tuple[type | str, str]] = {
     "int": (Integral, "a whole number"),
     "float": (Real, "a number"),
     "bool": (bool, "True or False"),
@@ -75,7 +75,7 @@ def check_names(function: str, given: Iterable[str], known: Collection[str]) -> 
             raise unknown(f"{function} has no argument {name!r}", name, listed, "its arguments")
 
 
-def _check(name: str, value: Any, annotation: str) -> None:
+def _check(name: str, value: object, annotation: str) -> None:
     parts = re.sub(r"\[.*\]", "", annotation).split(" | ")
     if all(part in _KINDS for part in parts) and not any(_is_a(part, value) for part in parts):
         words = [_KINDS[part][1] for part in parts if part != "None"]

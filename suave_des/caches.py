@@ -16,15 +16,15 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from platformdirs import user_cache_path
 
-_CACHE_VARIABLE: Final = "SUAVE_DES_CACHE_DIR"
+_CACHE_VARIABLE = "SUAVE_DES_CACHE_DIR"
 #: Entries of this size in all are kept in one file: with exact values there is no end to new ones.
-MAX_BYTES: Final = 16 * 2**20
+MAX_BYTES = 16 * 2**20
 #: Files of a kind that are kept; the least recently used are removed.
-MAX_FILES: Final = 64
+MAX_FILES = 64
 
 
 def private_cache(kind: str) -> Path | None:

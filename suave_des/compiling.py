@@ -72,7 +72,7 @@ class Record(ctypes.Structure):
 
 
 _R = TypeVar("_R", bound=type[Record])
-_KINDS: dict[Any, Any] = {bool: ctypes.c_bool, int: ctypes.c_int64, float: ctypes.c_double}
+_KINDS: dict[object, Any] = {bool: ctypes.c_bool, int: ctypes.c_int64, float: ctypes.c_double}
 
 
 def record(kind: _R) -> _R:
@@ -134,7 +134,7 @@ class _CodeCache(caching._Cache):
 
     disable = flush = enable
 
-    def load_overload(self, signature: Any, target_context: Any) -> Any:
+    def load_overload(self, signature: object, target_context: Any) -> object:
         """Load the machine code for a signature; None if there is none that can be used."""
         with suppress(Exception):  # there is no end to what a file leads to
             target_context.refresh()
@@ -147,7 +147,7 @@ class _CodeCache(caching._Cache):
                 return compiler.CompileResult._rebuild(target_context, *parts)
         return None
 
-    def save_overload(self, signature: Any, data: Any) -> None:
+    def save_overload(self, signature: object, data: Any) -> None:
         """Keep the machine code for a signature, if possible."""
         with suppress(Exception):  # such as a full disk
             if data.lifted or data.library.has_dynamic_globals:  # it has addresses in it
@@ -162,7 +162,7 @@ class _CodeCache(caching._Cache):
                 part.unlink(missing_ok=True)
             keep_latest(path.parent, f"*{path.suffix}", _MOST_FILES)
 
-    def _place(self, signature: Any, codegen: Any) -> tuple[Path, bytes]:
+    def _place(self, signature: object, codegen: Any) -> tuple[Path, bytes]:
         """Return the file of the machine code for a signature, and what that is made from.
 
         Raises:
@@ -188,7 +188,7 @@ _SETTING = (
 )
 
 
-def _ingredients(value: Any, names: Sequence[str], seen: list[Any]) -> Iterator[str]:
+def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterator[str]:
     """Yield what goes into machine code that uses a value: of a function, its code and all that its
     names stand for, as that is frozen; of a module, the values of the names that are used.
 
@@ -229,7 +229,7 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[Any]) -> Iterator[
         raise ValueError(f"unknown: {value!r}")
 
 
-def _of_function(function: Any, seen: list[Any]) -> Iterator[str]:
+def _of_function(function: Any, seen: list[object]) -> Iterator[str]:
     """Yield the ingredients of a function, and of the functions in it."""
     closed_over = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
     values = {**function.__globals__, **{name: cell.cell_contents for name, cell in closed_over}}

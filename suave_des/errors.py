@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 MISTAKES_LOGGER = "suave_des.mistakes"
 """Name of the logger for mistakes in rules and ontologies that stop nothing."""
@@ -197,8 +196,8 @@ class Level(StrEnum):
     NOTE = "NOTE"
 
 
-_SEVERITY: Final = {level: number for number, level in enumerate(Level)}
-_NOUNS: Final = {Level.ERROR: "error", Level.WARN: "warning", Level.NOTE: "note"}
+_SEVERITY = {level: number for number, level in enumerate(Level)}
+_NOUNS = {Level.ERROR: "error", Level.WARN: "warning", Level.NOTE: "note"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -157,8 +157,8 @@ def read_json(path: Path) -> Any:
     return parse_json(decode(path, read_bytes(path)), path)
 
 
-def parse_json(text: str, path: Path, place: str | None = None) -> Any:
-    """Return what a JSON text stands for, which is from a file or a place in it.
+def parse_json(text: str, path: Path) -> Any:
+    """Return what a JSON text stands for, which is from a file.
 
     Raises:
         InputError: it is not JSON, or has a number that is not finite.
@@ -167,7 +167,7 @@ def parse_json(text: str, path: Path, place: str | None = None) -> Any:
         return json_value(text, _finite)
     except ValueError as error:
         raise InputError(
-            f"is not JSON: {error}", file=path, place=place, remedy="restore it, or make it anew"
+            f"is not JSON: {error}", file=path, remedy="restore it, or make it anew"
         ) from None
 
 
@@ -211,9 +211,7 @@ def decode(path: Path, content: bytes) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(
-            "is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8"
-        ) from None
+        raise line_error(path, line, "is not UTF-8 text", "save it as UTF-8") from None
 
 
 def read_csv(
@@ -280,7 +278,7 @@ def csv_pieces(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> Iter
         part = list(islice(rest, _PIECE_ROWS))
 
 
-def json_text(content: Mapping[str, Any]) -> str:
+def json_text(content: Mapping[str, object]) -> str:
     """Return a JSON file that people can read, too."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
@@ -351,13 +349,10 @@ def _check_family(folder: Path, family: str, entries: Collection[str]) -> None:
 def _check_replaced(folder: Path, family: str, entries: Collection[str], noted: Noted) -> None:
     """Check that all that would be replaced in a folder is the project's, and unchanged."""
     listing = LISTINGS[family]
-    own = own_files(folder, listing, noted)
-    about: Any = {LISTED: {}}
-    if listing in entries:
-        about = read_json(folder / listing)
+    about = read_json(folder / listing) if listing in entries else {LISTED: {}}
     problem = f"has {listing}, which suave-des did not write"
     if isinstance(about, dict) and LISTED in about:
-        known = (*own, *DERIVED, listing, "campaign.sqlite")
+        known = (*own_files(folder, listing, noted), *DERIVED, listing, "campaign.sqlite")
         others = [name for name in FAMILIES[family] if name in entries and name not in known]
         if not others:
             return
@@ -413,7 +408,7 @@ def make_output_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
 
 
-def listed_files(folder: Path, listing: str) -> dict[str, Any]:
+def listed_files(folder: Path, listing: str) -> dict[str, object]:
     """Return what a folder's listing, a JSON file that may come from elsewhere, has under
     `files_sha256`: the SHA-256 of files by their names.
     """

@@ -13,9 +13,8 @@ from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType, ModuleType
-from typing import Final
 
-_one_at_a_time: Final = threading.RLock()
+_one_at_a_time = threading.RLock()
 
 
 @contextmanager
@@ -90,8 +89,8 @@ def _importer() -> str:
     return ""
 
 
-_finders: Final = dict[str, _Beside]()
-_beside: Final = list[str]()
+_finders = dict[str, _Beside]()
+_beside = list[str]()
 """The folder of the campaign file that was read last."""
 
 

@@ -73,13 +73,13 @@ def read_learned(path: Path) -> Mapping[str, Any]:
     return MappingProxyType({key: _frozen(value) for key, value in read_file(path).learned.items()})
 
 
-def _has_text_keys(value: Any) -> bool:
+def _has_text_keys(value: object) -> bool:
     if isinstance(value, dict):  # JSON would write numbers as text, which no manager looks up
         return all(isinstance(key, str) and _has_text_keys(each) for key, each in value.items())
     return not isinstance(value, list | tuple) or all(map(_has_text_keys, value))
 
 
-def _frozen(value: Any) -> Any:
+def _frozen(value: object) -> object:
     if isinstance(value, dict):
         return MappingProxyType({key: _frozen(each) for key, each in value.items()})
     return tuple(map(_frozen, value)) if isinstance(value, list) else value

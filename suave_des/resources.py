@@ -59,7 +59,7 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
         InputError: there is no such file, neither on disk nor shipped.
     """
     path = Path(name)
-    candidates = [path if beside is None else beside / path]
+    candidates = [(beside or Path()) / path]
     if len(path.parts) == 1:
         candidates += [shipped_folder(kind) / f"{path}{ending}" for ending in ("", _KINDS[kind])]
     for candidate in candidates:
@@ -67,9 +67,13 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
             return candidate
     if os.path.exists(candidates[0]):  # noqa: PTH110 - as above
         return candidates[0]  # whoever reads it says what it is
+    raise InputError("no such file", file=path, remedy=_other_than(path, kind))
+
+
+def _other_than(path: Path, kind: str) -> str:
+    """The remedy for a name of which there is no file."""
     shipped = shipped_folder(kind).glob(f"*{_KINDS[kind]}")
     names = sorted(each.name if path.suffix else each.stem for each in shipped)
     # no scenarios
     known = [each for each in names if "modes" not in each or each == similar(path.name, names)]
-    remedy = did_you_mean(path.name, known, "give a path, or one of the shipped files")
-    raise InputError("no such file", file=path, remedy=remedy)
+    return did_you_mean(path.name, known, "give a path, or one of the shipped files")

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from suave_des.domain import BATTERY_LEVEL, THRUSTER_NAMES
 from suave_des.errors import InputError, KnowledgeError
@@ -21,9 +21,9 @@ from suave_des.scenario.models import Scenario
 if TYPE_CHECKING:
     from suave_des.knowledge.checks import Subject
 
-REPORTED_STATUSES: Final = {**dict.fromkeys(THRUSTER_NAMES, (FAILED, RECOVERED)), HULL: (LEAK,)}
+REPORTED_STATUSES = {**dict.fromkeys(THRUSTER_NAMES, (FAILED, RECOVERED)), HULL: (LEAK,)}
 """The statuses that monitors report of each component."""
-OPENED: Final = 4
+OPENED = 4
 _opened: dict[Hashable, Reasoner] = {}
 """Knowledge bases that are kept open, the oldest first."""
 

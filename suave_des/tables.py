@@ -5,10 +5,12 @@ Markdown, LaTeX, CSV.
 from __future__ import annotations
 
 import json
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -67,7 +69,7 @@ class Table:
     def _alignment(self) -> str:
         return self.align + "r" * (len(self.headings) - len(self.align))
 
-    def _widths(self, width: int | None) -> list[int]:
+    def _widths(self, width: float) -> list[int]:
         """Return the width of each column; of a table that is too wide, columns of text are made
         narrower.
         """
@@ -75,7 +77,7 @@ class Table:
         columns = list(zip(*rows, strict=True))
         widths = list(map(_widest_line, columns))
         narrow = [place for place, side in enumerate(self._alignment) if side == "l"]
-        while width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
+        while sum(widths) + 2 * (len(widths) - 1) > width:
             widest = max(narrow, key=lambda place: widths[place], default=None)
             if widest is None or widths[widest] <= _LEAST_WIDTH:
                 break
@@ -89,7 +91,7 @@ class Table:
         """Write the table for a terminal, without its title; texts that make it wider are broken
         into lines.
         """
-        return "\n".join(self._lines(self._widths(width)))
+        return "\n".join(self._lines(self._widths(math.inf if width is None else width)))
 
     def without_effect(self, width: int) -> Table:
         """Return the table without its last column if that is the effect, and makes it wider."""
@@ -106,8 +108,7 @@ class Table:
                 broken_name(cell, width).split("\n")
                 for cell, width in zip(row, widths, strict=True)
             ]
-            for number in range(max(map(len, broken))):
-                parts = (lines[number] if number < len(lines) else "" for lines in broken)
+            for parts in zip_longest(*broken, fillvalue=""):
                 sides = zip(parts, self._alignment, widths, strict=True)
                 yield "  ".join(
                     f"{part:{'<' if side == 'l' else '>'}{width}}" for part, side, width in sides
@@ -283,7 +284,7 @@ class Written(ABC):
         """Write all of it; numbers with all their digits, null where there is none."""
         return json.dumps(self._content(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
-    def _content(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, object]:
         about = {"conclusion": self.conclusion, "notes": self.notes}
         return about | {name: rows_of(frame) for name, frame in self.frames().items()}
 

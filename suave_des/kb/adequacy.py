@@ -24,7 +24,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache, partial
-from typing import Final, NamedTuple, TypeVar
+from itertools import chain, islice
+from typing import NamedTuple, TypeVar
 
 from suave_des.errors import KnowledgeError, number_of
 from suave_des.kb.knowledge_base import KnowledgeBase
@@ -35,7 +36,7 @@ from suave_des.kb.space import PolicySpace, States, spread
 from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
-from suave_des.knowledge.rdf import EXACT, OWL, RDF_TYPE, RDFS, XSD, Lit, memberships
+from suave_des.knowledge.rdf import EXACT, OWL, RDFS, XSD, Lit, members, memberships, terms
 from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable, write_atom
 from suave_des.knowledge.rules.files import fatal_problems
 from suave_des.knowledge.state import KnowledgeState
@@ -45,7 +46,7 @@ from suave_des.tables import Table
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
 #: How the values of a comparison can relate, with the sign that says so and words for it.
-ORDERS: Final[Mapping[str, tuple[str, str]]] = {
+ORDERS: Mapping[str, tuple[str, str]] = {
     "less": ("<", "with the first value less than the second"),
     "equal": ("=", "with equal values"),
     "greater": (">", "with the first value greater than the second"),
@@ -127,11 +128,6 @@ class Coverage(NamedTuple):
     missing: frozenset[Goal]
     proposed: tuple[tuple[KnowledgeState, tuple[Goal, ...]], ...]
 
-    @property
-    def unreachable(self) -> frozenset[Goal]:
-        """Goals that no state of the model reaches, and that no test covers."""
-        return frozenset(self.goals) - self.missing - self.covered.keys()
-
     def table(self) -> Table:
         """The goals of each rule."""
         covered = len(self.covered)
@@ -212,21 +208,14 @@ def measure_coverage(
 
 # Mutants.
 
-_NOT_HORN: Final = [
-    "unionOf",
-    "complementOf",
-    "oneOf",
-    "disjointUnionOf",
-    "maxCardinality",
-    "maxQualifiedCardinality",
-    "cardinality",
-    "qualifiedCardinality",
-    "minQualifiedCardinality",
-    "minCardinality",
-    "allValuesFrom",
-]
+_NOT_HORN = terms(
+    OWL,
+    "unionOf complementOf oneOf disjointUnionOf allValuesFrom "
+    "cardinality minCardinality maxCardinality "
+    "qualifiedCardinality minQualifiedCardinality maxQualifiedCardinality",
+)
 #: By how much thresholds are moved, up and down.
-_MOVED: Final = (Decimal("1.1"), Decimal("0.9"))
+_MOVED = (Decimal("1.1"), Decimal("0.9"))
 _T = TypeVar("_T")
 
 
@@ -445,7 +434,7 @@ def _others(value: Lit, known: Iterable[Lit]) -> list[Lit]:
 
 
 #: What each kind of change makes of a rule; None: the rule is removed.
-MUTATION_OPERATORS: Final[Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None]]]] = {
+MUTATION_OPERATORS: Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None]]] = {
     "comparison turned": _comparison_turned,
     "comparison shifted": _comparison_shifted,
     "atom dropped": _atom_dropped,
@@ -474,16 +463,9 @@ def is_horn(base: Ontology) -> bool:
     """Whether no axiom leaves a choice, so that what follows is what the rules and axioms build up
     step by step.
     """
-    datatypes = {
-        line.split(" ", 1)[0]
-        for line in base.content.structure
-        if f"<{RDF_TYPE}> <{RDFS}Datatype>" in line
-    }
-    return not any(
-        f"<{OWL}{name}>" in line and line.split(" ", 1)[0] not in datatypes
-        for line in base.content.structure
-        for name in _NOT_HORN
-    )
+    structure = base.content.structure
+    datatypes = members(structure, [RDFS + "Datatype"])
+    return all(s in datatypes or _NOT_HORN.isdisjoint((p, o)) for s, p, o in structure)
 
 
 KILLED, EQUIVALENT, SURVIVED = "killed", "equivalent", "survived"
@@ -568,28 +550,30 @@ def mutate(
     results: dict[Mutant, MutantResult] = {}
     quick_first = sorted(tests, key=lambda test: len(test.situations))
     every = _Mutants(knowledge, mutants)
+    left: list[Mutant] = []
     for mutant in mutants:
-        if (killer := every.killer(mutant, quick_first)) is not None:
+        killer = every.killer(mutant, quick_first)
+        if killer is None:
+            left.append(mutant)
+        else:
             results[mutant] = MutantResult(mutant, KILLED, killer)
             on_result()
-    left = [mutant for mutant in mutants if mutant not in results]
     if not left:
         return list(results.values()), 0
     space = knowledge.space
     for mutant in left:  # which may depend on more than the original does
         space = space.common(PolicySpace.of(mutant.applied(knowledge.base), knowledge.settings))
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
-    of_tests = dict.fromkeys(situation for test in tests for situation in test.situations)
+    of_tests = dict.fromkeys(chain.from_iterable(test.situations for test in tests))
     situations = [*of_tests, *map(Situation, states)]
     few = _Mutants(knowledge, left)  # the policy has many more states than the tests
     for mutant in left:
+        results[mutant] = MutantResult(
+            mutant, EQUIVALENT, f"nothing differs in {len(states)} kinds of states"
+        )
         touched = filter(partial(few.touches, mutant), situations)
-        found = next(compare(few.unchanged, few.deciding(mutant), touched), None)
-        if found is None:
-            reason = f"nothing differs in {len(states)} kinds of states"
-            results[mutant] = MutantResult(mutant, EQUIVALENT, reason)
-        else:
-            situation, before, after = found
+        found = compare(few.unchanged, few.deciding(mutant), touched)
+        for situation, before, after in islice(found, 1):
             reason = difference(before, after)
             if situation in of_tests:
                 reason += ", in a state of a test that does not expect it"

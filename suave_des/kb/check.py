@@ -7,10 +7,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
+from decimal import Decimal
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
-from typing import Final
 
 from rdflib import RDF, BNode, Graph, Namespace, URIRef
 from rdflib.term import Node
@@ -48,11 +48,11 @@ from suave_des.monitor.diagnostics import RECOVERED
 from suave_des.resources import shipped_folder
 
 #: States that Pellet is asked about; `kb policy` goes through all.
-MAX_STATES: Final = 300
+MAX_STATES = 300
 #: The same times the rules, each of which Pellet reads anew for a state: some seconds in all.
-_MAX_RULES_READ: Final = 5_000
-_SH: Final = Namespace("http://www.w3.org/ns/shacl#")
-_LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.NOTE}
+_MAX_RULES_READ = 5_000
+_SH = Namespace("http://www.w3.org/ns/shacl#")
+_LEVELS = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.NOTE}
 
 
 def check(subject: Subject) -> tuple[Finding, ...]:
@@ -85,7 +85,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     return ordered([*findings, *_wrong_patterns(base), *_ask_pellet(subject, base, findings)])
 
 
-_PATTERN: Final = {
+_PATTERN = {
     rdf.SWRLB + name: place for name, place in (("matches", 1), ("replace", 2), ("tokenize", 2))
 }
 
@@ -158,19 +158,28 @@ def states_to_ask(
     settings = ManagingSettings(
         measured=tuple(base.model.attributes if measured is None else measured)
     )
-    space, apart = PolicySpace.of(base, settings), RECOVERED if rules_of_2023(base) else None
-    designs = {function: found for function in base.functions if (found := base.designs(function))}
+    space = PolicySpace.of(base, settings)
+    apart = {RECOVERED} if rules_of_2023(base) else set()
+    designs = {function: base.designs(function) for function in space.functions}
     for number in range(max(map(len, designs.values()), default=0)):
         groundings = {function: found[number % len(found)] for function, found in designs.items()}
         for status in space.statuses:
-            for place in range(len(space.scale) if space.attributes and status != apart else 1):
-                value = space.scale.value(place)
+            for measurements in [{}] if status in apart else _measurements(space):
                 yield KnowledgeState.of(
                     map(ObjectiveState, groundings),
                     groundings=groundings,
                     components={group[0]: status for group in space.alike},
-                    measurements={} if value is None else dict.fromkeys(space.attributes, value),
+                    measurements=measurements,
                 )
+
+
+def _measurements(space: PolicySpace) -> Iterator[dict[str, Decimal]]:
+    """No measured values, and one value of all attributes for each place that it can have."""
+    yield {}
+    for place in range(1, len(space.scale)) if space.attributes else ():
+        value = space.scale.value(place)
+        if value is not None:
+            yield dict.fromkeys(space.attributes, value)
 
 
 def check_shapes(sources: Sequence[OntologyFile]) -> list[Finding]:
@@ -232,10 +241,12 @@ def _finding(
     level = _LEVELS.get(URIRef(str(report.value(result, _SH.resultSeverity))), Level.ERROR)
     words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or ""))
     message = ": ".join(filter(None, words))
-    has_value = any((thing, URIRef(HAS_VALUE), None) in source.graph for source in sources)
-    if path == URIRef(HAS_VALUE) and name.startswith(measurement_name("")) and not has_value:
-        level, message = Level.NOTE, f"{name} has no hasValue: missions give it the measured one"
-    described = [source for source in sources if source.line_of(name)]
-    mentioning = [source for source in sources if thing in source.graph.all_nodes()]
-    file, line = place_of(name, described or mentioning or sources)
+    is_value = path == URIRef(HAS_VALUE) and name.startswith(measurement_name(""))
+    if is_value and not any((thing, path, None) in source.graph for source in sources):
+        level = Level.NOTE
+        message = f"{name} has no hasValue: missions give it the measured one"
+    file, line = place_of(name, sources)
+    if line is None:
+        mentioning = (source for source in sources if thing in source.graph.all_nodes())
+        file = next(mentioning, sources[0]).path
     return Finding(level, message, str(file), line)

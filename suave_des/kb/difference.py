@@ -32,6 +32,7 @@ from suave_des.knowledge.rdf import (
     fact_of,
     is_fact,
     local_name,
+    n_triple,
     term_of,
 )
 from suave_des.knowledge.reasoner import regions_of
@@ -88,7 +89,7 @@ def _triple(base: Ontology, triple: Triple) -> str:
 
 def _structure(base: Ontology) -> Iterator[str]:
     """Axioms with class expressions: what has no name is written out in brackets."""
-    graph = rdflib.Graph().parse(data="".join(base.content.structure), format="nt")
+    graph = rdflib.Graph().parse(data="".join(map(n_triple, base.content.structure)), format="nt")
 
     def text(node: Node, above: frozenset[Node]) -> str:
         if not isinstance(node, rdflib.BNode):

@@ -12,17 +12,16 @@ import itertools
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from decimal import Decimal
-from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import rdf
+from suave_des.knowledge.checks import attributes_asked
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple
 from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import (
     COMPARISONS,
     FACT_KINDS,
-    IDENTITIES,
     SAME,
     Atom,
     Named,
@@ -32,47 +31,39 @@ from suave_des.knowledge.rules import (
 )
 from suave_des.knowledge.state import exact
 
-_CARRIED: Final = frozenset({rdf.IS_QA_TYPE, rdf.HAS_VALUE})
-_OF_VALUES: Final = _CARRIED | {rdf.HAS_QA_VALUE, rdf.TOMASYS + "hasQAestimation"}
+_CARRIED = frozenset({rdf.IS_QA_TYPE, rdf.HAS_VALUE})
+_OF_VALUES = _CARRIED | {rdf.HAS_QA_VALUE, rdf.TOMASYS + "hasQAestimation"}
 #: What a schema may say of these properties without relating values of one attribute to those of
 # another.
-_HARMLESS: Final = {
+_HARMLESS = {
     (rdf.RDF_TYPE, kind) for kind in rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty")
 } | {(name, None) for name in rdf.terms(rdf.RDFS, "domain range")}
-_FUNCTIONAL: Final = frozenset(
-    (name, rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty") for name in _CARRIED
-)
+_FUNCTIONAL = frozenset((name, rdf.RDF_TYPE, rdf.FUNCTIONAL) for name in _CARRIED)
 
 
-def has_effect(base: Ontology, attribute: str, functions: Iterable[str] | None = None) -> bool:
-    """Whether a measured value of a quality attribute can have any effect, on decisions for some
-    functions or for any.
+def has_effect(base: Ontology, attribute: str, function: str | None = None) -> bool:
+    """Whether a measured value of a quality attribute can have any effect, on decisions for one
+    function or for any.
 
-    It has none if none of their designs expects one, and no rule can match the individual that
+    It has none if none of its designs expects one, and no rule can match the individual that
     carries it: what is known of that is its class, isQAtype and hasValue. Where the schema has more
     to say (class expressions, properties related to these), the attribute counts as one with an
     effect.
     """
-    if functions is None:
-        designs = set(base.model.estimated)
-    else:
-        designs = {design for function in functions for design in base.designs(function)}
-    if any(attribute in base.model.estimated[name] for name in designs):
+    model = base.model
+    iri = model.attributes[attribute]
+    designs: Iterable[str] = model.estimated
+    if function is not None:
+        designs = base.designs(function)
+    elif rdf.subjects(base.content.triples, rdf.IS_QA_TYPE, iri):  # the ontologies have a value
         return True
-    if functions is None and _is_stated(base, attribute):
+    if any(attribute in model.estimated[name] for name in designs):
         return True
-    measured = base.model.measurements[attribute]
-    if base.model.own[measured] or has_expressions(base) or _is_carrying_related(base):
+    measured = model.measurements[attribute]
+    if model.own[measured] or has_expressions(base) or _is_carrying_related(base):
         return True
-    iri = base.model.attributes[attribute]
     classes = _classes_of_measured(base)
     return any(_can_match(rule, iri, measured, classes) for rule in base.content.enabled_rules)
-
-
-def _is_stated(base: Ontology, attribute: str) -> bool:
-    """Whether the ontologies themselves have a value of a quality attribute."""
-    wanted = (rdf.IS_QA_TYPE, base.model.attributes[attribute])
-    return any((name, value) == wanted for _, name, value in base.content.triples)
 
 
 def _is_carrying_related(base: Ontology) -> bool:
@@ -89,33 +80,35 @@ def _classes_of_measured(base: Ontology) -> set[str]:
     say, and all above.
     """
     triples = base.content.triples
-    domains = {str(o) for s, p, o in triples if p == rdf.RDFS + "domain" and s in _CARRIED}
-    leading = (rdf.RDFS + "subClassOf", rdf.OWL + "equivalentClass")
-    above = ((s, str(o)) for s, p, o in triples if p in leading)
+    domains = {kind for name, kind in rdf.links(triples, rdf.RDFS + "domain") if name in _CARRIED}
+    above = rdf.links(triples, rdf.SUBCLASS, rdf.OWL + "equivalentClass")
     return rdf.reached({rdf.TOMASYS + "QAvalue", rdf.OWL + "Thing", *domains}, above)
 
 
 def has_expressions(base: Ontology) -> bool:
     """Whether the ontologies have class expressions."""
-    kinds = (f"<{rdf.OWL}Class>", f"<{rdf.OWL}Restriction>")
-    return any(kind in line for line in base.content.structure for kind in kinds)
+    return bool(rdf.members(base.content.structure, rdf.terms(rdf.OWL, "Class Restriction")))
 
 
 def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> bool:
     """Whether a variable of a rule, or a name in it, can stand for the individual of a measured
     value.
     """
-
-    terms = {term for atom in rule.atoms for term in atom.arguments}
-    if Named(measured) in terms or any(atom.predicate in IDENTITIES for atom in rule.atoms):
+    if Named(measured) in _terms_of(rule) or rule.speaks_of_identity:
         return True
-    for term in {atom.arguments[0] for atom in rule.body if atom.kind in FACT_KINDS}:
-        asking = [atom for atom in rule.body if term in atom.arguments]
-        if isinstance(term, Variable) and all(
-            atom.arguments[0] == term and _could_hold(atom, attribute, classes) for atom in asking
-        ):
-            return True
-    return False
+    subjects = {atom.arguments[0] for atom in rule.body if atom.kind in FACT_KINDS}
+    return any(_can_be(term, rule, attribute, classes) for term in subjects)
+
+
+def _can_be(term: Term, rule: Rule, attribute: str, classes: set[str]) -> bool:
+    asking = [atom for atom in rule.body if term in atom.arguments]
+    return isinstance(term, Variable) and all(
+        atom.arguments[0] == term and _could_hold(atom, attribute, classes) for atom in asking
+    )
+
+
+def _terms_of(*rules: Rule) -> set[Term]:
+    return {term for rule in rules for atom in rule.atoms for term in atom.arguments}
 
 
 def _could_hold(atom: Atom, attribute: str, classes: set[str]) -> bool:
@@ -139,17 +132,17 @@ def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
 
 
 def _exchangeable(base: Ontology, one: str, other: str) -> bool:
+    known_as = base.model.components
     swap: dict[str | Lit, str] = {
-        base.model.components[one]: base.model.components[other],
-        base.model.components[other]: base.model.components[one],
+        known_as[one]: known_as[other],
+        known_as[other]: known_as[one],
     }
-    atoms = [atom for rule in base.content.enabled_rules for atom in rule.atoms]
-    terms = {term for atom in atoms for term in atom.arguments}
-    if not terms.isdisjoint(map(Named, swap.values())):
+    content = base.content
+    if not _terms_of(*content.enabled_rules).isdisjoint(map(Named, swap.values())):
         return False
-    if any(f"<{iri}>" in line for line in base.content.structure for iri in swap):
+    if not swap.keys().isdisjoint(itertools.chain.from_iterable(content.structure)):
         return False
-    known = itertools.chain(base.content.triples, *(base.model.own[iri] for iri in swap.values()))
+    known = itertools.chain(content.triples, *(base.model.own[iri] for iri in swap.values()))
     own = {triple for triple in known if triple[0] in swap or triple[2] in swap}
     return own == {
         (swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own
@@ -159,7 +152,7 @@ def _exchangeable(base: Ontology, one: str, other: str) -> bool:
 #: One side of a comparison: IRIs of quality attributes whose values it can be, and numbers; _ANY:
 # of any attribute.
 _Side = frozenset[str | Decimal]
-_ANY: Final = ""
+_ANY = ""
 
 
 def regions_by_attribute(base: Ontology, attributes: tuple[str, ...]) -> dict[str, Regions] | None:
@@ -169,25 +162,26 @@ def regions_by_attribute(base: Ontology, attributes: tuple[str, ...]) -> dict[st
     known = base.model.attributes
     if not known.keys() >= {*attributes} or not regions_of(base).is_sound or not _is_plain(base):
         return None
-    measured = {known[name] for name in attributes}
+    measured = set(map(known.__getitem__, attributes))
     numbers = {iri: set(_values(base, iri)) for iri in measured}
-    for rule in base.content.enabled_rules:
-        for one, other in _compared(rule):
-            both = one | other
-            concerned = measured & both
-            if _ANY in both:
-                if not (_is_of_numbers(one) or _is_of_numbers(other)):
-                    return None
-                concerned = measured
-            elif len(concerned) > 1:
-                return None
-            for attribute in concerned:
-                numbers[attribute].update(*(_numbers_of(base, each) for each in both))
+    for one, other in itertools.chain.from_iterable(map(_compared, base.content.enabled_rules)):
+        concerned = _concerned(one, other, measured)
+        if concerned is None:
+            return None
+        for attribute in concerned:
+            numbers[attribute].update(*(_numbers_of(base, each) for each in one | other))
     return {name: Regions(tuple(sorted(numbers[known[name]])), ()) for name in attributes}
 
 
-def _is_of_numbers(side: _Side) -> bool:
-    return all(isinstance(each, Decimal) for each in side)
+def _concerned(one: _Side, other: _Side, measured: set[str]) -> Collection[str] | None:
+    """The attributes whose values a comparison can be about; None if it relates those of several
+    to one another.
+    """
+    if _ANY in one | other:
+        are_numbers = (all(isinstance(each, Decimal) for each in side) for side in (one, other))
+        return measured if any(are_numbers) else None
+    found = [name for name in measured if name in one | other]
+    return found if len(found) < 2 else None
 
 
 def _numbers_of(base: Ontology, one: str | Decimal) -> set[Decimal]:
@@ -198,7 +192,7 @@ def _numbers_of(base: Ontology, one: str | Decimal) -> set[Decimal]:
 def _values(base: Ontology, attribute: str) -> set[Decimal]:
     """The numbers that the ontologies give of a quality attribute."""
     triples = base.content.triples
-    typed = {s for s, p, o in triples if (p, o) == (rdf.IS_QA_TYPE, attribute)}
+    typed = rdf.subjects(triples, rdf.IS_QA_TYPE, attribute)
     values = (o for s, p, o in triples if p == rdf.HAS_VALUE and s in typed)
     return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
 
@@ -207,11 +201,7 @@ def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
     """Both sides of each comparison of values in a rule; a variable that is read twice compares
     what it reads.
     """
-    types = {
-        atom.arguments[0]: atom.arguments[1].iri
-        for atom in rule.body
-        if atom.predicate == rdf.IS_QA_TYPE and isinstance(atom.arguments[1], Named)
-    }
+    types = {atom.arguments[0]: attribute for atom, attribute in attributes_asked(rule)}
     read: dict[Term, list[_Side]] = {}
     for atom in rule.body:
         if atom.kind == "data":
@@ -260,19 +250,19 @@ def _says_more(triple: Triple) -> bool:
 def _has_equal_individuals(base: Ontology) -> bool:
     """Whether two individuals may be the same, or a rule may say so or give one a value."""
     triples = base.content.triples
-    if any(p == SAME or o == rdf.OWL + "InverseFunctionalProperty" for _, p, o in triples):
+    inverse = rdf.members(triples, [rdf.OWL + "InverseFunctionalProperty"])
+    if inverse or rdf.subjects(triples, SAME):
         return True
-    kind = (rdf.RDF_TYPE, rdf.OWL + "FunctionalProperty")
-    functional = {s for s, p, o in triples if (p, o) == kind}
+    functional = rdf.members(triples, [rdf.FUNCTIONAL])
     own = Counter((s, p) for s, p, o in triples if p in functional and isinstance(o, str))
-    if own and max(own.values()) > 1:
+    if max(own.values(), default=0) > 1:
         return True
     return any(_equates(rule, functional) for rule in base.content.enabled_rules)
 
 
 def _equates(rule: Rule, functional: Collection[str]) -> bool:
     """Whether a rule speaks of identity, concludes a value, or what may make individuals equal."""
-    if any(atom.predicate in IDENTITIES for atom in rule.atoms):
+    if rule.speaks_of_identity:
         return True
     concluded = {atom.predicate for atom in rule.head}
     links = {atom.predicate for atom in rule.head if atom.kind == "object"}

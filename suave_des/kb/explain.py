@@ -13,12 +13,13 @@ nearest, with the value found and the value needed.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.kb import matching
@@ -56,7 +57,7 @@ from suave_des.knowledge.state import (
     value_text,
 )
 
-_IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
+_IRI = re.compile(r"[a-z]+:[^\s,()]+")
 
 
 @dataclass(frozen=True)
@@ -139,11 +140,7 @@ class Tracer:
             KnowledgeError: the state contradicts itself.
         """
         given = self.base.assertions(self.state)
-        asks = any(
-            atom.predicate in IDENTITIES
-            for rule in self.base.content.enabled_rules
-            for atom in rule.atoms
-        )
+        asks = any(rule.speaks_of_identity for rule in self.base.content.enabled_rules)
         return self._told[0].union(self.asserted, self.pellet.identities(given) if asks else ())
 
     @cached_property
@@ -227,12 +224,7 @@ class Tracer:
 
     def _ways_of(self, triple: Triple) -> Iterator[_Way]:
         for rule in self.base.content.enabled_rules:
-            starts = (
-                matching.matched(atom, each, {})
-                for atom in rule.head
-                for each in _both_ways(triple)
-            )
-            for start in (each for each in starts if each is not None):
+            for start in matching.concluding(rule, _both_ways(triple)):
                 for binding in matching.matches(rule, self._facts, start):
                     said = (matching.stated(atom, binding) for atom in rule.body)
                     body = dict.fromkeys(canonical_triple(one) for one in said if one is not None)
@@ -246,19 +238,17 @@ class Tracer:
             whether there was any.
         """
         new: dict[Triple, _Way] = {}
-        for triple, ways in self._ways.items():
-            if triple not in self._found:
-                ready = [way for way in ways if all(one in self._found for one in way.body)]
-                if ready:
-                    new[triple] = ready[0]
-        for triple, way in sorted(new.items(), key=lambda each: str(each[0])):
-            premises = tuple(self._found[each] for each in way.body)
-            fact, axioms = self._fact(triple), tuple[str, ...]()
+        for triple in self._open:
+            ready = (way for way in self._ways[triple] if self._found.keys() >= {*way.body})
+            for way in itertools.islice(ready, 1):
+                new[triple] = way
+        for triple, way in new.items():
+            derivation = Derivation(self._fact(triple), "rule", way.rule, way.bindings)
             if way.rule is None:
                 axioms = self._axioms(triple, way.body)
-            source = "axioms" if way.rule is None else "rule"
-            new_one = Derivation(fact, source, way.rule, way.bindings, axioms, premises)
-            self._found[triple] = new_one
+                derivation = replace(derivation, source="axioms", axioms=axioms)
+            premises = tuple(self._found[each] for each in way.body)
+            self._found[triple] = replace(derivation, premises=premises)
         return bool(new)
 
     @property
@@ -357,7 +347,7 @@ class _Way(NamedTuple):
 
 def _is_expression(triple: Triple) -> bool:
     """Whether a triple says that something is a member of a class expression."""
-    return triple[1] == rdf.RDF_TYPE and str(triple[2]).startswith("_:")
+    return triple[1] == rdf.RDF_TYPE and rdf.is_node(triple[2])
 
 
 def _asked_of(triple: Triple) -> Atom:
@@ -406,7 +396,7 @@ def _denial(triple: Triple) -> str:
     return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(rdf.n_triple, triples)))
 
 
-_WORDS: Final = {
+_WORDS = {
     "<": "less than",
     "<=": "at most",
     ">": "greater than",
@@ -414,16 +404,16 @@ _WORDS: Final = {
     "=": "equal to",
     "!=": "different from",
 }
-_OF_GROUNDINGS: Final = sorted(rdf.terms(rdf.TOMASYS, "FunctionGrounding typeFD solvesO"))
+_OF_GROUNDINGS = sorted(rdf.terms(rdf.TOMASYS, "FunctionGrounding typeFD solvesO"))
 #: What a state asserts, and how to give it where it is missing.
-_GIVEN_BY_STATES: Final[Mapping[str, str]] = {
+_GIVEN_BY_STATES: Mapping[str, str] = {
     **dict.fromkeys(_OF_GROUNDINGS, "; ground a function: --at FUNCTION=DESIGN"),
     rdf.C_STATUS: "; report a component: --at COMPONENT=FALSE",
     rdf.HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
     rdf.TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
 }
 #: All that states assert.
-_IN_STATES: Final = rdf.terms(
+_IN_STATES = rdf.terms(
     rdf.TOMASYS, "QAvalue hasValue isQAtype typeF o_status o_always_improve"
 ).union(_GIVEN_BY_STATES)
 
@@ -479,12 +469,9 @@ class RuleQuestions:
         """Say why a rule, which may share its name, does not fire where variables stand for what
         `start` says.
         """
-        if not rule.enabled:
-            answer = f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
-            return WhyNot(rule.name, answer)
         never = self._why_never(rule)
-        if rule not in self._usable.rules:
-            return WhyNot(rule.name, never or f"never fires: {self._dropped[rule]}")
+        if never is not None and rule not in self._usable.content.enabled_rules:
+            return WhyNot(rule.name, never)
         known = self._known(state)
         if isinstance(known, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {known}")
@@ -493,20 +480,24 @@ class RuleQuestions:
             return WhyNot(rule.name, never)
         binding, failing = matching.nearest_match(rule, facts, start)
         if rule in firing and not (failing and start):
-            shown_bindings = matching.shown_bindings({} if failing else binding, self.base.names)
-            said = ", ".join(self._concluded(atom, dict(binding)) for atom in rule.head)
-            words = f"it fires{with_bindings(shown_bindings)}, and concludes {said}"
-            return WhyNot(rule.name, words, fires=True)
+            bindings = () if failing else matching.shown_bindings(binding, self.base.names)
+            return self._firing(rule, binding, with_bindings(bindings))
         if not failing:
             words = "it does not fire, though each atom of its body holds"
             return WhyNot(rule.name, words, failing=len(rule.body))
         return self._failing(rule, binding, failing, facts)
 
+    def _firing(self, rule: Rule, binding: Binding, how: str) -> WhyNot:
+        said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
+        return WhyNot(rule.name, f"it fires{how}, and concludes {said}", fires=True)
+
     def _why_never(self, rule: Rule) -> str | None:
         """Why a rule fires in no state, by the first problem in its text; None: there is none."""
+        if not rule.enabled:
+            return f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
         for each in rule_problems(rule, self.base.vocabulary):
             return f"never fires: {each.message}" + (f"; {each.remedy}" if each.remedy else "")
-        return None
+        return f"never fires: {self._dropped[rule]}" if rule in self._dropped else None
 
     def _failing(
         self, rule: Rule, binding: Binding, failing: Sequence[int], facts: Facts
@@ -527,9 +518,7 @@ class RuleQuestions:
         """Say why no rule concludes a fact, of each that could; those that lack least first."""
         found = []
         for rule in self.base.content.enabled_rules:
-            starts = (matching.matched(head, triple, {}) for head in rule.head)
-            start = next((each for each in starts if each is not None), None)
-            if start is not None:
+            for start in itertools.islice(matching.concluding(rule, [triple]), 1):
                 found.append(self.of(rule, state, start))
         return sorted(
             (each for each in found if not each.fires), key=lambda each: (each.failing, each.rule)
@@ -709,10 +698,9 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Lit):
-        is_plain_number = (
-            value.datatype in rdf.NUMERIC and str(rdf.value_of(value, base.names)) == value.text
-        )
-        return value.text if is_plain_number else write_term(value)
+        is_number = value.datatype in rdf.NUMERIC
+        is_plain = is_number and str(rdf.value_of(value, base.names)) == value.text
+        return value.text if is_plain else write_term(value)
     return base.names.short(value)
 
 
@@ -724,9 +712,9 @@ def _list(base: Ontology, values: list[str | Lit]) -> str:
 
 
 #: How many rules are named for a fact that does not follow, and values where another one is needed.
-_MOST: Final = 3
-_WHY: Final = re.compile(r"why\s+(?:not\s+)?([^\s(?]+)\s*\??", re.IGNORECASE)
-_FORMS: Final = 'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
+_MOST = 3
+_WHY = re.compile(r"why\s+(?:not\s+)?([^\s(?]+)\s*\??", re.IGNORECASE)
+_FORMS = 'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
 
 
 CHOSEN, LEFT_OUT, NOT_BEST = "chosen", "left out", "not the best"
@@ -754,15 +742,12 @@ def verdicts(base: Ontology, reasoning: Reasoning, decision: Decision) -> Iterat
         elif design in rejected:
             yield Candidate(design, LEFT_OUT, rejected[design])
         else:
-            own, best = (
-                performance(reasoning.inference, each) for each in (design, str(decision.design))
-            )
-            tie = f"performance {own}, as {decision.design}, which is first by name"
-            yield Candidate(
-                design,
-                NOT_BEST,
-                tie if own == best else f"performance {own} < {best} of {decision.design}",
-            )
+            own = performance(reasoning.inference, design)
+            best = performance(reasoning.inference, str(decision.design))
+            reason = f"performance {own} < {best} of {decision.design}"
+            if own == best:
+                reason = f"performance {own}, as {decision.design}, which is first by name"
+            yield Candidate(design, NOT_BEST, reason)
 
 
 @dataclass(frozen=True)
@@ -846,14 +831,7 @@ class Explainer:
 
     def design(self, design: str) -> tuple[str, ...]:
         """Why a design is chosen or not."""
-        function = next(
-            (name for name in self.base.functions if design in self.base.designs(name)), None
-        )
-        if function is None:
-            known = [each for name in self.base.functions for each in self.base.designs(name)]
-            raise InputError(
-                f"there is no function design {shown(design)}", remedy=did_you_mean(design, known)
-            )
+        function = self._solved_by(design)
         for decision in self.reasoning.plan.decisions:
             if decision.function == function:
                 return self.decision(decision, design)
@@ -862,6 +840,16 @@ class Explainer:
         if function not in {each.function for each in state.objectives}:
             answer = f"{function} has no objective in this state"
         return (f"{function}: nothing is decided: {answer}",)
+
+    def _solved_by(self, design: str) -> str:
+        """The function that a design solves."""
+        for name in self.base.functions:
+            if design in self.base.designs(name):
+                return name
+        known = [each for name in self.base.functions for each in self.base.designs(name)]
+        raise InputError(
+            f"there is no function design {shown(design)}", remedy=did_you_mean(design, known)
+        )
 
     def decision(self, decision: Decision, asked: str | None = None) -> tuple[str, ...]:
         """Why a decision is made: the answer, which begins with the design that was asked about,
@@ -876,15 +864,19 @@ class Explainer:
                 lines += ["  adapted because", *self.derive(fact).lines("    ")]
         for each in verdicts(self.base, self.reasoning, decision):
             lines.append(f"  {each}")
-            for fact in (
-                Fact(each.design, "fd_realisability", False),
-                Fact(each.design, "fd_error_log", objective),
-            ):
-                if each.verdict == LEFT_OUT and fact in self.triples:
-                    lines += self.derive(fact).lines("    ")
+            if each.verdict == LEFT_OUT:
+                lines += self._why_left_out(each.design, objective)
             if each.design == asked:
                 answer = f"{asked} is {each.verdict}: {each.reason}"
                 if decision.design is None:
                     present = self.reasoning.inference.state.grounded(function) or function
                     answer = f"no design is left, {present} stays; {answer}"
         return f"{function}: {answer}", *lines
+
+    def _why_left_out(self, design: str, objective: str) -> Iterator[str]:
+        for fact in (
+            Fact(design, "fd_realisability", False),
+            Fact(design, "fd_error_log", objective),
+        ):
+            if fact in self.triples:
+                yield from self.derive(fact).lines("    ")

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import rdflib
 from rdflib.namespace import RDFS
@@ -42,10 +42,11 @@ from suave_des.scenario_knowledge import open_base
 
 if TYPE_CHECKING:  # or every command of kb would load the parser
     from rdflib.plugins.sparql.sparql import Query
+    from rdflib.query import Result
 
-_UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
-_MODEL_NAME: Final = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
-_PREFIXES: Final = {
+_UNNAMED = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
+_MODEL_NAME = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
+_PREFIXES = {
     name: PREFIXES[name]
     for name in ("suave", "tomasys", "mros", "rdf", "rdfs", "owl", "xsd", "swrl")
 }
@@ -245,8 +246,7 @@ class KnowledgeBase:
         Raises:
             KnowledgeError: as infer.
         """
-        heads = (atom for rule in self.base.content.enabled_rules for atom in rule.head)
-        if not any(atom.predicate in IDENTITIES for atom in heads):
+        if not any(atom.predicate in IDENTITIES for atom in self.base.content.conclusions):
             return ()
         given = self.base.assertions(state)
 
@@ -381,19 +381,29 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         result = graph.query(query)
         if result.type == "ASK":
             return QueryResult(("answer",), ((str(result.askAnswer).lower(),),), unknown)
-        if result.type == "SELECT":
-            columns = list(map(str, result.vars or ()))
-            if "*" in text.partition("{")[0]:  # all variables, which rdflib returns in any order
-                columns.sort()
-            rows = [_texts(graph, (row[name] for name in columns)) for row in result]  # type: ignore
-        else:
-            columns = ["subject", "predicate", "object"]
-            rows = [_texts(graph, triple) for triple in result.graph or ()]
+        columns = _columns(result, text)
+        rows = [_texts(graph, each) for each in _answers(result, columns)]
     except Exception as error:  # evaluation raises whatever the functions of the query raise
         raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
     if result.type != "SELECT" or "OrderBy" not in str(query.algebra):
         rows.sort(key=_sortable)
     return QueryResult(tuple(columns), tuple(rows), unknown)
+
+
+def _columns(result: Result, text: str) -> list[str]:
+    if result.type != "SELECT":
+        return ["subject", "predicate", "object"]
+    names = list(map(str, result.vars or ()))
+    is_all = "*" in text.partition("{")[0]  # which rdflib returns in any order
+    return sorted(names) if is_all else names
+
+
+def _answers(result: Result, columns: Sequence[str]) -> Iterator[Iterable[object]]:
+    if result.type != "SELECT":
+        yield from result.graph or ()
+        return
+    for row in result:
+        yield [row[name] for name in columns]  # type: ignore
 
 
 def _parsed(text: str) -> Query:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 from types import MappingProxyType
-from typing import Final
 
 from suave_des.kb.situations import Situation
 from suave_des.knowledge.ontology import Content, Ontology, Terms
@@ -30,18 +30,18 @@ from suave_des.knowledge.rules import (
 from suave_des.knowledge.state import ContradictionError, Value, value_text
 
 #: Begins the IRIs of what is added to a knowledge base to question it.
-PROBE: Final = "urn:suave-des:probe"
-_HOLDS: Final = f"{PROBE}#holds"
-_MEMBER: Final = f"{PROBE}#member"
+PROBE = "urn:suave-des:probe"
+_HOLDS = f"{PROBE}#holds"
+_MEMBER = f"{PROBE}#member"
 
 Body = tuple[Atom, ...]
 #: What the variables of a rule stand for: IRIs and literals by name.
 Binding = Mapping[str, str | Lit]
 #: The same as people write it.
 Bound = tuple[tuple[str, Value], ...]
-_BINDING: Final = ("class", "object", "data")
+_BINDING = ("class", "object", "data")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
-MOST_WAYS: Final = 20_000
+MOST_WAYS = 20_000
 
 
 def bound(term: Term, binding: Binding) -> str | Lit | None:
@@ -58,9 +58,9 @@ def instance(atom: Atom, binding: Binding) -> Atom:
 
     def value(term: Term) -> Term:
         found = bound(term, binding)
-        return (
-            term if found is None else canonical(found) if isinstance(found, Lit) else Named(found)
-        )
+        if found is None:
+            return term
+        return canonical(found) if isinstance(found, Lit) else Named(found)
 
     return replace(atom, arguments=tuple(map(value, atom.arguments)), places=())
 
@@ -89,7 +89,7 @@ def shown_bindings(binding: Binding, names: Names) -> Bound:
     return tuple((name, value_of(binding[name], names)) for name in sorted(binding))
 
 
-def with_bindings(bindings: Bound) -> str:
+def with_bindings(bindings: Iterable[tuple[str, Value]]) -> str:
     """Write the values of variables after something that holds with them."""
     words = ", ".join(f"?{name} = {value_text(value)}" for name, value in bindings)
     return f" with {words}" if words else ""
@@ -105,6 +105,13 @@ def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
     return unified(atom.arguments, (subject, value), binding) if fits else None
 
 
+def concluding(rule: Rule, triples: Iterable[Triple]) -> Iterator[Binding]:
+    """The bindings with which a rule concludes one of some triples."""
+    for atom, triple in product(rule.head, triples):
+        if (found := matched(atom, triple, {})) is not None:
+            yield found
+
+
 def stated(atom: Atom, binding: Binding) -> Triple | None:
     """The triple that an atom says with the values of its variables; None where one has none, or
     for another atom.
@@ -113,11 +120,9 @@ def stated(atom: Atom, binding: Binding) -> Triple | None:
     if atom.kind not in FACT_KINDS or None in terms:
         return None
     subject, value = str(terms[0]), terms[-1] or ""
-    return (
-        (subject, RDF_TYPE, atom.predicate)
-        if atom.kind == "class"
-        else (subject, atom.predicate, value)
-    )
+    if atom.kind == "class":
+        return subject, RDF_TYPE, atom.predicate
+    return subject, atom.predicate, value
 
 
 class Facts:
@@ -220,34 +225,27 @@ def _ways(
 def _tested(atom: Atom, binding: Binding) -> list[Binding] | None:
     """The bindings with which a built-in or datatype holds; None if an argument has no value."""
     asked = instance(atom, binding)
-    unbound = [term.name for term in asked.arguments if isinstance(term, Variable)]
+    unbound = list(asked.variables())
     if not unbound:
         return [binding] if _holds(asked) else []
     if not set(unbound) <= computed(atom, binding):
         return None
     if isinstance(asked.arguments[0], Variable) and len(set(unbound)) == 1:
-        found: list[tuple[Lit, ...]] = [(value,) for value in _computed(asked)]
-    else:
-        found = [tuple(value for name in unbound for value in _part(asked, name))]
-    return [
-        {**binding, **dict(zip(unbound, map(canonical, each), strict=True))}
-        for each in found
-        if len(each) == len(unbound)
-    ]
+        return [{**binding, unbound[0]: canonical(value)} for value in _computed(asked, unbound[0])]
+    parts = [value for name in unbound for value in _computed(asked, name)]
+    if len(parts) != len(unbound):
+        return []
+    return [{**binding, **dict(zip(unbound, map(canonical, parts), strict=True))}]
 
 
 def _distance(atom: Atom, facts: Facts, binding: Binding) -> int:
     """How far an atom is from holding: a comparison, another value, nothing, a class."""
     if atom.kind not in FACT_KINDS:
         return 0
+    if atom.kind == "class":
+        return 3
     subject = bound(atom.arguments[0], binding)
-    return (
-        3
-        if atom.kind == "class"
-        else 1
-        if isinstance(subject, str) and facts.of(atom.predicate, subject)
-        else 2
-    )
+    return 1 if isinstance(subject, str) and facts.of(atom.predicate, subject) else 2
 
 
 def _canonical_body(rule: Rule) -> list[Atom]:
@@ -281,8 +279,8 @@ def _is_testable(atom: Atom, known: set[str]) -> bool:
     return set(atom.variables()) <= known | computed(atom, known)
 
 
-_IT: Final = Named(f"{PROBE}#it")
-_VALUE: Final = f"{PROBE}#value"
+_IT = Named(f"{PROBE}#it")
+_VALUE = f"{PROBE}#value"
 
 
 @lru_cache(maxsize=4096)
@@ -293,15 +291,8 @@ def _holds(atom: Atom) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def _computed(atom: Atom) -> tuple[Lit, ...]:
-    """What Pellet computes for the first argument, from the values of the others."""
-    given, body = _from_variables(atom)
-    return _concluded(given, body, Atom("data", _VALUE, (_IT, atom.arguments[0])))
-
-
-@lru_cache(maxsize=4096)
-def _part(atom: Atom, name: str) -> tuple[Lit, ...]:
-    """What Pellet computes for a variable that is not the first argument: a part of a date."""
+def _computed(atom: Atom, name: str) -> tuple[Lit, ...]:
+    """What Pellet computes for a variable: the first argument, or a part of a date."""
     given, body = _from_variables(atom)
     return _concluded(given, body, Atom("data", _VALUE, (_IT, Variable(name))))
 
@@ -310,7 +301,9 @@ def _from_variables(atom: Atom) -> tuple[tuple[Triple, ...], tuple[Atom, ...]]:
     """Facts and a body that give the values of an atom to variables: some are computed from these
     only.
     """
-    given, body, terms = list[Triple](), list[Atom](), list[Term]()
+    given: list[Triple] = []
+    body: list[Atom] = []
+    terms: list[Term] = []
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Lit):
             name, variable = f"{PROBE}#argument{number}", Variable(f"argument {number}")
@@ -352,7 +345,7 @@ def tracing_pellet(base: Ontology, bodies: Sequence[Body] = ()) -> InProcessPell
         Rule("", (atom,), (Atom("class", name, (Variable("x"),)),))
         for name, atom in members.items()
     ]
-    rules += [Rule("", body, (_head(number),)) for number, body in enumerate(bodies)]
+    rules += _probes(bodies)
     properties, classes = base.content.all_terms()
     terms = Terms((*properties, _HOLDS), (*classes, *members))
     return InProcessPellet(base.with_rules((*base.rules, *rules)), terms)
@@ -363,16 +356,13 @@ def told_of(base: Ontology, triples: Iterable[Triple]) -> tuple[frozenset[Triple
     bodies that hold.
     """
     members = {name: atom.predicate for name, atom in _expressions(base).items()}
-    known, numbers = set[Triple](), set[int]()
+    known: set[Triple] = set()
+    numbers: set[int] = set()
     for subject, predicate, value in triples:
         if predicate == _HOLDS and isinstance(value, Lit):
             numbers.add(int(value.text))
-        elif subject == _IT.iri or value == _IT.iri:  # which the probes alone have
-            continue
-        elif isinstance(value, str):
-            known.add((subject, predicate, members.get(value, value)))
-        else:
-            known.add((subject, predicate, value))
+        elif _IT.iri not in (subject, value):  # which the probes alone have
+            known.add((subject, predicate, members.get(str(value), value)))
     return frozenset(known), frozenset(numbers)
 
 
@@ -392,11 +382,7 @@ class Probes:
 
     def __init__(self, base: Ontology, limit: TimeLimit, bodies: Iterable[Body]) -> None:
         self._base, self._limit, self._bodies = base, limit, tuple(dict.fromkeys(bodies))
-        rules = (
-            Rule(f"probe {number}", body, (_head(number),))
-            for number, body in enumerate(self._bodies)
-        )
-        probed = base.with_rules((*base.rules, *rules))
+        probed = base.with_rules((*base.rules, *_probes(self._bodies)))
         self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
 
     def holding(self, situation: Situation) -> frozenset[Body] | None:
@@ -418,5 +404,8 @@ class Probes:
         return frozenset(self._bodies[int(number)] for number in numbers)
 
 
-def _head(number: int) -> Atom:
-    return Atom("data", _HOLDS, (_IT, Lit(str(number), XSD + "string")))
+def _probes(bodies: Sequence[Body]) -> Iterator[Rule]:
+    """Rules that conclude the numbers of the bodies that hold."""
+    for number, body in enumerate(bodies):
+        head = Atom("data", _HOLDS, (_IT, Lit(str(number), XSD + "string")))
+        yield Rule(f"probe {number}", body, (head,))

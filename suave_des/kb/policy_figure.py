@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain, cycle
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError
 from suave_des.kb.policy import FLIP_FLOP, Policy, function_table
@@ -16,18 +16,22 @@ from suave_des.results.figures import check_picture, write_picture
 from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publication
 from suave_des.tables import Table
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 #: Units of measured values; those of a user's own attributes are not known.
-_UNITS: Final = {"water_visibility": "m", "battery_level": "share of a full battery"}
-_FIXED: Final = {
+_UNITS = {"water_visibility": "m", "battery_level": "share of a full battery"}
+_FIXED = {
     **MODE_COLOURS,
     INCONSISTENT: "#B00020",
     NONE_LEFT: "#D9D9D9",
     NO_GROUNDING: "#FFFFFF",
 }
-_LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
-_ROW_IN: Final = 0.26
-_MOST_ROWS: Final = 60
-_LABEL_LETTERS: Final = 52
+_LEGEND = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
+_ROW_IN = 0.26
+_MOST_ROWS = 60
+_LABEL_LETTERS = 52
 
 
 def draw_policy(policy: Policy, path: Path) -> None:
@@ -40,11 +44,7 @@ def draw_policy(policy: Policy, path: Path) -> None:
     """
     check_picture(path)
     found = {name: function_table(policy, name) for name in policy.functions}
-    outcomes = {
-        name: {*chain(*(row[down:] for row in table.rows))}
-        for name, (table, down, _) in found.items()
-    }
-    drawn = {name: each for name, each in found.items() if len(outcomes[name] - {STAYS}) > 1}
+    drawn = {name: each for name, each in found.items() if _has_choice(*each)}
     if not drawn:
         raise InputError("no function has a choice to draw")
     rows = [len(table.rows) for table, _, _ in drawn.values()]
@@ -54,16 +54,11 @@ def draw_policy(policy: Policy, path: Path) -> None:
             remedy="lower --max-failed, or use --csv",
         )
     import matplotlib.pyplot as plt
-    from matplotlib.patches import Patch
 
     with publication():
-        names = {
-            _then(row[0], each)
-            for table, down, _ in drawn.values()
-            for row in table.rows
-            for each in row[down:]
-        }
-        colours, heights = _colours(names), [number + 4.0 for number in rows]
+        used = (_designs_after(table, down) for table, down, _ in drawn.values())
+        colours = _colours({*chain.from_iterable(used)})
+        heights = [number + 4.0 for number in rows]
         size = WIDTH_IN, _ROW_IN * sum(heights) + 0.6
         figure, grid = plt.subplots(
             len(drawn), figsize=size, height_ratios=heights, squeeze=False, layout="constrained"
@@ -71,20 +66,33 @@ def draw_policy(policy: Policy, path: Path) -> None:
         for axes, (name, each) in zip(grid.flat, drawn.items(), strict=True):
             _draw(axes, *each, colours)
             axes.set_title(name, loc="left")
-        handles = [
-            Patch(
-                facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name)
-            )
-            for name, colour in colours.items()
-        ]
-        title = "in use afterwards (rows: in use now, and what else matters)"
-        figure.legend(
-            handles=handles, loc="outside lower center", ncols=min(4, len(handles)), title=title
-        )
+        _add_legend(figure, colours)
         try:
             write_picture(figure, path, bbox_inches="tight")
         finally:
             plt.close(figure)
+
+
+def _add_legend(figure: Figure, colours: Mapping[str, str]) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(facecolor=colour, edgecolor="#8A8A8A", linewidth=0.4, label=_LEGEND.get(name, name))
+        for name, colour in colours.items()
+    ]
+    title = "in use afterwards (rows: in use now, and what else matters)"
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=min(4, len(handles)), title=title
+    )
+
+
+def _has_choice(table: Table, down: int, across: str) -> bool:
+    """Whether more than one thing can happen, besides that all stays as it is."""
+    return len({*chain(*(row[down:] for row in table.rows))} - {STAYS}) > 1
+
+
+def _designs_after(table: Table, down: int) -> set[str]:
+    return {_then(row[0], cell) for row in table.rows for cell in row[down:]}
 
 
 def _then(now: str, outcome: str) -> str:
@@ -92,14 +100,21 @@ def _then(now: str, outcome: str) -> str:
     return outcome.replace(STAYS, now, 1).partition(" (")[0]
 
 
-def _draw(axes: Any, table: Table, down: int, across: str, colours: dict[str, str]) -> None:
+def _draw(axes: Axes, table: Table, down: int, across: str, colours: dict[str, str]) -> None:
     import numpy as np
     from matplotlib.colors import ListedColormap
 
-    names, rows = list(colours), sorted(table.rows, key=lambda row: _low_to_high(row[0]))
+    names = list(colours)
+    rows = sorted(table.rows, key=lambda row: _low_to_high(row[0]))
     numbers = np.array([[names.index(_then(row[0], cell)) for cell in row[down:]] for row in rows])
-    cells = {"cmap": ListedColormap(list(colours.values())), "vmin": -0.5, "vmax": len(names) - 0.5}
-    axes.pcolormesh(numbers, edgecolors="white", linewidth=0.5, **cells)
+    axes.pcolormesh(
+        numbers,
+        edgecolors="white",
+        linewidth=0.5,
+        cmap=ListedColormap(list(colours.values())),
+        vmin=-0.5,
+        vmax=len(names) - 0.5,
+    )
     flips = np.array([[FLIP_FLOP in cell for cell in row[down:]] for row in rows])
     if flips.any():
         axes.pcolor(np.ma.masked_where(~flips, numbers), hatch="////", alpha=0.0)
@@ -121,14 +136,13 @@ def _labels(headings: Sequence[str], rows: list[Sequence[str]]) -> list[str]:
     reports = {report for row in rows for text in row[1:] for report in text.split(", ")}
     labels = []
     for now, *others in rows:
-        words = [
-            f"{heading} {_range(text)}"
-            if heading != "components"
-            else "any report"
-            if len(text.split(", ")) == len(reports)
-            else text
-            for heading, text in zip(headings, others, strict=True)
-        ]
+        words = []
+        for heading, text in zip(headings, others, strict=True):
+            if heading != "components":
+                words.append(f"{heading} {_range(text)}")
+            else:
+                is_any = len(text.split(", ")) == len(reports)
+                words.append("any report" if is_any else text)
         labels.append(
             "\n".join(
                 textwrap.shorten(text, _LABEL_LETTERS) for text in (now, "; ".join(words)) if text

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, number_of
 from suave_des.kb.explain import Tracer
@@ -20,7 +20,7 @@ from suave_des.knowledge.state import NONE_LEFT, STAYS, KnowledgeState
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 
-_UNCHANGED: Final = dict.fromkeys((STAYS, NONE_LEFT), "no change")
+_UNCHANGED = dict.fromkeys((STAYS, NONE_LEFT), "no change")
 
 
 FIRES, DECIDES, CONTRADICTS = "fires", "decides", "contradicts"
@@ -162,9 +162,12 @@ class _Trial:
             one, other = (_UNCHANGED.get(each, each) for each in choices)
             if one != other:
                 yield DECIDES, f"{name}: {other} instead of {one}"
+        yield from ((FIRES, words) for words in self._firings(state))
+
+    def _firings(self, state: KnowledgeState) -> Iterator[str]:
+        """What the tried rules conclude, and the individuals that their variables stand for."""
         tracer = Tracer(self.with_rule, state, self.pellet)
         for bindings, facts in (firing for rule in self.rules for firing in tracer.firings(rule)):
-            bound = with_bindings(
-                tuple(each for each in bindings if not isinstance(each[1], Decimal))
-            )
-            yield FIRES, f"{', '.join(map(str, facts))}{bound or ' with nothing bound'}"
+            individuals = [each for each in bindings if not isinstance(each[1], Decimal)]
+            bound = with_bindings(individuals) or " with nothing bound"
+            yield f"{', '.join(map(str, facts))}{bound}"

@@ -15,7 +15,6 @@ import stat
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 from xml.parsers import expat
 
 from lxml import etree
@@ -40,13 +39,13 @@ from suave_des.knowledge.rdf import (
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of, triples_of
 
-_TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
-_MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
-_PREFIXES: Final = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
+_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
+_MARK = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
+_PREFIXES = {"rdf": RDF, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
 _DESCRIPTION, _END = f"{{{RDF}}}Description", "</rdf:Description>"
 _TYPE, _VARIABLE, _BUILTIN = f"{{{RDF}}}type", SWRL + "Variable", SWRL + "Builtin"
-_NODE_ID: Final = f"{{{RDF}}}nodeID"
-_LANGUAGE: Final = "{http://www.w3.org/XML/1998/namespace}lang"
+_NODE_ID = f"{{{RDF}}}nodeID"
+_LANGUAGE = "{http://www.w3.org/XML/1998/namespace}lang"
 _Span = tuple[int, int]
 
 
@@ -137,15 +136,20 @@ def _spans_of(file: OntologyFile, name: str, *, with_parts: bool = False) -> lis
     """
     names = [rule.name for rule in rules_of(file)]
     if name not in names:
-        remedy = nearest(name, names) or f"its rules: {', '.join(names) or 'none'}"
-        raise KnowledgeError(f"there is no rule {name}", file=file.path, remedy=remedy)
+        raise _no_rule(file, name, names)
     root = etree.fromstring(file.content, etree.XMLParser(huge_tree=True, no_network=True))
     elements = [element for element in root if isinstance(element.tag, str)]
     spans = dict(zip(elements, _spans(file.content), strict=True))
-    found = [element for element in elements if _is_rule(element) and _name(element) == name]
+    rules = filter(_is_rule, elements)
+    found = [element for element in rules if _name(element) == name]
     if len(found) != names.count(name):
         raise _cannot(file.path)
     return [spans[element] for element in (_with_parts(found, elements) if with_parts else found)]
+
+
+def _no_rule(file: OntologyFile, name: str, names: Sequence[str]) -> KnowledgeError:
+    remedy = nearest(name, names) or f"its rules: {', '.join(names) or 'none'}"
+    return KnowledgeError(f"there is no rule {name}", file=file.path, remedy=remedy)
 
 
 def _with_parts(
@@ -214,18 +218,12 @@ def _rule_xml(rule: Rule) -> str:
         of.setdefault(triple[0], []).append(triple)
     root = etree.Element(_DESCRIPTION, nsmap=_PREFIXES)
     waiting = [(root, start)]
-    for (
-        element,
-        node,
-    ) in waiting:  # a list nests as deep as it is long, which is too deep for a recursion
+    # A list nests as deep as it is long, which is too deep for a recursion.
+    for element, node in waiting:
         for _, predicate, value in of[node]:
             inside = etree.SubElement(element, f"{{{namespace(predicate)}}}{local_name(predicate)}")
             if isinstance(value, Lit):
-                inside.text = value.text
-                if value.datatype.startswith("@"):
-                    inside.set(_LANGUAGE, value.datatype[1:])
-                elif predicate != RDFS + "label":
-                    inside.set(f"{{{RDF}}}datatype", value.datatype)
+                _write_literal(inside, predicate, value)
             elif value in of:
                 about = {} if value.startswith("_:") else {f"{{{RDF}}}about": value}
                 waiting.append((etree.SubElement(inside, _DESCRIPTION, about), value))
@@ -238,6 +236,14 @@ def _rule_xml(rule: Rule) -> str:
     return f"    {lines.removesuffix(_END)}\n    {_END}\n"
 
 
+def _write_literal(element: etree._Element, predicate: str, value: Lit) -> None:
+    element.text = value.text
+    if value.datatype.startswith("@"):
+        element.set(_LANGUAGE, value.datatype[1:])
+    elif predicate != RDFS + "label":
+        element.set(f"{{{RDF}}}datatype", value.datatype)
+
+
 def _replace(
     file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]
 ) -> None:
@@ -248,11 +254,9 @@ def _replace(
         result = read_ontology(file.path, content)
     except KnowledgeError as error:
         raise _cannot(file.path) from error
-    before, after = rules_of(file), rules_of(result)
-    intended = map(_statement, change(list(before)))
-    if sorted(map(_statement, after), key=str) != sorted(intended, key=str) or _others(
-        file
-    ) != _others(result):
+    intended = sorted(map(_statement, change(list(rules_of(file)))), key=str)
+    written = sorted(map(_statement, rules_of(result)), key=str)
+    if written != intended or _others(file) != _others(result):
         raise _cannot(file.path)
     path = file.path.resolve()
     mode = stat.S_IMODE(path.stat().st_mode)

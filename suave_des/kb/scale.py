@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError, shown
 from suave_des.knowledge.ontology import OPERATORS, Ontology
@@ -20,9 +19,9 @@ from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import mirrored
 from suave_des.knowledge.state import exact
 
-_SIGN: Final = re.compile("([<>]=?)")
-_MISSING: Final = "not measured"
-_REGIONS: Final = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
+_SIGN = re.compile("([<>]=?)")
+_MISSING = "not measured"
+_REGIONS = 'such as "< 1.25", ">= 3.25", "1.25 <= . < 2.25" or "not measured"'
 
 
 @dataclass(frozen=True)
@@ -63,13 +62,11 @@ class Scale:
             return "any"
         if low == high:
             return str(low)
-        # Odd places are ranges, without the numbers at their ends.
-        below = "<" if last % 2 else "<="
         if low is None:
-            return f"{below} {high}"
+            return f"{_sign(last)} {high}"
         if high is None:
-            return f"{'>' if first % 2 else '>='} {low}"
-        return f"{low} {'<' if first % 2 else '<='} . {below} {high}"
+            return f"{mirrored(_sign(first))} {low}"
+        return f"{low} {_sign(first)} . {_sign(last)} {high}"
 
     def value(self, place: int, rank: int = 0, ranks: int = 1) -> Decimal | None:
         """A value there, above 0 if there is one; in a range the `rank`-th of `ranks` ascending
@@ -101,6 +98,11 @@ class Scale:
                 for number, rank in zip(group, order, strict=True):
                     values[number] = self.value(places[number], rank, len(group))
             yield tuple(values)
+
+
+def _sign(place: int) -> str:
+    """How the values of a place relate to an end: odd places are ranges without their ends."""
+    return "<" if place % 2 else "<="
 
 
 def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:

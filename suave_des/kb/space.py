@@ -7,13 +7,14 @@ components with a status counts where ontologies and rules treat components alik
 from __future__ import annotations
 
 import itertools
+import operator
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from math import factorial, perm, prod
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.effects import has_effect, interchangeable_components, regions_by_attribute
@@ -27,9 +28,12 @@ from suave_des.knowledge.rules import texts_of
 from suave_des.knowledge.state import NO_GROUNDING, KnowledgeState
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 
+if TYPE_CHECKING:
+    import pandas
+
 #: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would
 # take ten minutes.
-LARGEST: Final = 400_000
+LARGEST = 400_000
 _T = TypeVar("_T")
 
 #: (component, c_status) of those that report.
@@ -46,28 +50,25 @@ def component_reports(
         reports of the first ones of each group of interchangeable components, with the number for
         which they stand.
     """
-    ways = (
-        [
-            each
-            for count in range(min(most, len(group)) + 1)
-            for each in itertools.combinations_with_replacement(statuses, count)
-        ]
-        for group in groups
-    )
     found: dict[Reports, int] = {}
-    for chosen in itertools.product(*ways):
+    for chosen in itertools.product(*(_reported(group, statuses, most) for group in groups)):
         if sum(map(len, chosen)) <= most:
-            both = list(zip(groups, chosen, strict=True))
-            components = sorted(
-                pair for group, named in both for pair in zip(group, named, strict=False)
-            )
-            alike = prod(
-                factorial(number) for named in chosen for number in Counter(named).values()
-            )
-            found[tuple(components)] = (
-                prod(perm(len(group), len(named)) for group, named in both) // alike
-            )
+            reports = sorted(itertools.chain.from_iterable(map(zip, groups, chosen)))
+            found[tuple(reports)] = prod(map(_number_alike, groups, chosen))
     return found
+
+
+def _reported(
+    group: Sequence[str], statuses: Sequence[str], most: int
+) -> Iterator[tuple[str, ...]]:
+    """What at most so many components of a group can report, without who reports it."""
+    for count in range(min(most, len(group)) + 1):
+        yield from itertools.combinations_with_replacement(statuses, count)
+
+
+def _number_alike(group: Sequence[str], reported: Sequence[str]) -> int:
+    """In how many ways components of a group can report some statuses."""
+    return perm(len(group), len(reported)) // prod(map(factorial, Counter(reported).values()))
 
 
 @dataclass(frozen=True)
@@ -220,21 +221,16 @@ class States:
         """
         import pandas  # an inference alone needs none, the larger part of its start
 
-        columns: dict[str, list[Any]] = {}
+        columns: dict[str, list[str] | list[int]] = {}
+        scale = self.space.scale
         for name in self.space.attributes:
-            columns[name] = [
-                self.space.scale.place(dict(state.measurements).get(name)) for state in states
-            ]
+            columns[name] = [scale.place(dict(each.measurements).get(name)) for each in states]
         columns["components"] = [
             "; ".join(f"{name}={status}" for name, status in each.components) for each in states
         ]
-        columns["states"] = [self.reports[state.components] for state in states]
+        columns["states"] = [self.reports[each.components] for each in states]
         for name in self.functions:
-            asked = (any(each.function == name for each in state.objectives) for state in states)
-            now = (state.grounded(name) or NO_GROUNDING for state in states)
-            columns[f"{name}_now"] = [
-                design if is_asked else "" for design, is_asked in zip(now, asked, strict=True)
-            ]
+            columns[f"{name}_now"] = [_present(each, name) for each in states]
         return pandas.DataFrame(columns)
 
     def shared(self, other: States) -> States:
@@ -242,17 +238,24 @@ class States:
         return replace(self, tasks=tuple(task for task in self.tasks if task in other.tasks))
 
 
+def _present(state: KnowledgeState, function: str) -> str:
+    """The grounding of a function that has an objective; empty if it has none."""
+    if all(each.function != function for each in state.objectives):
+        return ""
+    return state.grounded(function) or NO_GROUNDING
+
+
 def add_decisions(
-    cases: Any, states: States, outcomes: Sequence[Outcome], suffix: str = ""
+    cases: pandas.DataFrame, states: States, outcomes: Sequence[Outcome], suffix: str = ""
 ) -> None:
     """Add to a frame of states the inferred `statuses`, and what happens to the grounding of each
     function, `_then`.
     """
     cases[f"statuses{suffix}"] = ["; ".join(outcome.statuses) for outcome in outcomes]
     for name in states.functions:
-        then = map(Outcome.choice, outcomes, itertools.repeat(name))
         cases[f"{name}_then{suffix}"] = [
-            words if now else "" for words, now in zip(then, cases[f"{name}_now"], strict=False)
+            outcome.choice(name) if now else ""
+            for outcome, now in zip(outcomes, cases[f"{name}_now"], strict=True)
         ]
 
 
@@ -260,15 +263,13 @@ def _tasks(
     base: Ontology, settings: ManagingSettings, space: PolicySpace
 ) -> Iterator[KnowledgeState]:
     solvable = [name for name in base.functions if base.designs(name) or name in space.functions]
-    lasting = [name for name in LASTING if name in solvable]
-    for asked in [(*lasting, name) for name in solvable if name not in lasting] or [tuple(lasting)]:
-        for designs in itertools.product(*((None, *base.designs(name)) for name in asked)):
-            groundings = {
-                name: design
-                for name, design in zip(asked, designs, strict=True)
-                if design is not None
-            }
-            yield settings.state(dict.fromkeys(asked), groundings)
+    lasting = tuple(filter(solvable.__contains__, LASTING))
+    others: list[tuple[str, ...]] = [(name,) for name in solvable if name not in lasting]
+    for other in others or [()]:
+        asked = (*lasting, *other)
+        for designs in itertools.product(*(("", *base.designs(name)) for name in asked)):
+            grounded = filter(operator.itemgetter(1), zip(asked, designs, strict=True))
+            yield settings.state(dict.fromkeys(asked), dict(grounded))
 
 
 def kind_of(base: Ontology, space: PolicySpace) -> Callable[[KnowledgeState], Hashable]:
@@ -277,7 +278,7 @@ def kind_of(base: Ontology, space: PolicySpace) -> Callable[[KnowledgeState], Ha
     """
     functions = {*base.functions, *space.functions}
     effects = {
-        each: [name for name in space.attributes if has_effect(base, name, [each])]
+        each: [name for name in space.attributes if has_effect(base, name, each)]
         for each in functions
     }
     regions = regions_by_attribute(base, space.attributes)
@@ -315,11 +316,9 @@ def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount
         problem = "no function has a function design, so there is nothing to decide"
         remedy = "give an ontology that uses TOMASys as suave.owl does"
         raise KnowledgeError(problem, file=", ".join(map(str, base.files)), remedy=remedy)
-    kind, different, decided = (
-        kind_of(base, states.space),
-        dict[Hashable, KnowledgeState](),
-        dict[Hashable, Outcome](),
-    )
+    kind = kind_of(base, states.space)
+    different: dict[Hashable, KnowledgeState] = {}
+    decided: dict[Hashable, Outcome] = {}
     for state in states:
         different.setdefault(kind(state), state)
     on_count(0, len(different))

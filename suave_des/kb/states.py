@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
@@ -38,6 +38,7 @@ from suave_des.knowledge.rules import (
     texts_of,
 )
 from suave_des.knowledge.rules.files import (
+    NOUNS,
     RulesFile,
     Vocabulary,
     check_rule,
@@ -58,7 +59,7 @@ from suave_des.scenario.yamlfile import read_yaml, validated
 from suave_des.scenario_knowledge import REPORTED_STATUSES, measured_attributes
 
 #: Begins the IRIs of individuals that exist in a test or a question only.
-NEW_INDIVIDUAL: Final = "urn:suave-des:test#"
+NEW_INDIVIDUAL = "urn:suave-des:test#"
 
 
 @dataclass
@@ -125,8 +126,8 @@ class FactReader:
             for kind in kinds:
                 if kind in vocabulary.kinds.get(iri, ()):
                     return iri, kind
-        for head in (head for rule in self.base.content.enabled_rules for head in rule.head):
-            kind = _KINDS.get(head.kind, "")
+        for head in self.base.content.conclusions:
+            kind = NOUNS.get(head.kind, "")
             if kind in kinds and name in (head.predicate, local_name(head.predicate)):
                 return head.predicate, kind
         problem = f"there is no {kinds[0].split()[-1]} {shown(local_name(name))}"
@@ -172,9 +173,6 @@ class FactReader:
         raise InputError(f"there is no individual {shown(term.iri)}", remedy=remedy)
 
 
-_KINDS: Final = {"class": "class", "object": "object property", "data": "data property"}
-
-
 def read_rules(given: str, vocabulary: Vocabulary) -> tuple[Rule, ...]:
     """Read a rule that is given as "name: body -> head", or the rules of a file with the extension
     .swrl.
@@ -199,10 +197,10 @@ def _parsed(text: str) -> Atom:
 
 
 #: Functions that every task of the mission asks for.
-LASTING: Final = (MAINTAIN_MOTION,)
-_STATUSES: Final = {"components": "c_status", "objectives": "o_status"}
+LASTING = (MAINTAIN_MOTION,)
+_STATUSES = {"components": "c_status", "objectives": "o_status"}
 #: Parts of a state, and what their names are.
-_NOUNS: Final = {
+_NOUNS = {
     "measurements": "quality attribute",
     "components": "component",
     "groundings": "function",
@@ -220,7 +218,7 @@ class StateContent(BaseModel):
     components: dict[str, str | bool] = {}
     measurements: dict[str, int | float | bool | str] = {}
 
-    def parts(self) -> Iterator[tuple[str, str, Any, KeyPath]]:
+    def parts(self) -> Iterator[tuple[str, str, object, KeyPath]]:
         """Yield kind, name, value and key path of each part."""
         for kind in _NOUNS:
             content = getattr(self, kind)
@@ -286,7 +284,9 @@ class StateBuilder:
 
     base: Ontology
     settings: ManagingSettings
-    parts: dict[str, dict[str, Any]] = field(default_factory=lambda: {kind: {} for kind in _NOUNS})
+    parts: dict[str, dict[str, object]] = field(
+        default_factory=lambda: {kind: {} for kind in _NOUNS}
+    )
 
     def add(self, kind: str, name: str, value: Any) -> None:
         """Add one part: one of the objectives, groundings, components or measurements.
@@ -294,15 +294,13 @@ class StateBuilder:
         Raises:
             InputError: the knowledge base has no such name, or the value makes no sense.
         """
-        if name not in (known := self._known(kind)):
+        known = self._known(kind)
+        if name not in known:
             raise InputError(
                 f"there is no {_NOUNS[kind]} {shown(name)}", remedy=did_you_mean(name, known)
             )
         if kind == "measurements":
-            if isinstance(value, bool) or not isinstance(value, int | float | str | Decimal):
-                raise InputError(
-                    f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8"
-                )
+            _check_number(name, value)
         elif isinstance(value, bool):  # YAML reads a bare FALSE as one
             value = str(value).upper()
         # Both raise an error if the value is no number, or no text.
@@ -432,6 +430,12 @@ class StateBuilder:
         search = [name for name in (*LASTING, GENERATE_SEARCH_PATH) if name in self.base.functions]
         asked = self.parts["objectives"] or dict.fromkeys(self.parts["groundings"] or search)
         return self.settings.state(**self.parts | {"objectives": asked})
+
+
+def _check_number(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float | str | Decimal):
+        remedy = f"for instance {name}: 1.8"
+        raise InputError(f"{name}: {shown(value)} is not a number", remedy=remedy)
 
 
 def state_dict(state: KnowledgeState) -> dict[str, Any]:

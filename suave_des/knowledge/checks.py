@@ -13,9 +13,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import chain
+from itertools import chain, takewhile
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
@@ -38,11 +38,13 @@ from suave_des.knowledge.rules import (
     write_atom,
 )
 from suave_des.knowledge.rules.files import (
+    NOUNS,
     WITHOUT_NAME,
     RulesFile,
     about_rule,
     looked_up,
     rule_problems,
+    variable_uses,
 )
 from suave_des.resources import shipped_folder, shown_name
 
@@ -99,6 +101,12 @@ class Material:
             triples=tuple(dict.fromkeys((*self.base.content.triples, *self.base.stated))),
         )
 
+    @cached_property
+    def terms(self) -> frozenset[str]:
+        """All IRIs that the ontologies have but as subjects."""
+        both = (*self.content.triples, *self.content.structure)
+        return frozenset(str(term) for _, *rest in both for term in rest)
+
     @property
     def rules(self) -> tuple[Rule, ...]:
         """The enabled rules."""
@@ -117,16 +125,19 @@ class Material:
         held = self._held_without_rules()
         steps = _schema_steps(content.triples)
         possible = rdf.reached(held, steps)
-        structure = "".join(content.structure)
+        not_followed = {*chain.from_iterable(content.structure)}  # expressions, property chains
 
         def allows(atom: Atom) -> bool:
-            is_named = atom.kind in ("class", "object", "data") and not atom.expression
-            # Class expressions and property chains are not followed.
-            return not is_named or atom.predicate in possible or f"<{atom.predicate}>" in structure
+            if atom.kind not in NOUNS or atom.expression:
+                return True
+            return atom.predicate in possible or atom.predicate in not_followed
+
+        def can_fire(rule: Rule) -> bool:
+            return all(map(allows, rule.body))
 
         waiting = list(content.enabled_rules)
-        while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
-            waiting = [rule for rule in waiting if not all(map(allows, rule.body))]
+        while firing := list(filter(can_fire, waiting)):
+            waiting = [rule for rule in waiting if rule not in firing]
             held.update(atom.predicate for rule in firing for atom in rule.head)
             possible = rdf.reached(held, steps)
         return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
@@ -171,6 +182,10 @@ class Material:
         given = {path.resolve() for path in (*ontologies, *self.subject.rules)}
         return rule.file.resolve() in given and not self.is_of_metamodel(rule)
 
+    def measures(self, attribute: str) -> bool:
+        """Whether missions measure a quality attribute, or that is not checked."""
+        return self.subject.measured is None or attribute in self.subject.measured
+
     def about(self, level: Level, name: str, message: str, remedy: str | None = None) -> Finding:
         """Make a finding about the thing of a name."""
         file, line = place_of(name, self.base.sources)
@@ -186,15 +201,12 @@ class Material:
 
 def _schema_steps(triples: Iterable[rdf.Triple]) -> list[tuple[str, str]]:
     """Each class or property with those to which its members or values lead."""
-    leads = rdf.terms(rdf.RDFS, "subClassOf subPropertyOf domain range")
+    leads = rdf.terms(rdf.RDFS, "subClassOf domain range")
     both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
-    steps = []
-    for one, name, other in triples:
-        if name in leads or name in both_ways:
-            steps.append((one, str(other)))
-        if name in both_ways or name == rdf.RDFS + "subPropertyOf":
-            steps.append((str(other), one))
-    return steps
+    return [
+        *rdf.links(triples, *leads),
+        *rdf.both_ways(rdf.links(triples, *both_ways, rdf.SUBPROPERTY)),
+    ]
 
 
 def static_findings(subject: Subject, sources: Sources) -> list[Finding]:
@@ -253,10 +265,10 @@ def imports(material: Material) -> Iterator[Finding]:
 
 # The model, and what missions have to do with it.
 
-_ABOUT_CLASSES: Final = rdf.terms(rdf.RDFS, "subClassOf domain range") | rdf.terms(
+_ABOUT_CLASSES = rdf.terms(rdf.RDFS, "subClassOf domain range") | rdf.terms(
     rdf.OWL, "equivalentClass disjointWith"
 )
-_PROPERTIES: Final = ("object property", "data property", "annotation property")
+_PROPERTIES = ("object property", "data property", "annotation property")
 
 
 def values(material: Material) -> Iterator[Finding]:
@@ -406,12 +418,9 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
 
 def values_that_are_not_used(material: Material) -> Iterator[Finding]:
     """Find values that ontologies give of measurements, in whose place missions have others."""
-    measured = material.subject.measured
-    if measured is None:
-        return
-    valued = {s for s, predicate, _ in material.content.triples if predicate == rdf.HAS_VALUE}
+    valued = rdf.subjects(material.content.triples, rdf.HAS_VALUE)
     for name, iri in material.base.model.measurements.items():
-        if iri in valued and name not in measured:
+        if iri in valued and not material.measures(name):
             problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
             yield material.about(Level.WARN, local_name(iri), problem, "measure it in the scenario")
 
@@ -435,7 +444,7 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
     """
     content = material.content
     subject = material.subject
-    asserted = {each for each, predicate, _ in content.triples if predicate == rdf.C_STATUS}
+    asserted = rdf.subjects(content.triples, rdf.C_STATUS)
     if subject.reported is not None and rdf.C_STATUS not in content.concluded:
         for name, iri in sorted(material.base.model.components.items()):
             if name not in subject.reported and iri not in asserted:
@@ -444,23 +453,17 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
                 yield material.about(
                     Level.NOTE, name, f"{nothing}, so it has none in missions", remedy
                 )
-    expected = _expected(material.base.model)
-    for name in sorted(
-        expected.difference(expected if subject.measured is None else subject.measured)
-    ):
-        problem = (
-            f"missions do not measure {name}, so what designs expect of it is compared with nothing"
-        )
-        yield material.about(Level.NOTE, name, problem)
+    for name in sorted(_expected(material.base.model)):
+        if not material.measures(name):
+            problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+            yield material.about(Level.NOTE, name, problem)
 
 
 def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
     """Return the quality attributes that missions measure and designs expect, and that cannot be
     compared.
     """
-    compared = {
-        subject for subject, predicate, _ in base.content.triples if predicate == rdf.QA_OPERATOR
-    }
+    compared = rdf.subjects(base.content.triples, rdf.QA_OPERATOR)
     known = base.model.attributes
     return sorted(
         name for name in _expected(base.model).intersection(measured) if known[name] not in compared
@@ -549,7 +552,7 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
                     yield material.suspicious(rule, place, message, remedy)
 
 
-_TEXTS: Final = rdf.terms(rdf.XSD, "string boolean")
+_TEXTS = rdf.terms(rdf.XSD, "string boolean")
 
 
 def never_comparable(material: Material) -> Iterator[Finding]:
@@ -611,13 +614,13 @@ def undeclared_terms(material: Material) -> Iterator[Finding]:
             yield material.suspicious(rule, None, problem, "declare it: a swrl:Variable")
         for number, atom in enumerate(rule.atoms):
             if (
-                atom.kind in _NOUNS
+                atom.kind in NOUNS
                 and not atom.expression
                 and atom.predicate not in vocabulary.kinds
                 and (number >= len(rule.body) or atom.predicate in vocabulary.used)
             ):
                 name = local_name(atom.predicate)
-                noun = _NOUNS[atom.kind]
+                noun = NOUNS[atom.kind]
                 remedy = vocabulary.guess(atom.predicate, (noun,))
                 yield material.suspicious(
                     rule,
@@ -625,9 +628,6 @@ def undeclared_terms(material: Material) -> Iterator[Finding]:
                     f"{noun} {name} is not defined: it is taken as the rule uses it",
                     remedy or f"declare it as {noun} in the ontology",
                 )
-
-
-_NOUNS: Final = {"class": "class", "object": "object property", "data": "data property"}
 
 
 def shared_names(material: Material) -> Iterator[Finding]:
@@ -679,16 +679,15 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
     if rdf.IS_QA_TYPE in content.concluded:
         return
     of_groundings = _without_value_in_groundings(material)
-    stated = {str(o) for _, predicate, o in content.triples if predicate == rdf.IS_QA_TYPE}
-    measured = material.subject.measured
+    stated = rdf.values(content.triples, rdf.IS_QA_TYPE)
     for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
-        for atom, attribute in _attributes_asked(rule):
+        for atom, attribute in attributes_asked(rule):
             name = local_name(attribute)
             if atom.arguments[0] in held:
                 if name in of_groundings:
                     yield rule, atom, *of_groundings[name]
-            elif measured is not None and name not in measured and attribute not in stated:
+            elif not material.measures(name) and attribute not in stated:
                 problem = f"missions do not measure {name}, and no ontology has a value of it"
                 yield rule, atom, problem, None
 
@@ -701,7 +700,6 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
     if rdf.HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
         return {}
     estimated = frozenset().union(*model.estimated.values())
-    measured = model.attributes if material.subject.measured is None else material.subject.measured
     found: dict[str, tuple[str, str | None]] = {}
     for name in model.attributes:
         if name not in estimated:
@@ -709,13 +707,13 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
                 f"no function design has an estimate of {name}, so no grounding has a value of it"
             )
             found[name] = problem, f"add a hasQAestimation of type {name} to a design"
-        elif name not in measured:
+        elif not material.measures(name):
             problem = f"missions do not measure {name}, so no grounding has a value of it"
             found[name] = problem, None
     return found
 
 
-def _attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
+def attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
     """The atoms of a rule that name the quality attribute of a value, with its IRI."""
     for atom in rule.body:
         if atom.predicate == rdf.IS_QA_TYPE and len(atom.arguments) == 2:
@@ -738,9 +736,7 @@ def never_fires(material: Material) -> Iterator[Finding]:
 
 #: Axioms by which individuals are different: declared so, or members of disjoint classes or
 # properties.
-_MAKE_DIFFERENT: Final = re.compile(
-    rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)"
-)
+_MAKE_DIFFERENT = re.compile(rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
 
 
 def equal_individuals(material: Material) -> Iterator[Finding]:
@@ -749,12 +745,8 @@ def equal_individuals(material: Material) -> Iterator[Finding]:
 
     Values of functional properties can, so such a rule is suspicious, not dead.
     """
-    terms = (
-        *(predicate for _, predicate, _ in material.content.triples),
-        *material.content.structure,
-    )
-    heads = (atom.kind for rule in material.rules for atom in rule.head)
-    if any(map(_MAKE_DIFFERENT.search, terms)) or "different" in heads:
+    heads = {atom.kind for atom in material.content.conclusions}
+    if any(map(_MAKE_DIFFERENT.match, material.terms)) or "different" in heads:
         return
     remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
     for rule in material.rules:
@@ -776,7 +768,7 @@ def identities_of_names(material: Material) -> Iterator[Finding]:
 
 
 #: Axioms by which individuals that have different names can be the same.
-_MAKE_SAME: Final = re.compile(rdf.OWL + "(sameAs|.*Functional|.*ardinality|oneOf|hasKey|hasValue)")
+_MAKE_SAME = re.compile(rdf.OWL + "(sameAs|InverseFunctional|.*ardinality|oneOf|hasKey|hasValue)")
 
 
 def same_individuals(material: Material) -> Iterator[Finding]:
@@ -792,19 +784,15 @@ def same_individuals(material: Material) -> Iterator[Finding]:
 
 def _can_be_the_same(material: Material) -> bool:
     """Whether axioms or rules can make two individuals one."""
-    triples = material.content.triples
-    terms = (*(str(o) for _, _, o in triples), *(p for _, p, _ in triples))
-    of_properties = (each for each in terms if each != _FUNCTIONAL)
-    if any(map(_MAKE_SAME.search, (*of_properties, *material.content.structure))):
+    if any(map(_MAKE_SAME.match, material.terms)):
         return True
     kinds = material.base.vocabulary.kinds
-    functional = {s for s, _, o in triples if o == _FUNCTIONAL}
-    if any("object property" in kinds.get(name, ()) for name in functional):
+    every = (*material.content.triples, *material.content.structure)
+    functional = rdf.members(every, [rdf.FUNCTIONAL])
+    if any(rdf.is_node(name) or "object property" in kinds.get(name, ()) for name in functional):
         return True
-    return any(atom.kind == "same" for rule in material.rules for atom in rule.head)
+    return any(atom.kind == "same" for atom in material.content.conclusions)
 
-
-_FUNCTIONAL: Final = rdf.OWL + "FunctionalProperty"
 
 # Rules that cannot mean what their author wanted.
 
@@ -814,25 +802,23 @@ def misspelt_variables(material: Material) -> Iterator[Finding]:
     for rule in material.rules:
         places: dict[str, list[Place | None]] = defaultdict(list)
         values: dict[str, set[bool]] = defaultdict(set)
-        for atom in rule.atoms:
-            for number, term in enumerate(atom.arguments):
-                if isinstance(term, Variable):
-                    values[term.name].add(atom.takes_value(number))
-                    places[term.name].append(atom.place(number))
-        earlier: list[str] = []
-        for name, where in places.items():
-            if len(where) == 1:
-                near = [each for each in places if values[each] & values[name]]
-                often = [each for each in near if len(places[each]) > 1]
-                # One that occurs more often, else one that occurs before.
-                meant = _near(name, often) or _near(
-                    name, (each for each in earlier if each in near)
-                )
-                if meant is not None:
-                    problem = f"?{name} occurs only here, and is another variable than ?{meant}"
-                    remedy = f"did you mean ?{meant}?"
-                    yield material.suspicious(rule, where[0], problem, remedy)
-            earlier.append(name)
+        for atom, number, name in variable_uses(rule.atoms):
+            values[name].add(atom.takes_value(number))
+            places[name].append(atom.place(number))
+        for name, (place, *more) in places.items():
+            alike = {each: places[each] for each in places if values[each] & values[name]}
+            meant = None if more else _meant(name, alike)
+            if meant is not None:
+                problem = f"?{name} occurs only here, and is another variable than ?{meant}"
+                yield material.suspicious(rule, place, problem, f"did you mean ?{meant}?")
+
+
+def _meant(name: str, alike: Mapping[str, Sequence[Place | None]]) -> str | None:
+    """The variable, of some with their places, whose name one is probably a misspelling of: one
+    that occurs more often, else one that occurs before.
+    """
+    often = (each for each, places in alike.items() if len(places) > 1)
+    return _near(name, often) or _near(name, takewhile(name.__ne__, alike))
 
 
 def _near(name: str, names: Iterable[str]) -> str | None:
@@ -856,8 +842,7 @@ def are_near(one: str, other: str) -> bool:
 
 def two_values(material: Material) -> Iterator[Finding]:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
-    triples = material.content.triples
-    functional = {s for s, name, o in triples if (name, o) == (rdf.RDF_TYPE, _FUNCTIONAL)}
+    functional = rdf.members(material.content.triples, [rdf.FUNCTIONAL])
     for rule in material.rules:
         asked: dict[tuple[str, Term], Term] = {}
         for atom in rule.body:
@@ -899,7 +884,7 @@ def _same(one: Term, other: Term) -> bool:
     return one == other
 
 
-_FD_REALISABILITY: Final = rdf.TOMASYS + "fd_realisability"
+_FD_REALISABILITY = rdf.TOMASYS + "fd_realisability"
 
 
 def no_effect(material: Material) -> Iterator[Finding]:
@@ -953,7 +938,7 @@ def _statuses_asked(rule: Rule) -> Iterator[tuple[Atom, Term]]:
             yield from ((atom, term) for term in atom.arguments)
 
 
-CHECKS: Final[tuple[Callable[[Material], Iterable[Finding]], ...]] = (
+CHECKS: tuple[Callable[[Material], Iterable[Finding]], ...] = (
     values,
     undefined_names,
     functions_without_design,

@@ -11,13 +11,12 @@ import hashlib
 import itertools
 import json
 import operator
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
-from typing import Final, NamedTuple, TypeGuard
+from typing import NamedTuple, TypeGuard
 
 from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge import rdf
@@ -48,29 +47,27 @@ from suave_des.knowledge.state import (
 # The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all
 # libraries in use write and read without loss.
 
-_DECLARED: Final = rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty Class")
-_CLASSES: Final = frozenset((rdf.OWL + "Class", rdf.RDFS + "Class"))
-_PROPERTIES: Final = rdf.terms(
+_DECLARED = rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty Class")
+_CLASSES = frozenset((rdf.OWL + "Class", rdf.RDFS + "Class"))
+_PROPERTIES = rdf.terms(
     rdf.OWL,
     "ObjectProperty DatatypeProperty FunctionalProperty InverseFunctionalProperty TransitiveProperty "
     "SymmetricProperty AsymmetricProperty ReflexiveProperty IrreflexiveProperty",
 )
 #: What only an object property can be: it is one, whether or not it is declared as one.
-_OF_OBJECT_PROPERTIES: Final = rdf.terms(
+_OF_OBJECT_PROPERTIES = rdf.terms(
     rdf.OWL,
     "InverseFunctionalProperty TransitiveProperty SymmetricProperty AsymmetricProperty ReflexiveProperty "
     "IrreflexiveProperty",
 )
-_TRANSITIVE: Final = rdf.OWL + "TransitiveProperty"
-_CHAIN: Final = rdf.OWL + "propertyChainAxiom"
-_FIRST: Final = rdf.RDF + "first"
-_REST: Final = rdf.RDF + "rest"
-#: What makes values of a property follow from two others.
-_JOINING: Final = re.compile(re.escape(rdf.OWL) + "(TransitiveProperty|propertyChain)")
+_TRANSITIVE = rdf.OWL + "TransitiveProperty"
+_CHAIN = rdf.OWL + "propertyChainAxiom"
+#: That of the first draft of OWL 2, which is about a property without a name.
+_CHAIN_OF_DRAFT = rdf.OWL + "propertyChain"
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
-RULE_IRI: Final = "urn:suave-des:rule:"
+RULE_IRI = "urn:suave-des:rule:"
 #: Annotations, which mean nothing for inference.
-_ANNOTATIONS: Final = rdf.terms(rdf.RDFS, "label comment seeAlso isDefinedBy") | {
+_ANNOTATIONS = rdf.terms(rdf.RDFS, "label comment seeAlso isDefinedBy") | {
     *(rdf.OWL + "versionInfo", rdf.SWRLA + "isRuleEnabled")
 }
 
@@ -91,14 +88,14 @@ class Content:
     Attributes:
         triples: about named things and with named things or literals as values, without those of
             rules.
-        structure: all others, with blank nodes in them (class expressions), as N-Triples.
+        structure: all others, with blank nodes in them (class expressions).
         rules: the rules of all files, disabled ones included.
         replaced: rules that those of the same name in a later file of rules have replaced, each
             with its replacement.
     """
 
     triples: tuple[rdf.Triple, ...]
-    structure: tuple[str, ...]
+    structure: tuple[rdf.Triple, ...]
     rules: tuple[Rule, ...]
     replaced: tuple[tuple[Rule, Rule], ...] = ()
 
@@ -106,6 +103,11 @@ class Content:
     def enabled_rules(self) -> tuple[Rule, ...]:
         """The enabled rules."""
         return tuple(rule for rule in self.rules if rule.enabled)
+
+    @property
+    def conclusions(self) -> list[Atom]:
+        """The atoms that the enabled rules conclude."""
+        return [atom for rule in self.enabled_rules for atom in rule.head]
 
     @property
     def concluded(self) -> frozenset[str]:
@@ -121,14 +123,11 @@ class Content:
         a property it tries every choice of individuals: it may lose inferences, and may never end,
         depending on the order of its axioms.
         """
-        joined = {s for s, p, o in self.triples if o == _TRANSITIVE or p == _CHAIN}
         asked = {a.predicate for r in self.enabled_rules for a in r.body if a.kind == "object"}
-        for line in self.structure:
-            subject, predicate, _ = line.split(" ", 2)
-            if predicate == f"<{_CHAIN}>":
-                joined.add(subject.strip("<>"))
-            elif _JOINING.search(line):
-                return tuple(sorted(asked))  # joined without a name: it may be any of them
+        if any(p == _CHAIN_OF_DRAFT or o == _TRANSITIVE for _, p, o in self.structure):
+            return tuple(sorted(asked))  # joined without a name: it may be any of them
+        both = (*self.triples, *self.structure)
+        joined = {s for s, p, o in both if o == _TRANSITIVE or p == _CHAIN}
         return tuple(sorted(asked & rdf.reached(joined, self._related_properties())))
 
     def joined_by_rules(self) -> Content:
@@ -136,15 +135,14 @@ class Content:
         that holds of named individuals, and at once.
         """
         rules: list[Rule] = []
-        kept: list[str] = []
-        for line in self.structure:
-            subject, predicate, node = line.removesuffix(" .\n").split(" ", 2)
-            links = self._items(node) if predicate == f"<{_CHAIN}>" else []
-            if links and all(each.startswith("<") for each in links):
-                names = [each.strip("<>") for each in links]
-                rules.append(_joining_rule(names, subject.strip("<>")))
+        kept: list[rdf.Triple] = []
+        for triple in self.structure:
+            subject, predicate, value = triple
+            links = self._items(value) if predicate == _CHAIN else []
+            if links and not any(map(rdf.is_node, links)):
+                rules.append(_joining_rule(links, subject))
             else:
-                kept.append(line)
+                kept.append(triple)
         triples: list[rdf.Triple] = []
         for subject, predicate, value in self.triples:
             if value == _TRANSITIVE:
@@ -159,34 +157,19 @@ class Content:
             rules=(*self.rules, *rules),
         )
 
-    def _items(self, node: str) -> list[str]:
-        """The items of a list in the structure, as N-Triples has them."""
-        firsts, rests = self._lists
+    def _items(self, node: str | Lit) -> list[str]:
+        """The items of a list in the structure; one that leads back into itself ends there."""
+        values: dict[tuple[str | Lit, str], str | Lit] = {(s, p): o for s, p, o in self.structure}
         found: list[str] = []
-        while node in firsts and len(found) < len(firsts):
-            found.append(firsts[node])
-            node = rests.get(node, "")
+        while (node, rdf.FIRST) in values and len(found) < len(values):
+            found.append(str(values[node, rdf.FIRST]))
+            node = values.get((node, rdf.REST), "")
         return found
-
-    @cached_property
-    def _lists(self) -> tuple[dict[str, str], dict[str, str]]:
-        """The first item and the rest of each list in the structure, as N-Triples has them."""
-        firsts: dict[str, str] = {}
-        rests: dict[str, str] = {}
-        for line in self.structure:
-            subject, predicate, value = line.removesuffix(" .\n").split(" ", 2)
-            if predicate == f"<{_FIRST}>":
-                firsts[subject] = value
-            elif predicate == f"<{_REST}>":
-                rests[subject] = value
-        return firsts, rests
 
     def _related_properties(self) -> list[tuple[str, str]]:
         """Each property with those to which its values lead: super-properties and inverses."""
-        both_ways = (rdf.OWL + "inverseOf", rdf.OWL + "equivalentProperty")
-        related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
-        edges = [(s, o) for s, p, o in related if p in (rdf.RDFS + "subPropertyOf", *both_ways)]
-        return edges + [(o, s) for s, p, o in related if p in both_ways]
+        alike = rdf.links(self.triples, *rdf.terms(rdf.OWL, "inverseOf equivalentProperty"))
+        return [*rdf.links(self.triples, rdf.SUBPROPERTY), *rdf.both_ways(alike)]
 
     def decision_terms(self) -> Terms:
         """Terms on which decisions depend, and terms that rules assert, with super-properties and
@@ -203,31 +186,31 @@ class Content:
         """Every property and class, for some axiom can conclude any of them, and those that rules
         ask for.
         """
-        kinds: dict[str, set[str]] = {}
-        for subject, predicate, value in self.triples:
-            if predicate == rdf.RDF_TYPE and isinstance(value, str):
-                kinds.setdefault(value, set()).add(subject)
         decisions = self.decision_terms()
-        properties = {*decisions.properties}.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
-        properties.update(name for _, name, _ in filter(rdf.is_fact, self.triples))
-        classes = {*decisions.classes}.union(*(kinds.get(kind, ()) for kind in _CLASSES))
-        classes.update(name for _, name in rdf.memberships(self.triples))
         asked = [atom for rule in self.enabled_rules for atom in rule.body if not atom.expression]
-        properties.update(atom.predicate for atom in asked if atom.kind in ("object", "data"))
-        classes.update(atom.predicate for atom in asked if atom.kind == "class")
-        annotations = kinds.get(rdf.OWL + "AnnotationProperty", set())
+        properties = {
+            *decisions.properties,
+            *rdf.members(self.triples, _PROPERTIES),
+            *(name for _, name, _ in filter(rdf.is_fact, self.triples)),
+            *(atom.predicate for atom in asked if atom.kind in ("object", "data")),
+        }
+        classes = {
+            *decisions.classes,
+            *rdf.members(self.triples, _CLASSES),
+            *(name for _, name in rdf.memberships(self.triples)),
+            *(atom.predicate for atom in asked if atom.kind == "class"),
+        }
+        annotations = rdf.members(self.triples, [rdf.OWL + "AnnotationProperty"])
         # What has no name is an atom that SWRL does not know.
         return Terms(_named(properties - annotations - {""}), _named(classes - {""}))
 
     def n_triples(self, rules: Sequence[Rule] | None = None) -> str:
         """Write all of it for a reasoner, with the enabled rules or those given."""
         chosen = self.enabled_rules if rules is None else rules
-        lines = [rdf.n_triple(triple) for triple in self.triples]
-        lines += self.structure
-        lines += [rdf.n_triple(triple) for triple in _declarations(self.triples, chosen)]
+        triples = [*self.triples, *self.structure, *_declarations(self.triples, chosen)]
         for rule in chosen:
-            lines += _rule_lines(rule, self.rules.index(rule))
-        return "".join(lines)
+            triples += _rule_triples(rule, self.rules.index(rule))
+        return "".join(map(rdf.n_triple, triples))
 
 
 def _joining_rule(links: Sequence[str], whole: str) -> Rule:
@@ -249,14 +232,14 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
     replaced.
     """
     triples = dict[rdf.Triple, None]()
-    structure: list[str] = []
+    structure: list[rdf.Triple] = []
     rules: dict[tuple[str, str], Rule] = {}  # of two that say the same in several files, the first
     for source in sorted(sources, key=lambda source: source.content):
         for rule in rules_of(source):
             rules.setdefault((rule.name, rule.text), rule)
         for subject, predicate, value in _meaningful(source):
-            if any(term.startswith("_:") for term in (subject, value) if isinstance(term, str)):
-                structure.append(rdf.n_triple((subject, predicate, value)))
+            if rdf.is_node(subject) or rdf.is_node(value):
+                structure.append((subject, predicate, value))
                 continue
             if predicate == rdf.HAS_VALUE and local_name(subject) in values:
                 value = Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal")
@@ -291,11 +274,7 @@ def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[
     Pellet accepts an undeclared term, but stock owlready2 drops what is inferred of it; declared,
     both agree.
     """
-    declared = {
-        subject
-        for subject, predicate, value in triples
-        if predicate == rdf.RDF_TYPE and value in _DECLARED
-    }
+    declared = rdf.members(triples, _DECLARED)
     return [
         (name, rdf.RDF_TYPE, rdf.OWL + kind)
         for name, kind in sorted(_concluded(rules))
@@ -310,34 +289,31 @@ def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
     return {(atom.predicate, kinds[atom.kind]) for atom in heads if atom.kind in kinds}
 
 
-def _rule_lines(rule: Rule, number: int) -> list[str]:
-    """A rule's N-Triples, with an IRI for the rule and numbered blank nodes."""
+def _rule_triples(rule: Rule, number: int) -> Iterator[rdf.Triple]:
+    """A rule's triples, with an IRI for the rule and numbered blank nodes."""
     triples = [triple for triple in triples_of(rule) if triple[1] not in _ANNOTATIONS]
-    renamed: dict[str | Lit, str] = {triples[0][0]: f"{RULE_IRI}{number}"}
-    for term in (term for subject, _, value in triples for term in (subject, value)):
-        if isinstance(term, str) and term.startswith("_:"):
-            renamed.setdefault(term, f"_:r{number}n{len(renamed)}")
-    return [rdf.n_triple((renamed.get(s, s), p, renamed.get(o, o))) for s, p, o in triples]
+    own: dict[str | Lit, str] = {triples[0][0]: f"{RULE_IRI}{number}"}
+    return rdf.numbered_nodes(triples, f"_:r{number}n", own)
 
 
 # The model.
 
 #: Comparison operators that a quality attribute type may have.
-OPERATORS: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
+OPERATORS: Mapping[str, Callable[[Decimal, Decimal], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
     ">": operator.gt,
     ">=": operator.ge,
 }
-_HAS_QA_ESTIMATION: Final = rdf.TOMASYS + "hasQAestimation"
-_ALWAYS: Final = rdf.TOMASYS + "o_always_improve"
-_SOLVES_F: Final = rdf.TOMASYS + "solvesF"
-_SOLVES_O: Final = rdf.TOMASYS + "solvesO"
-_TYPE_F: Final = rdf.TOMASYS + "typeF"
-_TYPE_FD: Final = rdf.TOMASYS + "typeFD"
+_HAS_QA_ESTIMATION = rdf.TOMASYS + "hasQAestimation"
+_ALWAYS = rdf.TOMASYS + "o_always_improve"
+_SOLVES_F = rdf.TOMASYS + "solvesF"
+_SOLVES_O = rdf.TOMASYS + "solvesO"
+_TYPE_F = rdf.TOMASYS + "typeF"
+_TYPE_FD = rdf.TOMASYS + "typeFD"
 #: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology
 # asserts of it.
-_STATE_PROPERTIES: Final = frozenset(
+_STATE_PROPERTIES = frozenset(
     {
         _TYPE_F,
         _TYPE_FD,
@@ -386,6 +362,22 @@ class Model:
 
     def triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
         """What a state asserts of its objectives, groundings, components and measurements."""
+        yield from self._triples_of_loop(state)
+        reported = dict(state.components)
+        for name, iri in self.components.items():
+            if name in reported:
+                yield iri, rdf.C_STATUS, Lit(reported[name], rdf.XSD + "string")
+            else:
+                yield from self.own[iri]
+        for name, value in state.measurements:
+            if name in self.attributes:
+                iri = self.measurements[name]
+                yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "QAvalue"), *self.own[iri])
+                yield iri, rdf.IS_QA_TYPE, self.attributes[name]
+                yield iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.XSD + "decimal")
+
+    def _triples_of_loop(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
+        """What a state asserts of its objectives and groundings."""
         for objective in state.objectives:
             iri = self.objectives[objective.function]
             yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "Objective"), *self.own[iri])
@@ -404,18 +396,6 @@ class Model:
             for name, _ in state.measurements:
                 if name in self.estimated[design]:
                     yield iri, rdf.HAS_QA_VALUE, self.measurements[name]
-        reported = dict(state.components)
-        for name, iri in self.components.items():
-            if name in reported:
-                yield iri, rdf.C_STATUS, Lit(reported[name], rdf.XSD + "string")
-            else:
-                yield from self.own[iri]
-        for name, value in state.measurements:
-            if name in self.attributes:
-                iri = self.measurements[name]
-                yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "QAvalue"), *self.own[iri])
-                yield iri, rdf.IS_QA_TYPE, self.attributes[name]
-                yield iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.XSD + "decimal")
 
 
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
@@ -428,17 +408,16 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
         KnowledgeError: two functions, designs, components or quality attribute types share a name.
     """
     triples = content.triples
-    solved = _objects(triples, _SOLVES_F)
-    solving = _subjects(triples, _SOLVES_F)
-    parts = _subjects(triples, rdf.MROS + "requiredBy") | _subjects(triples, rdf.C_STATUS)
-    types = _objects(triples, rdf.IS_QA_TYPE)
-    found = {
-        "Function": _members(triples, "Function") | solved,
-        "FunctionDesign": _members(triples, "FunctionDesign") | solving,
-        "Component": _members(triples, "Component") | parts,
-        "QualityAttributeType": _members(triples, "QualityAttributeType") | types,
+    used = {
+        "Function": rdf.values(triples, _SOLVES_F),
+        "FunctionDesign": rdf.subjects(triples, _SOLVES_F),
+        "Component": rdf.subjects(triples, rdf.MROS + "requiredBy")
+        | rdf.subjects(triples, rdf.C_STATUS),
+        "QualityAttributeType": rdf.values(triples, rdf.IS_QA_TYPE),
     }
-    by_name = {kind: _by_name(iris, kind, sources) for kind, iris in found.items()}
+    by_name = {
+        kind: _by_name(_members(triples, kind) | iris, kind, sources) for kind, iris in used.items()
+    }
     objectives = _in_states(content, by_name["Function"], _OBJECTIVES)
     groundings = _in_states(content, by_name["FunctionDesign"], _GROUNDINGS)
     measurements = _in_states(content, by_name["QualityAttributeType"], _MEASUREMENTS)
@@ -465,20 +444,12 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     return model, replace(content, triples=kept)
 
 
-_IN_WORDS: Final = {
+_IN_WORDS = {
     "Function": "functions",
     "FunctionDesign": "function designs",
     "Component": "components",
     "QualityAttributeType": "quality attribute types",
 }
-
-
-def _subjects(triples: Iterable[rdf.Triple], predicate: str) -> set[str]:
-    return {subject for subject, each, _ in triples if each == predicate}
-
-
-def _objects(triples: Iterable[rdf.Triple], predicate: str) -> set[str]:
-    return {value for _, each, value in triples if each == predicate and isinstance(value, str)}
 
 
 def _by_name(iris: Iterable[str], kind: str, sources: Sequence[OntologyFile]) -> dict[str, str]:
@@ -507,9 +478,9 @@ class _OfStates(NamedTuple):
     rename: Callable[[str], str]
 
 
-_OBJECTIVES: Final = _OfStates("Objective", _TYPE_F, objective_name)
-_GROUNDINGS: Final = _OfStates("FunctionGrounding", _TYPE_FD, grounding_name)
-_MEASUREMENTS: Final = _OfStates("QAvalue", None, measurement_name)
+_OBJECTIVES = _OfStates("Objective", _TYPE_F, objective_name)
+_GROUNDINGS = _OfStates("FunctionGrounding", _TYPE_FD, grounding_name)
+_MEASUREMENTS = _OfStates("QAvalue", None, measurement_name)
 
 
 def _in_states(content: Content, things: Mapping[str, str], kind: _OfStates) -> dict[str, str]:
@@ -522,9 +493,8 @@ def _in_states(content: Content, things: Mapping[str, str], kind: _OfStates) -> 
     named = {local_name(iri): iri for iri in sorted(_described(triples), reverse=True)}
     others = _described(triples) - _members(triples, kind.class_name) - _without_class(triples)
     linked: dict[str, list[str]] = {}
-    for subject, predicate, value in triples:
-        if predicate == kind.property and isinstance(value, str):
-            linked.setdefault(value, []).append(subject)
+    for subject, value in rdf.links(triples, kind.property):
+        linked.setdefault(value, []).append(subject)
     found: dict[str, str] = {}
     for name, iri in things.items():
         usual = kind.rename(name)
@@ -573,35 +543,29 @@ def _estimated(
     triples: Sequence[rdf.Triple], designs: Mapping[str, str]
 ) -> dict[str, dict[str, Decimal | None]]:
     """Return the smallest expected value of each quality attribute, by the design's name."""
-    numbers = {
-        subject: Decimal(value.text.strip())
-        for subject, predicate, value in triples
-        if predicate == rdf.HAS_VALUE and _is_decimal(value)
-    }
-    type_of = {
-        subject: local_name(value)
-        for subject, predicate, value in triples
-        if predicate == rdf.IS_QA_TYPE and isinstance(value, str)
-    }
+    numbers = {iri: Decimal(value.text.strip()) for iri, value in _decimals(triples)}
+    types = {subject: local_name(kind) for subject, kind in rdf.links(triples, rdf.IS_QA_TYPE)}
     found: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
-    for design, predicate, value in triples:
+    for design, value in rdf.links(triples, _HAS_QA_ESTIMATION):
         name = local_name(design)
-        if predicate != _HAS_QA_ESTIMATION or value not in type_of or designs.get(name) != design:
-            continue
-        attribute = type_of[str(value)]
-        values = (found[name].get(attribute), numbers.get(str(value)))
-        found[name][attribute] = min((each for each in values if each is not None), default=None)
+        if value in types and designs.get(name) == design:
+            given = (found[name].get(types[value]), numbers.get(value))
+            known = (each for each in given if each is not None)
+            found[name][types[value]] = min(known, default=None)
     return {name: dict(sorted(values.items())) for name, values in found.items()}
+
+
+def _decimals(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, Lit]]:
+    return ((s, o) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o))
 
 
 def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
     """Individuals of a class of TOMASys or of its subclasses."""
-    below = ((str(o), s) for s, p, o in triples if p == rdf.RDFS + "subClassOf")
-    classes = rdf.reached([rdf.TOMASYS + name], below)
-    return {s for s, p, o in triples if p == rdf.RDF_TYPE and o in classes}
+    below = ((above, kind) for kind, above in rdf.links(triples, rdf.SUBCLASS))
+    return rdf.members(triples, rdf.reached([rdf.TOMASYS + name], below))
 
 
-def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]]:
+def wrong_values(triples: Sequence[rdf.Triple]) -> Iterator[tuple[str, str, str]]:
     """Find numbers that are no decimals, unknown operators, and functional properties with several
     values.
 
@@ -611,10 +575,7 @@ def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]
     Yields:
         the IRI of the individual, what is wrong, and what would be right.
     """
-    triples = tuple(triples)
-    functional = {
-        s for s, p, o in triples if p == rdf.RDF_TYPE and o == rdf.OWL + "FunctionalProperty"
-    }
+    functional = rdf.members(triples, [rdf.FUNCTIONAL])
     names = rdf.Names(triples)
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
@@ -631,7 +592,7 @@ def wrong_values(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, str, str]
         if predicate in functional and isinstance(value, Lit):
             one = rdf.value_of(value, names)
             other = seen.setdefault((subject, predicate), one)
-            if one is not other and one != other:
+            if one != other:
                 values = f"the values {other} and {one}"
                 problem = (
                     f"contradiction: the functional property {local_name(predicate)} has {values}"
@@ -744,9 +705,7 @@ class Ontology:
         contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources.files)
         merged = merge(sources.files, values)
         model, content = build_model(merged, sources.files)
-        present = {
-            subject for subject, predicate, _ in content.triples if predicate == rdf.QA_OPERATOR
-        }
+        present = rdf.subjects(content.triples, rdf.QA_OPERATOR)
         without = {name: iri for name, iri in model.attributes.items() if iri not in present}
         assumed = {name: sign for name, sign in sorted(operators.items()) if name in without}
         if assumed:
@@ -756,9 +715,8 @@ class Ontology:
             ]
             content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
         numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
-        known = Vocabulary.of(merged.triples, model.in_states, enumerated_texts(sources.files))
-        in_expressions = re.findall(r"<([^>]+)>", "".join(merged.structure))
-        known = replace(known, used=known.used.union(in_expressions))
+        texts = enumerated_texts(sources.files)
+        known = Vocabulary.of(merged.triples, merged.structure, model.in_states, texts)
         return cls(
             files=tuple(sorted(source.path for source in sources.files)),
             content_hash=_digest(contents, numbers, assumed),
@@ -811,11 +769,7 @@ class Ontology:
         Raises:
             KnowledgeError: a value names no individual with a hasValue, or there is no such rule.
         """
-        valued = {
-            local_name(subject)
-            for subject, predicate, _ in self.stated
-            if predicate == rdf.HAS_VALUE
-        }
+        valued = set(map(local_name, rdf.subjects(self.stated, rdf.HAS_VALUE)))
         for key, names, known, problem in (
             ("values", values, valued, "the ontology has no individual {} with a hasValue"),
             (

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urljoin, urlsplit
 from xml.sax import SAXParseException
 
@@ -38,27 +38,27 @@ from suave_des.knowledge.rdf import (
     without_log,
 )
 
-MAX_BYTES: Final = 64 * 2**20
-_BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
-_SAVE_AS: Final = "an OWL ontology in RDF/XML or Turtle is expected, as Protégé saves it"
-TURTLE_ENDINGS: Final = (".ttl", ".nt")
+MAX_BYTES = 64 * 2**20
+_BASE = "{http://www.w3.org/XML/1998/namespace}base"
+_SAVE_AS = "an OWL ontology in RDF/XML or Turtle is expected, as Protégé saves it"
+TURTLE_ENDINGS = (".ttl", ".nt")
 #: How files in Turtle begin, if they have another ending; comments may stand before.
-_TURTLE: Final = r"@prefix|@base|prefix\s+[\w.-]*:\s*<|base\s+<|(<[^<>\s]+>|_:\w+)\s+<[^<>\s]+>\s"
-_XML_LABEL: Final = r"label[^<>]*>\s*([^<]*?)\s*<"
-_TURTLE_LABEL: Final = r'label>?\s+"([^"\n]*)"'
+_TURTLE = r"@prefix|@base|prefix\s+[\w.-]*:\s*<|base\s+<|(<[^<>\s]+>|_:\w+)\s+<[^<>\s]+>\s"
+_XML_LABEL = r"label[^<>]*>\s*([^<]*?)\s*<"
+_TURTLE_LABEL = r'label>?\s+"([^"\n]*)"'
 #: How files in the other notations that ontology editors save begin; comments may stand before.
-_OTHER_NOTATIONS: Final = {
+_OTHER_NOTATIONS = {
     "OWL in Functional Syntax": r"(Prefix|Ontology)\s*\(",
     "OWL in Manchester Syntax": r"(Prefix|Ontology):",
     "JSON-LD": r"[\[{]",
 }
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a
 # reasoner.
-_NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
-_EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
+_NOT_IN_IRI = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
+_EXTERNAL = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
 #: Stands for the folder of a file without xml:base, and reveals nothing of this machine's folders.
 #: As deep as a path may climb by "../".
-RELATIVE_TO: Final = "http://ontology.invalid/a/a/a/a/a/a/a/a/"
+RELATIVE_TO = "http://ontology.invalid/a/a/a/a/a/a/a/a/"
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,8 +277,8 @@ def _another_notation(path: Path, notation: str) -> KnowledgeError:
     return KnowledgeError(f"this is {notation}", file=path, remedy=remedy)
 
 
-_FORMATS: Final = {"RDF/XML": "xml", "Turtle": "turtle"}  # as rdflib names them
-_BAD_TURTLE: Final = re.compile(r"at line (\d+) of .*?Bad syntax \((.*?)\) at ", re.DOTALL)
+_FORMATS = {"RDF/XML": "xml", "Turtle": "turtle"}  # as rdflib names them
+_BAD_TURTLE = re.compile(r"at line (\d+) of .*?Bad syntax \((.*?)\) at ", re.DOTALL)
 
 
 def _parse_graph(path: Path, text: str, notation: str) -> Graph:

@@ -13,33 +13,33 @@ import math
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
-from typing import Final, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from rdflib import Literal, URIRef
 from rdflib.term import Node
 
-from suave_des.knowledge.state import Fact, Value
+from suave_des.knowledge.state import Fact, Value, plain_text
 
-TOMASYS: Final = "http://metacontrol.org/tomasys#"
-MROS: Final = "http://ros/mros#"
-SUAVE: Final = "http://www.metacontrol.org/suave#"
+TOMASYS = "http://metacontrol.org/tomasys#"
+MROS = "http://ros/mros#"
+SUAVE = "http://www.metacontrol.org/suave#"
 
-RDF: Final = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
-RDFS: Final = "http://www.w3.org/2000/01/rdf-schema#"
-OWL: Final = "http://www.w3.org/2002/07/owl#"
-XSD: Final = "http://www.w3.org/2001/XMLSchema#"
-SWRL: Final = "http://www.w3.org/2003/11/swrl#"
-SWRLB: Final = "http://www.w3.org/2003/11/swrlb#"
-SWRLA: Final = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#"
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+OWL = "http://www.w3.org/2002/07/owl#"
+XSD = "http://www.w3.org/2001/XMLSchema#"
+SWRL = "http://www.w3.org/2003/11/swrl#"
+SWRLB = "http://www.w3.org/2003/11/swrlb#"
+SWRLA = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#"
 
 #: Namespaces of OWL, RDF and SWRL: their terms describe no fact of the system.
-LANGUAGE_NAMESPACES: Final = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
+LANGUAGE_NAMESPACES = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
 
 #: Prefixes that need not be declared.
-PREFIXES: Final[Mapping[str, str]] = {
+PREFIXES: Mapping[str, str] = {
     "mros": MROS,
     "owl": OWL,
     "rdf": RDF,
@@ -52,13 +52,18 @@ PREFIXES: Final[Mapping[str, str]] = {
     "xsd": XSD,
 }
 
-RDF_TYPE: Final = RDF + "type"
-HAS_VALUE: Final = TOMASYS + "hasValue"
-HAS_QA_VALUE: Final = TOMASYS + "hasQAvalue"
-IS_QA_TYPE: Final = TOMASYS + "isQAtype"
-QA_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
-C_STATUS: Final = TOMASYS + "c_status"
-O_STATUS: Final = TOMASYS + "o_status"
+RDF_TYPE = RDF + "type"
+FIRST = RDF + "first"
+REST = RDF + "rest"
+SUBCLASS = RDFS + "subClassOf"
+SUBPROPERTY = RDFS + "subPropertyOf"
+FUNCTIONAL = OWL + "FunctionalProperty"
+HAS_VALUE = TOMASYS + "hasValue"
+HAS_QA_VALUE = TOMASYS + "hasQAvalue"
+IS_QA_TYPE = TOMASYS + "isQAtype"
+QA_OPERATOR = TOMASYS + "qa_comparison_operator"
+C_STATUS = TOMASYS + "c_status"
+O_STATUS = TOMASYS + "o_status"
 
 
 def terms(namespace: str, names: str) -> frozenset[str]:
@@ -67,19 +72,19 @@ def terms(namespace: str, names: str) -> frozenset[str]:
 
 
 #: What the planner and the loop read, whether or not a rule can conclude it.
-DECISION_PROPERTIES: Final = terms(
+DECISION_PROPERTIES = terms(
     TOMASYS,
     "fd_error_log fd_realisability fg_status hasNFR hasQAestimation hasQAvalue hasValue isQAtype o_always_improve "
     "o_status o_updatable qa_comparison_operator solvesF solvesO typeF typeFD",
 )
 
 #: The quality attribute that the planner maximises.
-PERFORMANCE: Final = MROS + "performance"
+PERFORMANCE = MROS + "performance"
 
 
 def local_name(iri: str) -> str:
     """Last part of an IRI: after '#', or after the last '/' or ':' where there is none."""
-    if iri.startswith("_:"):  # what has no name
+    if is_node(iri):
         return iri[2:]
     for separator in ("#", "/", ":"):
         head, found, tail = iri.rpartition(separator)
@@ -110,27 +115,69 @@ Triple = tuple[str, str, str | Lit]
 _T = TypeVar("_T")
 _Term = TypeVar("_Term", Lit, str | Lit)
 #: Datatypes of whole numbers.
-WHOLE: Final = terms(
+WHOLE = terms(
     XSD,
     "integer int long short byte nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger "
     "unsignedInt unsignedLong unsignedShort unsignedByte",
 )
 #: Datatypes of exact numbers.
-EXACT: Final = WHOLE | {XSD + "decimal"}
+EXACT = WHOLE | {XSD + "decimal"}
 #: Datatypes of numbers.
-NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
-_DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
-_WHOLE_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,400}")
-_FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
+NUMERIC = EXACT | {XSD + "float", XSD + "double"}
+_DECIMAL = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*")
+_WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,400}")
+_FLOAT = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
 #: How values of a datatype are written; rdflib, which takes more for them, knows the other
 # datatypes of XML Schema.
-_LEXICAL: Final = (
+_LEXICAL = (
     dict.fromkeys(WHOLE, re.compile(r"[+-]?[0-9]+"))
     | dict.fromkeys((XSD + "double", XSD + "float"), re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
     | {XSD + "boolean": re.compile(r"true|false|0|1"), XSD + "decimal": _DECIMAL}
 )
 #: Escapes in texts between quotes, of N-Triples and of rules.
-ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
+ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
+
+
+def is_node(term: str | Lit) -> bool:
+    """Whether a term is a blank node, which has no name."""
+    return isinstance(term, str) and term.startswith("_:")
+
+
+def subjects(triples: Iterable[Triple], predicate: str, value: str | Lit | None = None) -> set[str]:
+    """Return what has a value of a property; None: any value."""
+    return {s for s, p, o in triples if p == predicate and value in (None, o)}
+
+
+def members(triples: Iterable[Triple], classes: Collection[str | Lit]) -> set[str]:
+    """Return what is said to be of one of some classes."""
+    return {s for s, p, o in triples if p == RDF_TYPE and o in classes}
+
+
+def links(triples: Iterable[Triple], *predicates: str | None) -> Iterator[tuple[str, str]]:
+    """Yield each subject of one of some properties with its value, if that is no literal."""
+    return ((s, o) for s, p, o in triples if p in predicates and isinstance(o, str))
+
+
+def both_ways(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return pairs, and each of them turned round."""
+    known = list(pairs)
+    return [*known, *((other, one) for one, other in known)]
+
+
+def values(triples: Iterable[Triple], predicate: str) -> set[str]:
+    """Return the values of a property that are no literals."""
+    return {value for _, value in links(triples, predicate)}
+
+
+def numbered_nodes(
+    triples: Iterable[Triple], start: str, names: Mapping[str | Lit, str] = {}
+) -> Iterator[Triple]:
+    """Rename blank nodes to a text with their number in order; some things have names already."""
+    found = dict(names)
+    for subject, predicate, value in triples:
+        for term in filter(is_node, (subject, value)):
+            found.setdefault(term, f"{start}{len(found)}")
+        yield found.get(subject, subject), predicate, found.get(value, value)
 
 
 def term_of(term: Node) -> str | Lit:
@@ -174,10 +221,8 @@ def canonical(value: _Term) -> _Term:
     if isinstance(value, str):
         return value
     text = value.text.strip()
-    if value.datatype == XSD + "decimal" and (found := _DECIMAL.fullmatch(text)):
-        sign, whole, part = found.groups()
-        text = (whole.lstrip("0") or "0") + (f".{part.rstrip('0')}" if part.rstrip("0") else "")
-        return Lit(f"-{text}" if sign == "-" and text != "0" else text, value.datatype)
+    if value.datatype == XSD + "decimal" and _DECIMAL.fullmatch(text):
+        return Lit(plain_text(Decimal(text) or Decimal(0)), value.datatype)
     if value.datatype in EXACT and _WHOLE_NUMBER.fullmatch(text):
         return Lit(str(int(text)), XSD + "integer")
     if value.datatype in (XSD + "double", XSD + "float") and _FLOAT.fullmatch(text):
@@ -193,7 +238,7 @@ def for_pellet(value: Lit) -> Lit:
     Pellet compares the texts of decimals, and takes one without a decimal place for an integer.
     Stock owlready2 gives it these forms, too.
     """
-    if value.datatype != XSD + "decimal" or _DECIMAL.fullmatch(value.text.strip()) is None:
+    if value.datatype != XSD + "decimal" or not _DECIMAL.fullmatch(value.text.strip()):
         return value
     text = canonical(value).text
     return Lit(text if "." in text else f"{text}.0", value.datatype)
@@ -201,16 +246,14 @@ def for_pellet(value: Lit) -> Lit:
 
 def _written(value: str | Lit) -> str:
     if isinstance(value, str):
-        return value if value.startswith("_:") else f"<{value}>"
+        return value if is_node(value) else f"<{value}>"
     value = for_pellet(value)
     text = "".join(
         char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(ESCAPES)
     )
-    return (
-        f'"{text}"{value.datatype}'
-        if value.datatype.startswith("@")
-        else f'"{text}"^^<{value.datatype}>'
-    )
+    if value.datatype.startswith("@"):
+        return f'"{text}"{value.datatype}'
+    return f'"{text}"^^<{value.datatype}>'
 
 
 def n_triple(triple: Triple) -> str:

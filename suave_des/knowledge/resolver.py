@@ -17,10 +17,10 @@ their scheme and their last mark, '#' or '/'.
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Final
 from urllib.parse import urldefrag, urljoin, urlsplit
 from urllib.request import url2pathname
 
@@ -39,11 +39,10 @@ from suave_des.knowledge.ontology_file import (
 from suave_des.knowledge.rdf import MROS, TOMASYS, local_name
 from suave_des.resources import shipped_folder
 
-_ENDINGS: Final = (".owl", ".rdf", ".xml", *TURTLE_ENDINGS)
-_CATALOG: Final = "catalog-v001.xml"
-_CATALOG_ENTRY: Final = "{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"
-_SHIPPED: Final = ("tomasys", "mros", "suave", "suave_extended")
-_BESIDE: Final = "give the imported ontology's file too, or put it beside this one"
+_ENDINGS = (".owl", ".rdf", ".xml", *TURTLE_ENDINGS)
+_CATALOG = "catalog-v001.xml"
+_CATALOG_ENTRY = "{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"
+_SHIPPED = ("tomasys", "mros", "suave", "suave_extended")
 
 
 @dataclass(frozen=True)
@@ -130,37 +129,33 @@ def _among_own_files(
     file: OntologyFile, iri: str, files: Sequence[OntologyFile]
 ) -> tuple[OntologyFile, str] | None:
     """Return the file of the user's that supplies an import, and how it was found."""
+    return next(_own_files_for(file, iri, files), None)
+
+
+def _own_files_for(
+    file: OntologyFile, iri: str, files: Sequence[OntologyFile]
+) -> Iterator[tuple[OntologyFile, str]]:
+    """Yield the files of the user's that can supply an import, the one that does first."""
     others = [each for each in files if each is not file and not is_shipped(each)]
-    for other in others:
-        if has_iri(other, iri):
-            return other, "by its IRI"
-    beside = [] if is_shipped(file) else list(_beside(file))
-    found = _where_the_file_says(file, iri, beside)
-    if found is not None:
-        return found
-    for other in others:
-        if has_name(other.path, iri):
-            return other, "by its name"
-    for path in beside:
+    yield from ((other, "by its IRI") for other in others if has_iri(other, iri))
+    yield from _where_the_file_says(file, iri)
+    yield from ((other, "by its name") for other in others if has_name(other.path, iri))
+    for path in _beside(file):
         if has_name(path, iri):
-            return read_ontology(path), "by its name, beside the importing file"
-    return None
+            yield read_ontology(path), "by its name, beside the importing file"
 
 
-def _where_the_file_says(
-    file: OntologyFile, iri: str, beside: Sequence[Path]
-) -> tuple[OntologyFile, str] | None:
-    """Return the file that a catalog, the IRI itself or an IRI beside the importing file names."""
+def _where_the_file_says(file: OntologyFile, iri: str) -> Iterator[tuple[OntologyFile, str]]:
+    """Yield the files that a catalog, the IRI itself or an IRI beside the importing file names."""
     catalogued = _in_catalog(file, iri)
     if catalogued is not None and catalogued.parent != shipped_folder("ontology"):
-        return read_ontology(catalogued), f"by {_CATALOG}"
+        yield read_ontology(catalogued), f"by {_CATALOG}"
     named = _path_of(file, iri)
     if named is not None and _is_file(named):
-        return read_ontology(named), "by its path"
-    for path in beside:
+        yield read_ontology(named), "by its path"
+    for path in _beside(file):
         if _may_have_iri(path, iri) and has_iri(read_ontology(path), iri):
-            return read_ontology(path), "by its IRI, beside the importing file"
-    return None
+            yield read_ontology(path), "by its IRI, beside the importing file"
 
 
 def _among_all_files(
@@ -192,17 +187,20 @@ def _add_mros_if_used(files: list[OntologyFile], supplies: list[Supply]) -> None
 
     Until mros.owl was shipped, its terms stood in the shipped tomasys.owl.
     """
-    is_described = any(subject.startswith(MROS) for file in files for subject, _, _ in file.triples)
-    if is_described or any(has_iri(file, MROS) for file in files):
+    subjects = (triple[0] for file in files for triple in file.triples)
+    if any(has_iri(file, MROS) for file in files) or _mentions_mros(subjects):
         return
     for file in files:
-        terms = (term for triple in file.triples for term in triple[1:])
-        if any(isinstance(term, str) and term.startswith(MROS) for term in terms):
+        if _mentions_mros(chain.from_iterable(file.triples)):
             source = read_ontology(shipped_folder("ontology") / "mros.owl")
             reason = "shipped: its terms are used without an import"
             supplies.append(Supply(file.path, 0, MROS, source.path, reason))
             files.append(source)
             return
+
+
+def _mentions_mros(terms: Iterable[object]) -> bool:
+    return any(isinstance(term, str) and term.startswith(MROS) for term in terms)
 
 
 def _add(files: list[OntologyFile], new: OntologyFile) -> None:
@@ -217,9 +215,7 @@ def _add(files: list[OntologyFile], new: OntologyFile) -> None:
 
 def has_iri(file: OntologyFile, iri: str) -> bool:
     """Return whether a file's ontology has an IRI; an anonymous one has that of xml:base."""
-    known = file.iris
-    if not known and file.base is not None:
-        known = (file.base,)
+    known = file.iris or filter(None, [file.base])
     return _comparable(iri) in map(_comparable, known)
 
 
@@ -245,7 +241,9 @@ def _comparable(iri: str) -> str:
 
 
 def _beside(file: OntologyFile) -> Iterator[Path]:
-    """Yield the other ontology files in the folder of a file, by name."""
+    """Yield the other ontology files in the folder of a file, unless that is shipped, by name."""
+    if is_shipped(file):
+        return
     for path in sorted(file.path.parent.iterdir()):
         is_ontology = path.suffix in _ENDINGS and path.name != _CATALOG and path.is_file()
         if is_ontology and path.resolve() != file.path.resolve():

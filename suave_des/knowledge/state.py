@@ -11,24 +11,24 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from suave_des.errors import KnowledgeError, shown
 
 Value = str | bool | Decimal
 NumberLike = Decimal | float | int | str
 #: Status of an objective whose function has no function design in use.
-UNGROUNDED: Final = "UNGROUNDED"
+UNGROUNDED = "UNGROUNDED"
 #: What a record or a table shows in place of a function design where a function has none.
-NO_GROUNDING: Final = "ungrounded"
+NO_GROUNDING = "ungrounded"
 #: What happens to a function's grounding that gets no other design.
-STAYS: Final = "stays"
-NONE_LEFT: Final = "none left"
+STAYS = "stays"
+NONE_LEFT = "none left"
 #: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the
 # memory.
-MAX_EXPONENT: Final = 400
+MAX_EXPONENT = 400
 #: Halves of surrogate pairs: also what Python reads bytes as that are not UTF-8.
-_SURROGATE: Final = re.compile("[\ud800-\udfff]")
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 class ContradictionError(KnowledgeError):
@@ -50,8 +50,13 @@ def exact(number: NumberLike) -> Decimal:
         raise KnowledgeError(f"{number!r} is not a number") from error
     if not value.is_finite() or abs(value.adjusted()) > MAX_EXPONENT:
         raise KnowledgeError(f"{number!r} is not a finite number of ordinary size")
-    text = format(value, "f")
-    return Decimal(text.rstrip("0").rstrip(".") if "." in text else text)
+    return Decimal(plain_text(value))
+
+
+def plain_text(number: Decimal) -> str:
+    """Write a number without exponent, and without zeros at the end of its decimals."""
+    text = format(number, "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def _text(name: str, value: object) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Self, TypeVar, get_type_hints
+from typing import Annotated, Any, Self, TypeVar, get_type_hints
 
 from pydantic import (
     BaseModel,
@@ -27,7 +27,7 @@ from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import problem_and_remedy
 
-GREATEST: Final = 1e12
+GREATEST = 1e12
 """Of numbers, as in scenarios."""
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -88,7 +88,7 @@ _WRITTEN: TypeAdapter[dict[str, list[str]]] = TypeAdapter(
 )
 
 
-def row_of(cells: list[Any]) -> tuple[Cell, ...]:
+def row_of(cells: list[object]) -> tuple[Cell, ...]:
     """Check the cells of a row of runs.csv, with what a campaign keeps besides; a ValueError if
     one has another type.
     """
@@ -96,12 +96,12 @@ def row_of(cells: list[Any]) -> tuple[Cell, ...]:
     return *_OWN_CELLS.validate_python(own), *_FURTHER_CELLS.validate_python(cells[len(own) :])
 
 
-def failure_of(cells: list[Any]) -> tuple[str, int, float | None, str, bool, int]:
+def failure_of(cells: list[object]) -> tuple[str, int, float | None, str, bool, int]:
     """Check what a campaign keeps of a mission that failed; a ValueError likewise."""
     return _FAILURE.validate_python(tuple(cells))
 
 
-def written_of(noted: Any) -> dict[str, list[str]]:
+def written_of(noted: object) -> dict[str, list[str]]:
     """Check what a campaign keeps of the files that it wrote: SHA-256 by name; a ValueError
     likewise.
     """
@@ -168,9 +168,8 @@ class MissionLine(Recorded):
             is_there = isinstance(index, int) and 0 <= index < len(self.states)
             if isinstance(t_s, str) or not is_there:
                 raise ValueError("a cycle has no time, or none of the states")
-            if len(values) != len(self.states[int(index)].measured) or not all(
-                isinstance(value, str) for value in values
-            ):
+            are_texts = all(isinstance(value, str) for value in values)
+            if not are_texts or len(values) != len(self.states[int(index)].measured):
                 raise ValueError("a cycle has other values than its state")
         return self
 
@@ -189,8 +188,8 @@ class MissionCounts(Recorded):
 class RecordedSweep(Recorded):
     """What a sweep varies, by name."""
 
-    grid: dict[str, Any] = {}
-    zip: dict[str, Any] = {}
+    grid: dict[str, object] = {}
+    zip: dict[str, object] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -203,7 +202,7 @@ class Manifest(Recorded):
 
     missions: MissionCounts | None = None
     sweep: RecordedSweep = RecordedSweep()
-    perturbations: dict[str, Any] = {}
+    perturbations: dict[str, object] = {}
     runs_per_draw: Annotated[int, Field(ge=1, le=GREATEST)] = 1
     campaign_sha256: str | None = None
     command: list[FileName] = []
@@ -212,8 +211,8 @@ class Manifest(Recorded):
 # Reading
 
 
-def checked(model: type[_Model], content: Any, file: Path, remedy: str, place: str = "") -> _Model:
-    """Check what was read from a JSON file, or from a place in it.
+def checked(model: type[_Model], content: object, file: Path, remedy: str) -> _Model:
+    """Check what was read from a JSON file, or from a line of it.
 
     Raises:
         InputError: a value is missing, or of another type.
@@ -221,10 +220,10 @@ def checked(model: type[_Model], content: Any, file: Path, remedy: str, place: s
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        data = dict(content) if isinstance(content, Mapping) else {}
+        data = content if isinstance(content, Mapping) else {}
         keys, problem, _ = problem_and_remedy(error, data, model)
-        where = ": ".join(filter(None, (place, ".".join(map(str, keys)))))
-        raise InputError(problem, file=file, place=where or None, remedy=remedy) from None
+        place = ".".join(map(str, keys)) or None
+        raise InputError(problem, file=file, place=place, remedy=remedy) from None
 
 
 def read(model: type[_Model], file: Path, remedy: str) -> _Model:

@@ -14,11 +14,12 @@ import json
 import platform
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import astuple, dataclass, field, fields
 from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -47,8 +48,8 @@ from suave_des.scenario.models import Scenario
 if TYPE_CHECKING:
     import pandas
 
-KNOWLEDGE_FILE: Final = "knowledge.jsonl"
-CAMPAIGN_KNOWLEDGE_FILE: Final = "knowledge_states.jsonl"
+KNOWLEDGE_FILE = "knowledge.jsonl"
+CAMPAIGN_KNOWLEDGE_FILE = "knowledge_states.jsonl"
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
 EVENT_COLUMNS = tuple(field.name for field in fields(Event))
 TRAJECTORY_COLUMNS = tuple(
@@ -120,7 +121,7 @@ def versions() -> dict[str, str]:
 
 def provenance(
     loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return versions, machine, command line and input files; no time of day, so that equal work
     gives equal files.
 
@@ -162,7 +163,7 @@ def mission_files(
     return files | ({KNOWLEDGE_FILE: knowledge_text(result.knowledge)} if result.knowledge else {})
 
 
-def _metrics(result: MissionResult) -> dict[str, Any]:
+def _metrics(result: MissionResult) -> Mapping[str, object]:
     further = dict(zip(result.further, further_of(result), strict=True))
     return dict(zip(COLUMNS, row_of(result.metrics), strict=True)) | further
 
@@ -310,14 +311,14 @@ def mission_line(
     point: int,
     run: int,
     records: Iterable[KnowledgeRecord],
-    swept: Mapping[str, Any] = {},
+    swept: Mapping[str, object] = {},
 ) -> str:
     """Return the line of a mission in knowledge_states.jsonl; it depends on the mission alone.
 
     `swept` has the value at this point of each key path in the scenario that is swept.
     """
-    states: dict[tuple[Any, ...], int] = {}
-    table: list[dict[str, Any]] = []
+    states: dict[tuple[object, ...], int] = {}
+    table: list[dict[str, object]] = []
     cycles = []
     for record in records:
         state: KnowledgeState = record.state
@@ -333,7 +334,7 @@ def mission_line(
     return _line({**place, "states": table, "cycles": cycles})
 
 
-def _plain(state: KnowledgeState) -> dict[str, Any]:
+def _plain(state: KnowledgeState) -> dict[str, object]:
     return {
         "objectives": [
             [each.function, each.status, each.always_improve] for each in state.objectives
@@ -343,7 +344,7 @@ def _plain(state: KnowledgeState) -> dict[str, Any]:
     }
 
 
-def _line(content: Mapping[str, Any]) -> str:
+def _line(content: Mapping[str, object]) -> str:
     return json.dumps(content, ensure_ascii=False, separators=(",", ":")) + "\n"
 
 
@@ -378,7 +379,7 @@ def read_missions(path: Path) -> Iterator[RecordedKnowledge]:
 
 
 def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> RecordedKnowledge:
-    at_point = json.loads(json.dumps(scenario))
+    at_point = deepcopy(dict(scenario))
     for key_path, value in recorded.swept.items():
         holder, key = holder_of(at_point, key_path)
         holder[key] = value

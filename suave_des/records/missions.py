@@ -145,17 +145,7 @@ def _read_exemplars(folder: Path) -> Missions:
     """Read a folder of the exemplar's files; those that are no results, such as its statistics, are
     left out.
     """
-    if (folder / STORE_FILE).is_file():
-        remedy = f"suave-des campaign --resume {folder} runs the rest and writes them"
-        raise InputError(
-            "the campaign ended before its result files were written", file=folder, remedy=remedy
-        )
-    files = sorted(folder.glob("*.csv"))
-    if not files:
-        remedy = (
-            "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
-        )
-        raise InputError("has no result files", file=folder, remedy=remedy)
+    files = _csv_files(folder)
     contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
     own = [file for file in files if not is_foreign(contents[file])] or files[:1]
     read = [_checked(file, contents[file], Manifest()) for file in own]
@@ -167,6 +157,21 @@ def _read_exemplars(folder: Path) -> Missions:
     others = sorted({*files} - {*own})
     notes = [f"{file} is left out: it has no columns of missions" for file in others]
     return Missions(frame, (), (*notes, *_notes(read)))
+
+
+def _csv_files(folder: Path) -> list[Path]:
+    if (folder / STORE_FILE).is_file():
+        remedy = f"suave-des campaign --resume {folder} runs the rest and writes them"
+        raise InputError(
+            "the campaign ended before its result files were written", file=folder, remedy=remedy
+        )
+    files = sorted(folder.glob("*.csv"))
+    if not files:
+        remedy = (
+            "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+        )
+        raise InputError("has no result files", file=folder, remedy=remedy)
+    return files
 
 
 def _checked(file: Path, content: CsvContent, manifest: Manifest) -> Missions:
@@ -248,11 +253,7 @@ def _sharing_seen(frame: pandas.DataFrame, swept: Sequence[str]) -> int:
     """Return how many runs in a row share their draws, as the columns of drawn values show it: they
     change only from one draw to the next. It is 1 if none do, or nothing shows it.
     """
-    drawn = [
-        str(name)
-        for name in frame
-        if "." in str(name) and name not in swept and metric_of(str(name)) is None
-    ]
+    drawn = [name for name in _no_metrics(frame) if "." in name and name not in swept]
     runs = frame.dropna(subset=["run"]).drop_duplicates(["seed", "run"])
     runs = runs.sort_values(["seed", "run"], kind="stable")
     if not drawn or len(runs) < 2:
@@ -261,6 +262,10 @@ def _sharing_seen(frame: pandas.DataFrame, swept: Sequence[str]) -> int:
     values = runs[drawn].astype(str)
     changes = runs.loc[follows & (values != values.shift()).any(axis=1), "run"]
     return math.gcd(*(int(run) - 1 for run in changes)) or 1
+
+
+def _no_metrics(frame: pandas.DataFrame) -> list[str]:
+    return [name for name in map(str, frame) if metric_of(name) is None]
 
 
 def _unfinished(folder: Path, missions: MissionCounts | None) -> Iterator[str]:
@@ -279,8 +284,7 @@ def _swept(manifest: Manifest, frame: pandas.DataFrame) -> tuple[str, ...]:
 
     These differ between missions of one manager, seed and run, and are no metrics.
     """
-    known = (*COLUMNS, TIME_LIMIT)
-    columns = [str(name) for name in frame if name not in known and metric_of(str(name)) is None]
+    columns = [name for name in _no_metrics(frame) if name not in (*COLUMNS, TIME_LIMIT)]
     if manifest.missions is not None:
         return tuple(name for name in manifest.sweep.names if name in columns)
     if not columns or frame["run"].isna().any():

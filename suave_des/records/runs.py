@@ -33,17 +33,15 @@ from suave_des.records.metrics import (
 )
 
 COLUMNS = (
-    *(
-        "scenario",
-        "manager",
-        SEARCH_TIME,
-        DISTANCE,
-        "detection_x_m",
-        FOUND,
-        REACTION_TIME,
-        "run",
-        "seed",
-    ),
+    "scenario",
+    "manager",
+    SEARCH_TIME,
+    DISTANCE,
+    "detection_x_m",
+    FOUND,
+    REACTION_TIME,
+    "run",
+    "seed",
 )
 """Columns that every frame of missions has.
 
@@ -55,7 +53,7 @@ TIME_LIMIT = "time_limit_s"
 """Column of frames whose file has it, and of the exemplar's file of 2023."""
 MISSION = "mission"
 """Column of frames of the exemplar's files: its name of the mission, such as "suave_extended"."""
-_LIMIT, _DURATION = TIME_LIMIT, "mission_duration_s"
+_DURATION = "mission_duration_s"
 _POSITION = "initial pos (x,y)"
 _START = ("initial_x_m", "initial_y_m")
 _PLACE = r"^\(\s*([-+.0-9e]+)\s*,\s*([-+.0-9e]+)\s*\)$"
@@ -91,7 +89,7 @@ _LAYOUT_2023: _Layout = {
     "mission_name": ("manager", lambda of: of["name"]),
     "datetime": ("", lambda of: f"{of['month']}-{of['stamp']:%d-%Y-%H-%M-%S}"),
     _POSITION: ("", lambda of: of["position"]),
-    "time budget (s)": (_LIMIT, lambda of: _whole(of[_LIMIT])),
+    "time budget (s)": (TIME_LIMIT, lambda of: _whole(of[TIME_LIMIT])),
     # The program wrote -1 when the pipeline was not found; the published table has the limit
     # instead.
     "time search (s)": (SEARCH_TIME, lambda of: _whole(of[SEARCH_TIME]) if of[FOUND] else -1),
@@ -113,7 +111,7 @@ _LAYOUT_1_5: _Layout = {
     "mean reaction time (s)": (REACTION_TIME, lambda of: of[REACTION_TIME] or 0.0),
     _RUN_INDEX: ("", lambda of: of["run"]),
 }
-_OWN = {name: name for name in (*COLUMNS, _LIMIT)}
+_OWN = {name: name for name in (*COLUMNS, TIME_LIMIT)}
 _LAYOUTS: tuple[Mapping[str, str], ...] = (
     _OWN,
     *(
@@ -281,25 +279,32 @@ class _Cells:
         self._check("manager", names != "", "a manager's name")
         if not self._is_own:
             self._split_names([str(name) for name in names.unique()])
-        limit_s = self._numbers(_LIMIT, least=0.0) if _LIMIT in self.text else None
+        limit_s = self._numbers(TIME_LIMIT, least=0.0) if TIME_LIMIT in self.text else None
         search_time_s = self._search_times_s(limit_s)
         values: dict[str, Any] = dict.fromkeys(COLUMNS, math.nan) | {"scenario": "", "seed": ""}
-        further = [name for name in map(str, self.text) if name not in ("", FOUND)]
-        values |= {name: self._converted(name) for name in further}
+        values |= {
+            name: self._converted(name) for name in map(str, self.text) if name not in ("", FOUND)
+        }
         values[SEARCH_TIME] = search_time_s
         values[DISTANCE] = self._numbers(DISTANCE, least=0.0)
         values[FOUND] = self._found(search_time_s, limit_s)
         if limit_s is not None:
-            values[_LIMIT] = limit_s
+            values[TIME_LIMIT] = limit_s
         if _RUN_INDEX in self.text and not self._is_own:
-            numbers = self._numbers(_RUN_INDEX, is_whole=True)
-            if not pandas.DataFrame({"name": names, "run": numbers}).duplicated().any():
-                # The missions of one name and number have the same draws, whoever manages them.
-                values |= {"run": numbers, "seed": names.str.rpartition(" ")[0]}
+            values |= self._runs_of(names)
         frame = pandas.DataFrame(values, index=self.text.index)
         if "scenario" not in self.text:  # the exemplar writes 0.0 for none, a campaign nothing
             frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)
         return frame
+
+    def _runs_of(self, names: pandas.Series[str]) -> dict[str, object]:
+        """Take the exemplar's numbers of missions, unless one is there twice: those of one name and
+        number have the same draws, whoever manages them.
+        """
+        numbers = self._numbers(_RUN_INDEX, is_whole=True)
+        if pandas.DataFrame({"name": names, "run": numbers}).duplicated().any():
+            return {}
+        return {"run": numbers, "seed": names.str.rpartition(" ")[0]}
 
     def _search_times_s(self, limit_s: NDArray[np.float64] | None) -> NDArray[np.float64]:
         times_s = self._numbers(SEARCH_TIME)
@@ -459,7 +464,7 @@ def suave_pieces(
         # drawn and swept parameters follow
         mission: dict[str, Any] = dict(zip(columns, row, strict=False))
         mission |= {
-            _LIMIT: time_limit_s,
+            TIME_LIMIT: time_limit_s,
             "stamp": stamp,
             "month": _MONTHS[stamp.month - 1],
             "name": name,

@@ -141,10 +141,11 @@ class Store:
             self._connect()
         except BaseException as error:
             is_damaged = isinstance(error, InputError) and error.file == str(path)
-            if not was_there or (replace and is_damaged):
+            is_replaced = replace and is_damaged
+            if is_replaced or not was_there:
                 for each in own:
                     each.unlink(missing_ok=True)
-            if not (replace and is_damaged):
+            if not is_replaced:
                 raise
             self._connect()
 
@@ -182,7 +183,7 @@ class Store:
         """Whether no campaign was begun in it; one that was killed at its very start leaves that,
         too.
         """
-        return bool(self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,))
+        return not _has_tables(self._db)
 
     def reading(self) -> AbstractContextManager[None]:
         """Turn whatever is unexpected while what is stored is used into one error about the store,
@@ -190,7 +191,7 @@ class Store:
         """
         return store_read(self.path)
 
-    def begin(self, about: Mapping[str, Any]) -> None:
+    def begin(self, about: Mapping[str, object]) -> None:
         """Begin a new campaign, in place of an earlier one, with what is noted about it, by name;
         atomic.
 
@@ -232,7 +233,7 @@ class Store:
         with self.reading():
             return _about(self._db, self.path, name, default)
 
-    def note(self, name: str, value: Any) -> None:
+    def note(self, name: str, value: object) -> None:
         """Note something about the campaign, at once and durably."""
         with self.reading():
             self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
@@ -380,9 +381,13 @@ def has_campaign(folder: Path) -> bool:
         return False
     try:
         with closing(_connected(path, "ro")) as db:
-            return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
+            return _has_tables(db)
     except (SuaveDesError, sqlite3.Error, UnicodeDecodeError):  # SQLite quotes what is damaged
         return True
+
+
+def _has_tables(db: sqlite3.Connection) -> bool:
+    return db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
 
 
 def read_written(folder: Path) -> Noted:
@@ -481,7 +486,7 @@ def _damaged(path: Path | None, what: object) -> InputError:
     return InputError(f"is damaged: {what}", file=path, remedy=remedy)
 
 
-def _note(name: str, value: Any) -> tuple[str, str, int]:
+def _note(name: str, value: object) -> tuple[str, str, int]:
     text = json.dumps(value)
     return name, text, _crc(name, text)
 
@@ -515,7 +520,7 @@ def _crc(*parts: object) -> int:
 
 def write_campaign(
     store: Store,
-    about: Mapping[str, Any],
+    about: Mapping[str, object],
     files: Mapping[str, FileContent],
     suave: Mapping[str, FileContent],
 ) -> None:
@@ -576,7 +581,7 @@ def check_replaceable(folder: Path, noted: Noted) -> None:
     check_unchanged(folder, [RUNS_FILE, SUMMARY_FILE, *sorted(known), MANIFEST_FILE], own)
 
 
-def _digest(content: Any) -> str:
+def _digest(content: object) -> str:
     """Return the SHA-256, in hex, of what a manifest says, but for the files that it lists, as more
     are added when pages are made of them.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -31,7 +31,7 @@ from suave_des.scenario.yamlfile import Layer, Location, parse_yaml
 MISSION_FILE, RUNNER_FILE = "mission_config.yaml", "runner_config.yml"
 MANAGERS = ("none", "random", "metacontrol", *TREES.values())
 _NOT_COMPARED = ("name", "description", "campaign", "scenario")
-_DIGITS: Final = 9
+_DIGITS = 9
 """Decimals without rounding errors of differences."""
 
 
@@ -92,7 +92,7 @@ def _publishing_period(loaded: LoadedScenario) -> dict[str, float]:
     return {f"signals.{WATER_VISIBILITY}.publishing_period_s": period_s}
 
 
-def _lost_campaign(campaign: Mapping[str, Any], again: str | None) -> Iterator[str]:
+def _lost_campaign(campaign: Mapping[str, object], again: str | None) -> Iterator[str]:
     """Yield what of a campaign is lost; `again` is what is imported again, None without runner."""
     given = {key: value for key, value in campaign.items() if value not in (None, {}, [])}
     if again is not None:
@@ -102,7 +102,7 @@ def _lost_campaign(campaign: Mapping[str, Any], again: str | None) -> Iterator[s
         yield f"{named}: the exemplar has no experiment runner before {FIRST_WITH_RUNNER}"
 
 
-def _text(nodes: Mapping[str, Mapping[str, Any]], source: Path, revision: str) -> str:
+def _text(nodes: Mapping[str, Mapping[str, object]], source: Path, revision: str) -> str:
     """A file of these nodes' parameters."""
     content = {f"/{node}": {PARAMETERS: given} for node, given in nodes.items()}
     written = f"# Written by `suave-des export-config` from {source.name}"
@@ -157,7 +157,7 @@ class Shift(NamedTuple):
     interval_s: tuple[float, float]
 
 
-def _shift_of(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> Shift | None:
+def _shift_of(loaded: LoadedScenario, drawn: Mapping[str, object]) -> Shift | None:
     """Find the interval, and times that it is added to, that give what a campaign draws; None if
     the runner cannot draw that.
     """
@@ -176,7 +176,7 @@ def _shift_of(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> Shift | None:
 
 
 def _drawn_events(
-    loaded: LoadedScenario, drawn: Mapping[str, Any]
+    loaded: LoadedScenario, drawn: Mapping[str, object]
 ) -> list[tuple[float, float, float]]:
     """Return the time of each thruster event, and the bounds of what a campaign draws in its place;
     nothing if it is not so of each.
@@ -190,7 +190,7 @@ def _drawn_events(
     return found
 
 
-def _bounds(drawn: Any) -> tuple[float, float] | None:
+def _bounds(drawn: object) -> tuple[float, float] | None:
     """Return the bounds of what a campaign draws; None if it is not uniform."""
     if isinstance(drawn, dict) and drawn["distribution"] == "uniform":
         return float(drawn["minimum"]), float(drawn["maximum"])
@@ -209,9 +209,9 @@ def _texts(events: Sequence[ThrusterEvent], times_s: Sequence[float]) -> list[st
 # The nodes' parameters.
 
 
-def _nodes(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, Any]]:
+def _nodes(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, object]]:
     """The parameters of each node of which the scenario has a value of their type."""
-    nodes: dict[str, dict[str, Any]] = {}
+    nodes: dict[str, dict[str, object]] = {}
     for key in read_by(revision):
         value = _value(loaded, key.path, key.default)
         # The reasoner's file is another one. What the runner does anyway may have no key in an
@@ -225,7 +225,7 @@ def _nodes(loaded: LoadedScenario, revision: str) -> dict[str, dict[str, Any]]:
     return nodes
 
 
-def _value(loaded: LoadedScenario, path: str, default: Any) -> Any:
+def _value(loaded: LoadedScenario, path: str, default: object) -> object:
     """A value of the scenario in the type of a default, as ROS 2 demands; None if it has none."""
     if path == EVENTS:
         events = loaded.scenario.thruster_events
@@ -241,7 +241,7 @@ def _value(loaded: LoadedScenario, path: str, default: Any) -> Any:
 
 def _runner_of(
     loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """The parameters that only the runner has; an InputError if the exemplar has none of the
     managers.
     """
@@ -259,11 +259,11 @@ def _runner_of(
     return {**found, "experiments": [json.dumps(each) for each in experiments]}
 
 
-def _intervals(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> dict[str, Any]:
+def _intervals(loaded: LoadedScenario, drawn: Mapping[str, object]) -> dict[str, object]:
     """The runner's intervals that give what a campaign draws, and its thruster events if some of
     them are before the start.
     """
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for key in DRAWN:
         path = key.path.removeprefix(PERTURBED)
         if path != EVENTS:
@@ -278,7 +278,9 @@ def _intervals(loaded: LoadedScenario, drawn: Mapping[str, Any]) -> dict[str, An
     return found
 
 
-def _experiment(manager: str, runs: int, loaded: LoadedScenario, revision: str) -> dict[str, Any]:
+def _experiment(
+    manager: str, runs: int, loaded: LoadedScenario, revision: str
+) -> dict[str, object]:
     is_extended = manager == "bt_extended"
     name = manager.removesuffix("_extended")
     launch = f"ros2 launch suave_{name} suave_{manager}.launch.py"

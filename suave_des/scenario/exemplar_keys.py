@@ -13,7 +13,7 @@ import csv
 import json
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from suave_des.errors import InputError, shown, unknown
 
@@ -67,7 +67,7 @@ class Key(NamedTuple):
     node: str
     name: str
     path: str
-    default: Any
+    default: object
     meaning: str
     since: str
     until: str
@@ -115,12 +115,12 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
         return name, "as requested"
     fitting = list(REVISIONS)
     telling = ""
-    given = [each for each in _TELLING if each in found]
+    given = list(filter(found.__contains__, _TELLING))
     for each in given:
-        left = [revision for revision in fitting if _has(revision, each)]
-        if len(left) < len(fitting):
+        before = fitting
+        fitting = [revision for revision in before if _has(revision, each)]
+        if fitting != before:
             telling = each
-        fitting = left
     if len(fitting) == 1:
         return fitting[0], f"only revision {fitting[0]} has {telling}"
     if not fitting:

@@ -49,9 +49,9 @@ class LoadedScenario:
     rules: tuple[Path, ...] = ()
     manager_files: Mapping[tuple[str, str], Path] = field(default_factory=dict)
 
-    def manager_settings(self, manager: str) -> Mapping[str, Any]:
+    def manager_settings(self, manager: str) -> Mapping[str, object]:
         """Settings of a manager that is not built in."""
-        settings: dict[str, Any] = (self.scenario.managers.model_extra or {}).get(manager, {})
+        settings: dict[str, object] = (self.scenario.managers.model_extra or {}).get(manager, {})
         return settings
 
     def manager_file(self, manager: str, name: str) -> Path:
@@ -86,8 +86,8 @@ class Replacements(TypedDict, total=False):
     reasoner: str | None
     rules: Sequence[str | Path]
     disabled_rules: Sequence[str]
-    values: Mapping[str, Any]
-    manager_options: Mapping[str, Mapping[str, Any]]
+    values: Mapping[str, object]
+    manager_options: Mapping[str, Mapping[str, object]]
 
 
 @plain_arguments
@@ -143,13 +143,18 @@ def load_scenario(
         scenario, layer.path, ontologies, modes, modes_layer.path, tables, inputs, layer, rules
     )
     loaded = _set(loaded, replacements.get("values") or {}, "--set")
-    if options := replacements.get("manager_options"):
-        managers = loaded.scenario.managers.model_dump(mode="json")
-        managers |= {
-            name: {**managers.get(name, {}), **settings} for name, settings in options.items()
-        }
-        loaded = _set(loaded, {"managers": managers}, "--manager-option")
-    return loaded
+    options = replacements.get("manager_options")
+    return _with_options(loaded, options) if options else loaded
+
+
+def _with_options(
+    loaded: LoadedScenario, options: Mapping[str, Mapping[str, object]]
+) -> LoadedScenario:
+    """Set what options say about managers over the settings of the scenario."""
+    managers = loaded.scenario.managers.model_dump(mode="json")
+    for name, settings in options.items():
+        managers[name] = {**managers.get(name, {}), **settings}
+    return _set(loaded, {"managers": managers}, "--manager-option")
 
 
 def _knowledge_files(
@@ -203,7 +208,7 @@ def _with_replaced_files(scenario: Scenario, replacements: Replacements) -> Scen
     return scenario.model_copy(update=update)
 
 
-def _set(loaded: LoadedScenario, values: Mapping[str, Any], option: str) -> LoadedScenario:
+def _set(loaded: LoadedScenario, values: Mapping[str, object], option: str) -> LoadedScenario:
     """Replace the values that an option of the command line gives."""
     for path, value in values.items():
         try:
@@ -215,7 +220,7 @@ def _set(loaded: LoadedScenario, values: Mapping[str, Any], option: str) -> Load
 
 
 @plain_arguments
-def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
+def with_values(loaded: LoadedScenario, values: Mapping[str, object]) -> LoadedScenario:
     """Replace the values at some key paths of a scenario.
 
         slower = with_values(loaded, {"signals.water_visibility.period_s": 120})

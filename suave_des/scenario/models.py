@@ -108,7 +108,7 @@ class Within:
     draws_are_cut: bool = False
 
     def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
+        self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Check what the type's own checks have passed."""
         return core_schema.no_info_after_validator_function(self._check, handler(source))
@@ -268,7 +268,7 @@ class Choice(Drawn):
 AnyDistribution = float | Normal | Uniform | Exponential | Choice
 
 
-def _tag(value: Any) -> str | None:
+def _tag(value: object) -> str | None:
     if isinstance(value, dict):
         value = value.get("distribution")
         return value if isinstance(value, str) else None
@@ -610,7 +610,7 @@ class ThrusterEvent(Strict):
 
     @model_validator(mode="before")
     @classmethod
-    def _from_text(cls, value: Any) -> Any:
+    def _from_text(cls, value: object) -> object:
         if not isinstance(value, str):
             return value
         match = _EVENT_TEXT.fullmatch(value.strip())
@@ -1207,7 +1207,7 @@ class Scenario(Strict):
 
     @field_validator("signals", mode="after")
     @classmethod
-    def _visibility_is_there(cls, value: dict[str, Any]) -> dict[str, Any]:
+    def _visibility_is_there(cls, value: dict[str, object]) -> dict[str, object]:
         if WATER_VISIBILITY not in value:
             raise wrong(
                 "there is no signal named water_visibility",

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 
@@ -135,7 +135,7 @@ class ModeTable:
 # The file.
 
 
-def _value(value: Any) -> ParameterValue:
+def _value(value: object) -> ParameterValue:
     if isinstance(value, bool | str):
         return value
     if not isinstance(value, int | float) or not math.isfinite(value):
@@ -183,7 +183,7 @@ class _Node(Strict):
         }
 
 
-def _split(value: Any) -> Any:
+def _split(value: object) -> object:
     # The exemplar writes several parts on lines without dashes, which YAML reads as one text with
     # spaces.
     return value.split() if isinstance(value, str) else value
@@ -192,7 +192,7 @@ def _split(value: Any) -> Any:
 class _System(Strict):
     type: Literal["system"]
     parts: Annotated[tuple[str, ...], BeforeValidator(_split), Field(min_length=1)]
-    modes: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
+    modes: Annotated[dict[str, dict[str, object]], Field(min_length=1)]
 
 
 class _Entry(Strict):
@@ -265,7 +265,7 @@ def _function(
 
 
 def _mode(
-    document: Layer, path: KeyPath, states: Mapping[str, Any], nodes: Mapping[str, _NodeModes]
+    document: Layer, path: KeyPath, states: Mapping[str, object], nodes: Mapping[str, _NodeModes]
 ) -> Mode:
     """A mode of a function: the parameters that it sets on each of the function's nodes that are
     active in it.

@@ -63,7 +63,7 @@ def scenario_schema() -> dict[str, Any]:
     }
 
 
-def _partial(schema: Any) -> Any:
+def _partial(schema: object) -> object:
     """The same schema with nothing required; a mapping may then fit several members of a union."""
     if isinstance(schema, list):
         return list(map(_partial, schema))

@@ -141,7 +141,7 @@ def parse_yaml(text: str, path: Path, depth: int = 0) -> Layer:
         raise InputError(problem, file=path, remedy="write it out") from None
 
 
-def read_value(text: str, option: str) -> Any:
+def read_value(text: str, option: str) -> object:
     """Read a value of the command line as one in a file; an InputError, with the option, if it is
     not plain data.
     """
@@ -178,7 +178,7 @@ for _name, _pattern, _first in (
     ("float", r"^(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$", _DIGITS),
 ):
     _Composer.add_implicit_resolver(_TAG + _name, re.compile(_pattern), _first)
-_SCALARS: dict[str, Callable[[str], Any]] = {
+_SCALARS: dict[str, Callable[[str], object]] = {
     _TAG + "null": lambda text: None,
     _TAG + "bool": lambda text: {"true": True, "false": False}[text.lower()],
     _TAG + "int": int,
@@ -215,7 +215,7 @@ class _Reading:
                 node, key_path, f"expected {tag}, got {shown(node.value)}", "remove the tag"
             ) from None
 
-    def _entries(self, node: yaml.MappingNode, key_path: KeyPath) -> Iterator[tuple[str, Any]]:
+    def _entries(self, node: yaml.MappingNode, key_path: KeyPath) -> Iterator[tuple[str, object]]:
         for key_node, value_node in node.value:
             key = key_node.value
             if not isinstance(key_node, yaml.ScalarNode) or not key.isprintable() or len(key) > 200:
@@ -227,7 +227,7 @@ class _Reading:
                 raise self._error(key_node, (*key_path, key), problem, "keep one of them")
             yield key, self._below(key_node, value_node, (*key_path, key))
 
-    def _below(self, place: yaml.Node, node: yaml.Node, key_path: KeyPath) -> Any:
+    def _below(self, place: yaml.Node, node: yaml.Node, key_path: KeyPath) -> object:
         self.places[key_path] = Location(self._depth, _line(place), self._path)
         if len(self.places) > _VALUES_LIMIT:
             problem = f"expands to more than {_VALUES_LIMIT:,} values"
@@ -438,12 +438,12 @@ def validated(layer: Layer, model: type[_T]) -> _T:
 
 
 def problem_and_remedy(
-    error: ValidationError, data: dict[str, Any], model: Any
+    error: ValidationError, data: Mapping[str, object], model: object
 ) -> tuple[KeyPath, str, str | None]:
     """Return the first problem of data that are in no file: its key path, what is wrong, and what
     would be right.
     """
-    path, first = _first_problem(error, Layer(data, {(): Location(0, 1, Path())}))
+    path, first = _first_problem(error, Layer({**data}, {(): Location(0, 1, Path())}))
     path = (*path, *first.get("ctx", {}).get("keys", "").split()[:1])
     return path, *_texts(first, path, model)
 
@@ -457,7 +457,7 @@ def _first_problem(error: ValidationError, layer: Layer) -> tuple[KeyPath, Error
 
 
 def models_within(
-    wanted: Any, path: tuple[str, ...] = ()
+    wanted: object, path: tuple[str, ...] = ()
 ) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
     """Yield every model that a type holds, with its key path; members of a union have the same."""
     if isinstance(wanted, type) and issubclass(wanted, BaseModel):
@@ -492,7 +492,7 @@ def _key_path(detail: ErrorDetails, layer: Layer) -> KeyPath:
     return min(candidates, key=lambda candidate: layer.place(candidate).depth, default=tuple(path))
 
 
-def _is_key_of_nothing(detail: ErrorDetails, here: Any, key: str | int) -> bool:
+def _is_key_of_nothing(detail: ErrorDetails, here: object, key: str | int) -> bool:
     """Whether a part of pydantic's location that is nowhere in the data is a key: one that is
     missing, or one inside the text of a thruster event, and not the tag of a union's member.
     """
@@ -500,7 +500,7 @@ def _is_key_of_nothing(detail: ErrorDetails, here: Any, key: str | int) -> bool:
     return is_missing or (isinstance(here, str) and key != "number")
 
 
-def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | None]:
+def _texts(detail: ErrorDetails, path: KeyPath, model: object) -> tuple[str, str | None]:
     """Return the problem and the remedy."""
     value = detail["input"]
     context = detail.get("ctx", {})
@@ -542,7 +542,7 @@ def _texts(detail: ErrorDetails, path: KeyPath, model: Any) -> tuple[str, str | 
     return f"{shown(value)} {sentence.partition(' ')[2]}", None
 
 
-def _known_keys(model: Any, path: KeyPath, loc: KeyPath) -> Iterator[str]:
+def _known_keys(model: object, path: KeyPath, loc: KeyPath) -> Iterator[str]:
     """The keys that a model has at a key path; of the members of a union, those of the one in
     pydantic's location.
     """

@@ -14,26 +14,26 @@ from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 from suave_des.errors import KnowledgeError, PassingError
 from suave_des.knowledge.state import KnowledgeState
 
 #: What a reasoner may take for one state by default, in s.
-TIME_LIMIT_S: Final = 60.0
+TIME_LIMIT_S = 60.0
 #: The longest limit; longer times are more than some systems can count.
-LONGEST_S: Final = 1e6
+LONGEST_S = 1e6
 #: What a reasoner does at first, for the message.
-LOADING: Final = "loading the ontologies"
+LOADING = "loading the ontologies"
 _Result = TypeVar("_Result")
 #: How long the end of the process waits for reasoners to leave Java, in s.
-_LEAVE_JAVA_S: Final = 0.5
+_LEAVE_JAVA_S = 0.5
 #: Work may wait this many times its limit, where the machine is busy with other work.
-_PATIENCE: Final = 10
+_PATIENCE = 10
 #: So many times its limit the next work waits for what was abandoned.
-_AGAIN: Final = 3
-_abandoned: Final[list[str]] = []
-_stuck: Final[set[Future[Any]]] = set()
+_AGAIN = 3
+_abandoned: list[str] = []
+_stuck: set[Future[object]] = set()
 
 
 def times_abandoned() -> int:
@@ -119,7 +119,7 @@ class TimeLimit:
             raise ReasonerTimeoutError(f"the reasoner is still {earlier.doing}", remedy=remedy)
         self._abandoned = None
 
-    def _wait(self, future: Future[Any], doing: str, limit_s: float) -> None:
+    def _wait(self, future: Future[_Result], doing: str, limit_s: float) -> None:
         """Wait until work is done; a ReasonerTimeoutError after the limit.
 
         Each wait counts as long as it was to be, however long the process was stopped in it.

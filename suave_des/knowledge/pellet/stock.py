@@ -12,11 +12,10 @@ import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
 
 import owlready2
 import owlready2.reasoning
-from rdflib import URIRef
+from rdflib import Graph, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
@@ -35,14 +34,14 @@ from suave_des.knowledge.rdf import (
     term_of,
 )
 
-_PLAIN: Final = RDF_IRI + "PlainLiteral"
-_STATE_IRI: Final = "urn:suave-des:state"
+_PLAIN = RDF_IRI + "PlainLiteral"
+_STATE_IRI = "urn:suave-des:state"
 #: Literals of N-Triples, and IRIs that come back otherwise from Pellet's output, which owlready2
 #: reads: there Pellet writes apostrophes and characters beyond U+FFFF with escapes.
-_LITERAL_OR_ODD_IRI: Final = re.compile(
+_LITERAL_OR_ODD_IRI = re.compile(
     r"""("(?:[^"\\]|\\.)*")|<([^<>]*['\U00010000-\U0010ffff][^<>]*)>"""
 )
-_STAND_IN: Final = "urn:suave-des:name:"
+_STAND_IN = "urn:suave-des:name:"
 
 
 class StockPellet:
@@ -132,7 +131,7 @@ class StockPellet:
         finally:
             world.close()
 
-    def _read(self, world: Any) -> Iterator[Triple]:
+    def _read(self, world: owlready2.World) -> Iterator[Triple]:
         graph = world.as_rdflib_graph()
         yield from self._values(graph, self._properties)
         for name in self._classes:
@@ -140,7 +139,7 @@ class StockPellet:
                 for subject in graph.subjects(RDF.type, kind):
                     yield str(self._named(str(subject))), RDF_TYPE, name
 
-    def _values(self, graph: Any, properties: Iterable[str]) -> Iterator[Triple]:
+    def _values(self, graph: Graph, properties: Iterable[str]) -> Iterator[Triple]:
         for name in properties:
             iri = URIRef(self._stand_ins.get(name, name))
             for subject, _, value in graph.triples((None, iri, None)):
@@ -158,7 +157,7 @@ def _value(term: Node) -> str | Lit:
     return Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found
 
 
-def _below(graph: Any, name: str) -> set[Node]:
+def _below(graph: Graph, name: str) -> set[Node]:
     """A class with all its subclasses: the reasoner returns only the nearest classes of an
     individual.
     """

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.rdf import (
@@ -25,6 +25,7 @@ from suave_des.knowledge.rdf import (
     Triple,
     local_name,
     namespace,
+    terms,
 )
 
 
@@ -59,7 +60,7 @@ Term = Variable | Named | Lit
 #: The kinds of atoms that SWRL has; "" is an atom whose name has not been looked up yet.
 AtomKind = Literal["", "class", "object", "data", "range", "same", "different", "builtin"]
 #: Kind by the name of the RDF class of an atom.
-KINDS: Final[dict[str, AtomKind]] = {
+KINDS: dict[str, AtomKind] = {
     SWRL + "ClassAtom": "class",
     SWRL + "IndividualPropertyAtom": "object",
     SWRL + "DatavaluedPropertyAtom": "data",
@@ -70,11 +71,11 @@ KINDS: Final[dict[str, AtomKind]] = {
 }
 #: Kinds of atoms that are about facts, which bind all of their variables; the others compare or
 # compute.
-FACT_KINDS: Final = ("class", "object", "data", "same", "different")
-SAME: Final = OWL + "sameAs"
-DIFFERENT: Final = OWL + "differentFrom"
-IDENTITIES: Final = (SAME, DIFFERENT)
-NOT_THE_SAME: Final = (
+FACT_KINDS = ("class", "object", "data", "same", "different")
+SAME = OWL + "sameAs"
+DIFFERENT = OWL + "differentFrom"
+IDENTITIES = (SAME, DIFFERENT)
+NOT_THE_SAME = (
     "asks about identity with nothing but names: Pellet's inferences are not the same each time"
 )
 """Of atoms in Rule.identities_of_names."""
@@ -114,7 +115,11 @@ class Atom:
 
     def variables(self) -> Iterator[str]:
         """Names of the variables among the arguments."""
-        return (term.name for term in self.arguments if isinstance(term, Variable))
+        return _variables_in(self.arguments)
+
+
+def _variables_in(terms: Iterable[Term]) -> Iterator[str]:
+    return (term.name for term in terms if isinstance(term, Variable))
 
 
 @dataclass(frozen=True)
@@ -154,6 +159,11 @@ class Rule:
         return (*self.body, *self.head)
 
     @property
+    def speaks_of_identity(self) -> bool:
+        """Whether it asks or concludes that individuals are the same, or different."""
+        return any(atom.predicate in IDENTITIES for atom in self.atoms)
+
+    @property
     def identities_of_names(self) -> tuple[Atom, ...]:
         """Atoms of the body that ask whether individuals are the same, or different, with nothing
         in it that says which: of names, or of variables that no fact binds.
@@ -168,14 +178,14 @@ class Rule:
 
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
     """Texts that atoms mention as values of a property."""
-    terms = (term for atom in atoms if atom.predicate == predicate for term in atom.arguments)
+    found = (term for atom in atoms if atom.predicate == predicate for term in atom.arguments)
     return {
-        term.text for term in terms if isinstance(term, Lit) and term.datatype == XSD + "string"
+        term.text for term in found if isinstance(term, Lit) and term.datatype == XSD + "string"
     }
 
 
 #: The sign of each built-in that compares two values.
-COMPARISONS: Final[Mapping[str, str]] = {
+COMPARISONS: Mapping[str, str] = {
     SWRLB + "equal": "=",
     SWRLB + "notEqual": "!=",
     SWRLB + "lessThan": "<",
@@ -184,19 +194,13 @@ COMPARISONS: Final[Mapping[str, str]] = {
     SWRLB + "greaterThanOrEqual": ">=",
 }
 #: The built-in of each sign.
-COMPARISON_OF: Final[Mapping[str, str]] = {sign: name for name, sign in COMPARISONS.items()}
-_TESTING_TEXT: Final = [
-    "contains",
-    "containsIgnoreCase",
-    "endsWith",
-    "matches",
-    "startsWith",
-    "stringEqualIgnoreCase",
-]
+COMPARISON_OF: Mapping[str, str] = {sign: name for name, sign in COMPARISONS.items()}
 #: Built-ins that compare, so that every argument must be bound; the others compute their first one.
-TESTERS: Final = frozenset((*COMPARISONS, *(SWRLB + name for name in _TESTING_TEXT)))
+TESTERS = COMPARISONS.keys() | terms(
+    SWRLB, "contains containsIgnoreCase endsWith matches startsWith stringEqualIgnoreCase"
+)
 #: Pellet's built-ins, with the least and the largest number of arguments.
-BUILTINS: Final[Mapping[str, tuple[int, int]]] = dict.fromkeys(TESTERS, (2, 2)) | {
+BUILTINS: Mapping[str, tuple[int, int]] = dict.fromkeys(TESTERS, (2, 2)) | {
     SWRLB + name: counts
     for names, counts in (
         ("abs ceiling cos floor round sin tan unaryMinus unaryPlus booleanNot", (2, 2)),
@@ -220,7 +224,7 @@ BUILTINS: Final[Mapping[str, tuple[int, int]]] = dict.fromkeys(TESTERS, (2, 2)) 
 
 
 #: What computes from its result, too, and only from variables.
-_BOTH_WAYS: Final = frozenset(SWRLB + name for name in ("booleanNot", "date", "dateTime", "time"))
+_BOTH_WAYS = terms(SWRLB, "booleanNot date dateTime time")
 
 
 def computed(atom: Atom, bound: Collection[str]) -> frozenset[str]:
@@ -233,14 +237,13 @@ def computed(atom: Atom, bound: Collection[str]) -> frozenset[str]:
     if not atom.computes or not atom.arguments:
         return frozenset()
     first, *others = atom.arguments
-    open_others = {term.name for term in others if isinstance(term, Variable)} - set(bound)
-    is_both_ways = atom.predicate in _BOTH_WAYS
     if not isinstance(first, Variable):
         return frozenset()
+    still_open = {*_variables_in(others)}.difference(bound)
+    is_both_ways = atom.predicate in _BOTH_WAYS
     if first.name in bound:
-        return frozenset(open_others) if is_both_ways else frozenset()
-    has_literal = any(isinstance(term, Lit) for term in others)
-    if open_others or (is_both_ways and has_literal):
+        return frozenset(still_open if is_both_ways else ())
+    if still_open or (is_both_ways and any(isinstance(term, Lit) for term in others)):
         return frozenset()
     return frozenset({first.name})
 
@@ -252,9 +255,9 @@ def mirrored(sign: str) -> str:
 
 # Rules as text: for messages on one line, and for files so that they read back the same.
 
-_WORD: Final = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
+_WORD = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
 #: Literals without quotes, by the datatype that the parser gives them.
-_BARE: Final = {
+_BARE = {
     XSD + "boolean": re.compile(r"true|false"),
     XSD + "integer": re.compile(r"[+-]?[0-9]+"),
     XSD + "decimal": re.compile(r"[+-]?(?:[0-9]+\.[0-9]*|\.[0-9]+)"),

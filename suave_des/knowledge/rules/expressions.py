@@ -5,13 +5,12 @@ writes them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
 
 from suave_des.knowledge.rdf import OWL, RDF, XSD, Lit, Triple, local_name
 
-_BETWEEN: Final = {"intersectionOf": " and ", "unionOf": " or "}
-_BEFORE: Final = ("complementOf", "datatypeComplementOf")
-_QUANTIFIERS: Final = {
+_BETWEEN = {"intersectionOf": " and ", "unionOf": " or "}
+_BEFORE = ("complementOf", "datatypeComplementOf")
+_QUANTIFIERS = {
     "someValuesFrom": "some",
     "allValuesFrom": "only",
     "hasValue": "value",
@@ -20,7 +19,7 @@ _QUANTIFIERS: Final = {
     **dict.fromkeys(("maxCardinality", "maxQualifiedCardinality"), "max"),
     **dict.fromkeys(("cardinality", "qualifiedCardinality"), "exactly"),
 }
-_FACETS: Final = {
+_FACETS = {
     "minInclusive": ">=",
     "minExclusive": ">",
     "maxInclusive": "<=",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain, count
 from pathlib import Path
-from typing import Final, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import rdflib
 
@@ -29,7 +29,7 @@ from suave_des.knowledge.rules.parser import parse_rules
 # that none can use. Which mistakes Pellet ignores was found by giving it each of them (owlready2
 # 0.51's Pellet).
 
-_DECLARED: Final = {
+_DECLARED = {
     rdf.OWL + "Class": "class",
     rdf.RDFS + "Class": "class",
     rdf.OWL + "ObjectProperty": "object property",
@@ -64,21 +64,23 @@ class Vocabulary:
     @classmethod
     def of(
         cls,
-        triples: Iterable[rdf.Triple],
+        triples: Sequence[rdf.Triple],
+        structure: Sequence[rdf.Triple],
         individuals: Iterable[str],
         enumerations: Mapping[str, frozenset[str]],
     ) -> Vocabulary:
-        """Collect the names in triples of ontologies; the individuals are further ones, that exist
-        only in states.
+        """Collect the names in triples of ontologies, and those that their structure uses (see
+        Content); the individuals are further ones, that exist only in states.
         """
-        triples = tuple(triples)
         texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
         literals = [(p, o) for _, p, o in triples if isinstance(o, Lit)]
         return cls(
             kinds=_kinds(triples, individuals),
             ranges=_ranges(triples) | texts,
             enumerations=enumerations,
-            used=frozenset(term for each in triples for term in each if isinstance(term, str)),
+            used=frozenset(
+                term for each in (*triples, *structure) for term in each if isinstance(term, str)
+            ),
             whole=frozenset(p for p, literal in literals if literal.datatype in rdf.WHOLE),
         )
 
@@ -105,6 +107,14 @@ class Vocabulary:
         found = self.by_name.get(name, ())
         shared = tuple(iri for iri in found if iri.startswith((rdf.TOMASYS, rdf.MROS)))
         return shared or found or ((rdf.SWRLB + name,) if rdf.SWRLB + name in swrl.BUILTINS else ())
+
+    def fitting(self, name: str, wanted: Collection[str]) -> tuple[str, ...]:
+        """IRIs that a bare name can mean; if one alone of several is of the wanted kinds, that."""
+        found = self.candidates(name)
+        if len(found) > 1:
+            wished = tuple(iri for iri in found if self.kinds[iri].intersection(wanted))
+            return wished if len(wished) == 1 else found
+        return found
 
     def means_itself(self, iri: str) -> bool:
         """Whether the bare name of an IRI means that IRI."""
@@ -149,9 +159,9 @@ def _ranges(triples: Iterable[rdf.Triple]) -> dict[str, frozenset[str]]:
     All ranges of a property hold at once; which values several of them leave is not worked out.
     """
     ranges: dict[str, set[str]] = defaultdict(set)
-    for subject, predicate, value in triples:
-        if predicate == rdf.RDFS + "range" and str(value).startswith(rdf.XSD):
-            ranges[subject].add(str(value))
+    for subject, value in rdf.links(triples, rdf.RDFS + "range"):
+        if value.startswith(rdf.XSD):
+            ranges[subject].add(value)
     return {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
 
 
@@ -170,8 +180,10 @@ class Problem(NamedTuple):
     is_fatal: bool = True
 
 
-_DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
-_ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
+#: What the kinds of atoms that name a class or a property are called.
+NOUNS = {"class": "class", "object": "object property", "data": "data property"}
+_PROPERTIES = ("object property", "data property")
+_ARGUMENTS = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
 
 
 def about_rule(
@@ -229,11 +241,8 @@ def check_property_use(rules: Iterable[Rule], vocabulary: Vocabulary) -> None:
     """
     for rule in rules:
         for atom in rule.atoms:
-            others = vocabulary.kinds.get(atom.predicate, frozenset()) & {
-                "object property",
-                "data property",
-            }
-            wanted = _DECLARED_AS.get(atom.kind, "")
+            others = vocabulary.kinds.get(atom.predicate, frozenset()).intersection(_PROPERTIES)
+            wanted = NOUNS.get(atom.kind, "")
             if atom.kind in ("object", "data") and others and wanted not in others:
                 problem = f"{local_name(atom.predicate)} is declared as {min(others)}, but used as {wanted}"
                 remedy = f"the rule is: {rule.text}"
@@ -266,31 +275,30 @@ def _predicate_problem(
     atom: Atom, name: str, vocabulary: Vocabulary, *, is_head: bool
 ) -> Problem | None:
     """Check that a class, property or datatype can hold of something, and is used as declared."""
-    if atom.kind == "" or not atom.predicate:
+    if "" in (atom.kind, atom.predicate):
         words = "an atom without a kind that SWRL knows, or without a name"
         return Problem(atom.place(), words, None)
     if atom.kind == "range":
         return _range_problem(atom, name, vocabulary, is_head=is_head)
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
-    wanted = _DECLARED_AS.get(atom.kind)
+    wanted = NOUNS.get(atom.kind)
     if wanted is None or wanted in declared or atom.expression:
         return None
     if not declared:
-        if is_head or atom.predicate in vocabulary.used:
-            return None  # a reasoner takes it as it is used
-        kinds = ("class",) if atom.kind == "class" else ("object property", "data property")
-        remedy = (
-            vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
-        )
-        return Problem(atom.place(), f"{wanted} {name} is not defined", remedy)
+        is_taken = is_head or atom.predicate in vocabulary.used  # by a reasoner, as it is used
+        return None if is_taken else _undefined(atom, wanted, vocabulary)
     if "class" in declared:
         words = f"{name} is a class, but is used as a property"
         return Problem(atom.place(), words, f"write {name}(?x)")
-    found = next(
-        (kind for kind in ("object property", "data property") if kind in declared), min(declared)
-    )
+    found = max(declared.intersection(_PROPERTIES), default=min(declared))
     words = f"{name} is {with_article(found)}, but is used as {with_article(wanted)}"
     return Problem(atom.place(), words, None)
+
+
+def _undefined(atom: Atom, wanted: str, vocabulary: Vocabulary) -> Problem:
+    kinds = _PROPERTIES if wanted in _PROPERTIES else (wanted,)
+    remedy = vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
+    return Problem(atom.place(), f"{wanted} {local_name(atom.predicate)} is not defined", remedy)
 
 
 def _range_problem(
@@ -313,11 +321,9 @@ def _argument_problems(
     """Check that an argument is an individual or a value, as required, and possible for that
     property.
     """
-    name, place, takes_value = (
-        local_name(atom.predicate),
-        atom.place(number),
-        atom.takes_value(number),
-    )
+    name = local_name(atom.predicate)
+    place = atom.place(number)
+    takes_value = atom.takes_value(number)
     if isinstance(term, Lit) and not takes_value:
         words = f"{name}: {swrl.write_term(term)} is a value, but an individual is needed"
         yield Problem(place, words, None)
@@ -326,18 +332,18 @@ def _argument_problems(
         if takes_value:
             words = f"{name}: {thing} is an individual where a value is needed"
             yield Problem(place, words, f'a text needs quotes: "{thing}"')
-        elif (
-            not is_head
-            and atom.kind in _DECLARED_AS
-            and atom.predicate != rdf.OWL + "Thing"
-            and not atom.expression
-            and term.iri not in vocabulary.used
-            and term.iri not in vocabulary.kinds
-        ):
+        elif not is_head and _asks_of_nothing(atom, term, vocabulary):
             words = f"individual {thing} is not defined"
             yield Problem(place, words, vocabulary.guess(term.iri, ("individual",)))
     elif isinstance(term, Lit) and atom.kind == "data":
         yield from _value_problems(atom, place, term, vocabulary, is_head=is_head)
+
+
+def _asks_of_nothing(atom: Atom, term: Named, vocabulary: Vocabulary) -> bool:
+    """Whether an atom asks for a class or property of a name that stands for nothing."""
+    is_known = term.iri in vocabulary.used or term.iri in vocabulary.kinds
+    holds_of_all = atom.predicate == rdf.OWL + "Thing" or bool(atom.expression)
+    return atom.kind in NOUNS and not holds_of_all and not is_known
 
 
 def _value_problems(
@@ -348,19 +354,30 @@ def _value_problems(
     consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
     ranges = vocabulary.ranges.get(atom.predicate, frozenset({term.datatype}))
     values = vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))
-    # A whole number is a decimal, which matches no decimal as they are measured.
-    whole = term.datatype in rdf.WHOLE and rdf.XSD + "decimal" in ranges
-    can_be = whole and (is_head or atom.predicate in vocabulary.whole)
-    can_be = can_be or (term.datatype in rdf.WHOLE and not ranges.isdisjoint(rdf.WHOLE))
-    if term.datatype not in ranges and not can_be:
+    may_be_whole = is_head or atom.predicate in vocabulary.whole
+    if not _is_in(ranges, term, may_be_whole=may_be_whole):
         wanted = " or ".join(sorted(map(local_name, ranges)))
         words = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
-        remedy = f"write {term.text}.0" if whole else f"a value of {wanted}"
+        remedy = f"a value of {wanted}"
+        if term.datatype in rdf.WHOLE and rdf.XSD + "decimal" in ranges:
+            remedy = f"write {term.text}.0"
         yield Problem(place, words, remedy, is_head)
     elif term.text not in values:
         words = f"{swrl.write_term(term)} is not among the values of {name}: it {consequence}"
         remedy = nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
         yield Problem(place, words, remedy, is_head)
+
+
+def _is_in(ranges: Collection[str], value: Lit, *, may_be_whole: bool) -> bool:
+    """Whether a value is in one of some datatypes.
+
+    A whole number is a decimal, which matches no decimal as they are measured, but one that
+    `may_be_whole`.
+    """
+    if value.datatype not in rdf.WHOLE:
+        return value.datatype in ranges
+    taking = rdf.EXACT if may_be_whole else rdf.WHOLE
+    return not taking.isdisjoint(ranges)
 
 
 def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Problem]:
@@ -375,19 +392,13 @@ def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Probl
         yield Problem(atom.place(), words, "Pellet takes builtins in bodies only")
     least, most = counts
     if not least <= len(atom.arguments) <= most:
-        wanted = (
-            str(least)
-            if least == most
-            else f"{least} or more"
-            if most == 99
-            else f"{least} to {most}"
-        )
+        wanted = {least: f"{least}", 99: f"{least} or more"}.get(most, f"{least} to {most}")
         words = f"{name} takes {wanted} arguments, not {len(atom.arguments)}"
         remedy = "arguments are separated by commas, and decimals have a point"
         yield Problem(atom.place(), words, remedy)
 
 
-def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
+def variable_uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
     """(atom, number of the argument, name) of each variable."""
     for atom in atoms:
         for number, term in enumerate(atom.arguments):
@@ -399,20 +410,19 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
     """Find unbound variables, and variables that stand for both an individual and a value."""
     individuals: dict[str, Place | None] = {}
     values: dict[str, Place | None] = {}
-    for atom, number, name in _uses(rule.atoms):
+    for atom, number, name in variable_uses(rule.atoms):
         places = values if atom.takes_value(number) else individuals
         places.setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(filter(None, (individuals[name], values[name])), default=None)
         yield Problem(place, f"?{name} stands for an individual and for a value", None)
     bound = _bound_in(rule)
-    builtins = [atom for atom in rule.body if atom.kind == "builtin"]
-    ranges = [atom for atom in rule.body if atom.kind == "range"]
-    for atom, number, name in _uses([*builtins, *ranges]):
+    testing = [atom for atom in rule.body if atom.kind in ("builtin", "range")]
+    for atom, number, name in variable_uses(testing):
         if name not in bound:
             words = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it"
             yield Problem(atom.place(number), words, nearest(name, bound))
-    for atom, number, name in _uses(rule.head):
+    for atom, number, name in variable_uses(rule.head):
         if name not in bound:
             words = f"?{name} occurs in the head, but the body does not bind it"
             yield Problem(atom.place(number), words, nearest(name, bound))
@@ -429,7 +439,7 @@ def _bound_in(rule: Rule) -> set[str]:
 
 # Rules as text.
 
-MAX_BYTES: Final = 8 * 2**20
+MAX_BYTES = 8 * 2**20
 
 
 @dataclass(frozen=True)
@@ -488,7 +498,7 @@ def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
 
 
 def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
-    kinds: tuple[str, ...] = ("class", "object property", "data property", "builtin")
+    kinds = (*NOUNS.values(), "builtin")
     predicate = _iri(atom.predicate, atom.place(), vocabulary, file, kinds)
 
     def named(number: int, word: str) -> Named:
@@ -518,26 +528,15 @@ def _iri(
         return name
     if name in ("sameAs", "differentFrom") and "class" in kinds:
         return rdf.OWL + name
-    found = vocabulary.candidates(name)
-    if len(found) > 1:
-        fitting = tuple(iri for iri in found if vocabulary.kinds[iri] & {*kinds})
-        found = fitting if len(fitting) == 1 else found
+    found = vocabulary.fitting(name, kinds)
     if len(found) == 1:
         return found[0]
-    where = str(place) if place else None
-    if found:
-        raise RuleError(
-            f"{name} is ambiguous",
-            file=file,
-            place=where,
-            remedy=f"write {' or '.join(map(str, found))}",
-        )
-    raise RuleError(
-        f"{name} is not defined",
-        file=file,
-        place=where,
-        remedy=vocabulary.guess(name, kinds) or otherwise,
-    )
+    problem = f"{name} is ambiguous"
+    remedy = f"write {' or '.join(found)}"
+    if not found:
+        problem = f"{name} is not defined"
+        remedy = vocabulary.guess(name, kinds) or otherwise
+    raise RuleError(problem, file=file, place=str(place) if place else None, remedy=remedy)
 
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:
@@ -561,51 +560,49 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
     return "data" if isinstance(arguments[1], Lit) else "object"
 
 
-_IMP: Final = rdf.SWRL + "Imp"
-_VARIABLE: Final = rdf.SWRL + "Variable"
-ENABLED: Final = rdf.SWRLA + "isRuleEnabled"
-_PREDICATE_OF: Final = {
+_IMP = rdf.SWRL + "Imp"
+_VARIABLE = rdf.SWRL + "Variable"
+ENABLED = rdf.SWRLA + "isRuleEnabled"
+_PREDICATE_OF = {
     "object": "propertyPredicate",
     "data": "propertyPredicate",
     "class": "classPredicate",
     "range": "dataRange",
     "builtin": "builtin",
 }
-_NAMES: Final[Mapping[str, str]] = {"same": swrl.SAME, "different": swrl.DIFFERENT}
-_CLASS_OF: Final = {kind: name for name, kind in swrl.KINDS.items()}
+_NAMES: Mapping[str, str] = {"same": swrl.SAME, "different": swrl.DIFFERENT}
+_CLASS_OF = {kind: name for name, kind in swrl.KINDS.items()}
 #: Ends the names that rules without one get.
-WITHOUT_NAME: Final = "without a name"
+WITHOUT_NAME = "without a name"
 #: Begins the IRIs given to variables, as Protégé does.
-_VARIABLES: Final = "urn:swrl:var#"
-_Term = TypeVar("_Term", str, str | Lit)
+_VARIABLES = "urn:swrl:var#"
 
 
 # as many as there are files in the cache of those: their rules are read again and again
 @lru_cache(maxsize=4)
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
-    rules, found, numbers = list[Rule](), list[tuple[str, Rule]](), count(1)
-    for node in (
-        subject
-        for subject, predicate, kind in file.triples
-        if predicate == rdf.RDF_TYPE and kind == _IMP
-    ):
-        names: dict[str, str] = {}
-        body = _read_side(file, node, "body", names)
-        rule = Rule("", body, _read_side(file, node, "head", names))
-        undeclared = (name for iri, name in names.items() if _VARIABLE not in file.kinds(iri))
-        found.append((node, replace(rule, undeclared=tuple(undeclared))))
-    for node, rule in sorted(found, key=lambda each: (each[1].text, each[0])):
-        label, mark = file.value(node, rdf.RDFS + "label"), file.value(node, ENABLED)
+    read = {node: _read_rule(file, node) for node in rdf.members(file.triples, [_IMP])}
+    rules: list[Rule] = []
+    numbers = count(1)
+    for node, rule in sorted(read.items(), key=lambda each: (each[1].text, each[0])):
+        label = file.value(node, rdf.RDFS + "label")
         name = label.text if isinstance(label, Lit) else local_name(node)
-        if label is None and node.startswith("_:"):
+        if label is None and rdf.is_node(node):
             name = f"rule {next(numbers)} {WITHOUT_NAME}"
-        enabled = not isinstance(mark, Lit) or mark.text.strip().lower() not in ("false", "0")
-        line, triples = file.line_of_rule(name), tuple(_closure(file, node))
-        rules.append(
-            replace(rule, name=name, enabled=enabled, file=file.path, line=line, triples=triples)
-        )
+        rules.append(replace(rule, name=name, line=file.line_of_rule(name)))
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
+
+
+def _read_rule(file: OntologyFile, node: str) -> Rule:
+    """Read a rule without its name."""
+    names: dict[str, str] = {}
+    body, head = (_read_side(file, node, side, names) for side in ("body", "head"))
+    undeclared = tuple(name for iri, name in names.items() if _VARIABLE not in file.kinds(iri))
+    mark = file.value(node, ENABLED)
+    enabled = not isinstance(mark, Lit) or mark.text.strip().lower() not in ("false", "0")
+    triples = tuple(_closure(file, node))
+    return Rule("", body, head, enabled, file.path, triples=triples, undeclared=undeclared)
 
 
 def _closure(file: OntologyFile, start: str) -> Iterator[rdf.Triple]:
@@ -626,7 +623,7 @@ def _is_part_of_rule(file: OntologyFile, node: str) -> bool:
     """
     kinds = file.kinds(node)
     named = any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
-    return named or node.startswith("_:")
+    return named or rdf.is_node(node)
 
 
 def _read_side(file: OntologyFile, rule: str, side: str, names: dict[str, str]) -> tuple[Atom, ...]:
@@ -645,26 +642,21 @@ def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> At
         file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values())
     )
     name = next((str(term) for term in predicates if term is not None), _NAMES.get(kind, ""))
-    arguments = [file.value(node, rdf.SWRL + name) for name in ("argument1", "argument2")]
-    if kind == "builtin":
-        arguments = [*file.items(file.value(node, rdf.SWRL + "arguments"))]
-    expression = tuple(_renamed(_closure(file, name))) if name.startswith("_:") else ()
+    # With their nodes numbered equal expressions are equal.
+    expression = tuple(rdf.numbered_nodes(_closure(file, name), "_:e")) if rdf.is_node(name) else ()
     atom = Atom(kind, f"_:{in_words(expression)}" if expression else name, (), (), expression)
     terms = (
         _read_term(file, term, names, takes_value=atom.takes_value(number))
-        for number, term in enumerate(term for term in arguments if term is not None)
+        for number, term in enumerate(_arguments_of(file, node, kind))
     )
     return replace(atom, arguments=tuple(terms))
 
 
-def _renamed(triples: Iterable[rdf.Triple]) -> Iterator[rdf.Triple]:
-    """Triples with their nodes without a name numbered, so that equal expressions are equal."""
-    names: dict[str | Lit, str] = {}
-    for subject, predicate, value in triples:
-        for term in (subject, value):
-            if isinstance(term, str) and term.startswith("_:"):
-                names.setdefault(term, f"_:e{len(names)}")
-        yield names.get(subject, subject), predicate, names.get(value, value)
+def _arguments_of(file: OntologyFile, node: str | Lit, kind: AtomKind) -> list[str | Lit]:
+    if kind == "builtin":
+        return list(file.items(file.value(node, rdf.SWRL + "arguments")))
+    given = (file.value(node, f"{rdf.SWRL}argument{number}") for number in (1, 2))
+    return [each for each in given if each is not None]
 
 
 def _read_term(
@@ -711,7 +703,8 @@ def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
     node = f"_:atom{len(triples)}"
     triples.append((node, rdf.RDF_TYPE, _CLASS_OF[atom.kind]))
     if atom.kind in _PREDICATE_OF:
-        of_atom = [(_of_atom(node, s), p, _of_atom(node, o)) for s, p, o in atom.expression]
+        # Its nodes get names of their own in each atom.
+        of_atom = list(rdf.numbered_nodes(atom.expression, f"{node}e"))
         predicate = of_atom[0][0] if of_atom else atom.predicate
         triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], predicate))
         triples += of_atom
@@ -726,20 +719,14 @@ def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
     return node
 
 
-def _of_atom(node: str, term: _Term) -> _Term:
-    """A term of the expression of an atom; its nodes get names of their own in each atom."""
-    is_node = isinstance(term, str) and term.startswith("_:")
-    return f"{node}{term[2:]}" if is_node else term
-
-
 def _write_list(items: Sequence[str | Lit], kind: str, triples: list[rdf.Triple]) -> str:
     rest = rdf.RDF + "nil"
     for item in reversed(items):
         node = f"_:list{len(triples)}"
         triples += [
             (node, rdf.RDF_TYPE, kind),
-            (node, rdf.RDF + "first", item),
-            (node, rdf.RDF + "rest", rest),
+            (node, rdf.FIRST, item),
+            (node, rdf.REST, rest),
         ]
         rest = node
     return rest

@@ -20,7 +20,7 @@ import threading
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from suave_des.errors import nearest, shown
 from suave_des.knowledge.rdf import PREFIXES, XSD, Lit, is_well_formed, local_name
@@ -29,11 +29,11 @@ from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term,
 if TYPE_CHECKING:
     from lark import Lark, Token
 
-MAX_DIGITS: Final = 400
-_WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
+MAX_DIGITS = 400
+_WORD = r"[^\W\d][\w.-]*(?<![.-])"
 #: What stands for the terminals of which the first is expected, and what would be right; the first
 # that fits counts.
-_EXPECTED: Final = (
+_EXPECTED = (
     ("VARIABLE", 'an argument, such as ?o, 2.5, "text", true or an individual,', None),
     ("PREFIXED", "an atom, such as Objective(?o),", None),
     ("DISABLED", "a rule's name", 'write name: body -> head, or "a name": body -> head'),
@@ -45,21 +45,19 @@ _EXPECTED: Final = (
     ("_COLON", ":", "a rule is name: body -> head"),
 )
 #: What SWRL does not have, and what to do without it.
-_LACKING: Final = (
+_LACKING = (
     (re.compile(r"\|\|?|∨|(?i:or)\b"), "'or'", "write a rule for each case"),
     (re.compile(r"[¬!~]|(?i:not)\b"), "negation", "say what holds instead"),
 )
-_HEADER: Final = re.compile(
-    rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE
-)
-_ESCAPE: Final = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
-_ESCAPED: Final = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
+_HEADER = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE)
+_ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
+_ESCAPED = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
 #: What no text may contain: control characters, and halves of surrogate pairs, which no file can
 # encode.
-_FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
-_FOUND: Final = re.compile(r"=>|\??[^\s\"<>(),^?]+|.", re.DOTALL)
-_BLANK: Final = re.compile(r"(?:\s|#[^\n]*)*")
-_lock: Final = threading.Lock()
+_FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+_FOUND = re.compile(r"=>|\??[^\s\"<>(),^?]+|.", re.DOTALL)
+_BLANK = re.compile(r"(?:\s|#[^\n]*)*")
+_lock = threading.Lock()
 
 
 def parse_rules(
