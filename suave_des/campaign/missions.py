@@ -14,9 +14,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import chain, product
+from itertools import chain, compress, product
 from types import FrameType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, check_range
 from suave_des.campaign.variation import Variation, cell_of, short_mission
@@ -131,17 +131,46 @@ class Campaign:
         """Yield the missions that have yet to be run, in order.
 
         `settled` returns the runs of a manager at a point that need not be run; it is called when
-        their turn comes.
+        their turn comes. Missions that are the same as at an earlier point are copies of these,
+        unless only the earlier ones are there, as campaigns of earlier versions may have it.
         """
+        firsts = [{each: first for first, own in by.items() for each in own} for by in self._alike]
+        runs = range(1, self.spec.runs + 1)
         for point, manager in product(
             range(self.variation.sweep.points), range(len(self.spec.managers))
         ):
             known = settled(point, manager)
-            yield from (
-                MissionKey(point, manager, run)
-                for run in range(1, self.spec.runs + 1)
-                if run not in known
-            )
+            first = firsts[manager].get(point)
+            wanted = runs if first is None else sorted(settled(first, manager))
+            yield from (MissionKey(point, manager, run) for run in wanted if run not in known)
+
+    @cached_property
+    def _alike(self) -> list[dict[int, list[int]]]:
+        """By manager the points whose missions are the same as at an earlier point, by that; none
+        if knowledge states are recorded, which name their point.
+        """
+        sweep = self.variation.sweep
+        found: list[dict[int, list[int]]] = []
+        for manager in self.spec.managers:
+            read = [_reads(manager, self.variation.paths[name]) for name in sweep.parameters]
+            by_values: dict[str, list[int]] = {}
+            if not all(read) and not self.spec.record_knowledge:
+                for point in range(sweep.points):
+                    values = sweep.values(point).values()
+                    by_values.setdefault(repr([*compress(values, read)]), []).append(point)
+            found.append({first: others for first, *others in by_values.values()})
+        return found
+
+    def copies(self, key: MissionKey, outcome: Row | MissionFailure) -> Iterator[MissionOutcome]:
+        """Yield the outcomes of missions that are the same as one, at later points of the sweep."""
+        for point in self._alike[key.manager].get(key.point, ()):
+            copied = key._replace(point=point)
+            if isinstance(outcome, MissionFailure):
+                yield copied, outcome._replace(point=point)
+            else:
+                swept = map(cell_of, self.variation.sweep.values(point).values())
+                further = outcome[len(COLUMNS) + len(self.variation.paths) :]
+                yield copied, (*outcome[: len(COLUMNS)], *swept, *further)
 
     def scenarios(self) -> Iterator[LoadedScenario]:
         """Yield scenarios that together have every swept value of what managers and functions are
@@ -180,6 +209,23 @@ class Campaign:
     def too_long(self) -> str:
         """The cause where a mission took too long."""
         return f"not done after {self.spec.time_out_s:g} s (time-out)"
+
+
+_SETTINGS_READ: Final[Mapping[str, tuple[str, ...]]] = {
+    "none": (),
+    "random": ("random",),
+    "metacontrol": ("metacontrol",),
+    "bt": ("bt",),
+    "bt_extended": ("bt",),
+}
+"""Whose settings a manager reads; others than these may read all."""
+
+
+def _reads(manager: str, path: str) -> bool:
+    """Whether a manager's missions depend on the value at a key path of the scenario."""
+    part, _, rest = path.partition(".")
+    section = rest.partition(".")[0]
+    return part != "managers" or section in _SETTINGS_READ.get(manager, (section,))
 
 
 Executor = Callable[[Campaign, Iterable[MissionKey], int], Iterator[list[Finished]]]
