@@ -9,8 +9,8 @@ import signal
 import sys
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -134,36 +134,48 @@ class Campaign:
         their turn comes. Missions that are the same as at an earlier point are copies of these,
         unless only the earlier ones are there, as campaigns of earlier versions may have it.
         """
-        firsts = [{each: first for first, own in by.items() for each in own} for by in self._alike]
         runs = range(1, self.spec.runs + 1)
         for point, manager in product(
             range(self.variation.sweep.points), range(len(self.spec.managers))
         ):
             known = settled(point, manager)
-            first = firsts[manager].get(point)
-            wanted = runs if first is None else sorted(settled(first, manager))
+            first = self._alike[manager][point]
+            wanted = runs if first == point else sorted(settled(first, manager))
             yield from (MissionKey(point, manager, run) for run in wanted if run not in known)
 
     @cached_property
-    def _alike(self) -> list[dict[int, list[int]]]:
-        """By manager the points whose missions are the same as at an earlier point, by that; none
+    def _alike(self) -> list[Sequence[int]]:
+        """By manager, for each point, the first one at which its missions are the same; that itself
         if knowledge states are recorded, which name their point.
         """
         sweep = self.variation.sweep
-        found: list[dict[int, list[int]]] = []
+        found: list[Sequence[int]] = []
         for manager in self.spec.managers:
             read = [_reads(manager, self.variation.paths[name]) for name in sweep.parameters]
-            by_values: dict[str, list[int]] = {}
-            if not all(read) and not self.spec.record_knowledge:
-                for point in range(sweep.points):
-                    values = sweep.values(point).values()
-                    by_values.setdefault(repr([*compress(values, read)]), []).append(point)
-            found.append({first: others for first, *others in by_values.values()})
+            firsts: dict[str, int] = {}
+            if all(read) or self.spec.record_knowledge:
+                found.append(range(sweep.points))
+                continue
+            each = (
+                repr([*compress(values.values(), read)])
+                for values in map(sweep.values, range(sweep.points))
+            )
+            found.append([firsts.setdefault(own, point) for point, own in enumerate(each)])
         return found
+
+    @cached_property
+    def _later(self) -> dict[tuple[int, int], list[int]]:
+        """The later points whose missions are the same, by point and manager."""
+        found: dict[tuple[int, int], list[int]] = defaultdict(list)
+        for manager, firsts in enumerate(self._alike):
+            for point, first in enumerate(firsts):
+                if first != point:
+                    found[first, manager].append(point)
+        return dict(found)
 
     def copies(self, key: MissionKey, outcome: Row | MissionFailure) -> Iterator[MissionOutcome]:
         """Yield the outcomes of missions that are the same as one, at later points of the sweep."""
-        for point in self._alike[key.manager].get(key.point, ()):
+        for point in self._later.get(key[:2], ()):
             copied = key._replace(point=point)
             if isinstance(outcome, MissionFailure):
                 yield copied, outcome._replace(point=point)

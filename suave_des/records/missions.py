@@ -87,17 +87,10 @@ def read_missions(paths: Sequence[Path], labels: Mapping[str, str] = _NO_LABELS)
             "no results are given",
             remedy="give the --out folders of suave-des campaign, or CSV files",
         )
-    seen = set[Path]()
-    for path in paths:
-        if real(path) in seen:
-            raise InputError("is given twice", file=path, remedy="name each folder of results once")
-        seen.add(real(path))
+    _check_each_once(paths)
     named = dict(zip(_short_names(paths), paths, strict=True))
     read = {name: _read_source(path) for name, path in named.items()}
-    managers = dict.fromkeys(chain.from_iterable(each.frame["manager"] for each in read.values()))
-    for name in labels:
-        if name not in managers:
-            raise unknown(f"there is no mission of {shown(name)}", name, managers, "there are")
+    _check_labels(labels, [each.frame for each in read.values()])
     sources = {name: _labelled(each, labels) for name, each in read.items()}
     frames = [each.frame.assign(source=name) for name, each in sources.items()]
     folders = {name: path for name, path in named.items() if (path / STORE_FILE).is_file()}
@@ -108,8 +101,23 @@ def read_missions(paths: Sequence[Path], labels: Mapping[str, str] = _NO_LABELS)
         tuple(dict.fromkeys(chain.from_iterable(each.swept for each in sources.values()))),
         _notes(sources.values()),
         folders,
-        {name: label for each in sources.values() for name, label in each.labels.items()},
+        dict(chain.from_iterable(each.labels.items() for each in sources.values())),
     )
+
+
+def _check_each_once(paths: Iterable[Path]) -> None:
+    seen = set[Path]()
+    for path in paths:
+        if real(path) in seen:
+            raise InputError("is given twice", file=path, remedy="name each folder of results once")
+        seen.add(real(path))
+
+
+def _check_labels(labels: Iterable[str], frames: Iterable[pandas.DataFrame]) -> None:
+    managers = dict.fromkeys(chain.from_iterable(frame["manager"] for frame in frames))
+    for name in labels:
+        if name not in managers:
+            raise unknown(f"there is no mission of {shown(name)}", name, managers, "there are")
 
 
 def _labelled(missions: Missions, further: Mapping[str, str]) -> Missions:

@@ -247,7 +247,7 @@ def _summary(group: Group, metric: Metric) -> dict[str, Any]:
     """
     rows = group.frame[group.frame[metric.name].notna()]
     sample = rows[metric.name].to_numpy(float)
-    row: dict[str, Any] = {"group": group.name, "metric": metric.name, "point": group.point}
+    row: dict[str, Any] = {"group": group.name, "metric": metric.name}
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample) or np.isinf(sample).any():
         return row
@@ -292,7 +292,6 @@ def _difference(
     """
     is_paired, why, x, y = samples
     row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
-    row["point"] = first.point if first.point == second.point else ""
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row

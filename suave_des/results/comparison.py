@@ -218,30 +218,30 @@ class Comparison(Written):
         page holds no more.
         """
         note = " ".join(self._methods())
-        tested = [each for each in self.of_pairs if each["test"]]
-        rows: dict[str, list[tuple[str, ...]]] = {}
-        for metric in self.metrics:
-            rows[metric.name] = [(capital(metric.heading),)] * (not self._has_headings)
-            before = ""
-            for each in self._by_point(tested, metric):
-                point = each["point"]
-                if point != before:
-                    before = point
-                    rows[metric.name].append((point.removeprefix(", "),))
-                names = (each[side].removesuffix(point) for side in ("group", "other"))
-                _, _, mean, interval, _, p, effect = _difference_row(each, metric)
-                name = " \N{MINUS SIGN} ".join(names)
-                rows[metric.name].append((name, mean, interval, effect, p))
-        if not self.of_pairs:
-            return
-        if not self._has_headings:
-            own = [row for each in rows.values() if len(each) > 1 for row in each]
-            yield _latex_differences(own, "Differences between managers.", "tab:differences", note)
-            return
-        for metric in (each for each in self.metrics if rows[each.name]):
-            title = f"Differences between managers: {metric.heading}."
-            label = f"tab:differences-{metric.name.replace('_', '-')}"
-            yield _latex_differences(rows[metric.name], title, label, note)
+        found = [(metric, rows) for metric in self.metrics if (rows := self._latex_rows(metric))]
+        if self._has_headings:
+            for metric, rows in found:
+                title = f"Differences between managers: {metric.heading}."
+                label = f"tab:differences-{metric.name.replace('_', '-')}"
+                yield _latex_differences(rows, title, label, note)
+        elif self.of_pairs:
+            together = [row for metric, own in found for row in ((capital(metric.heading),), *own)]
+            title = "Differences between managers."
+            yield _latex_differences(together, title, "tab:differences", note)
+
+    def _latex_rows(self, metric: Metric) -> list[tuple[str, ...]]:
+        """Return the rows of differences in a metric, with each point of a sweep above its own."""
+        rows: list[tuple[str, ...]] = []
+        before = ""
+        for each in self._by_point([each for each in self.of_pairs if each["test"]], metric):
+            point = each["point"]
+            if point != before:
+                before = point
+                rows.append((point.removeprefix(", "),))
+            names = (each[side].removesuffix(point) for side in ("group", "other"))
+            _, _, mean, interval, _, p, effect = _difference_row(each, metric)
+            rows.append((" \N{MINUS SIGN} ".join(names), mean, interval, effect, p))
+        return rows
 
     def _sizes(self) -> str:
         sizes = self.summaries.drop_duplicates("group").set_index("group")["n"]
@@ -395,11 +395,24 @@ def concluded(
         row["conclusion"] = conclusion(row, by_name[row["metric"]])
     sentences = " ".join(_conclusions(groups, summaries, differences))
     notes = (*groups.missions.notes, *groups.notes, *_worse_paired(differences))
-    of_groups = [dict.fromkeys(_SUMMARY) | {"mean": Estimate()} | dict(row) for row in summaries]
-    of_pairs = [dict.fromkeys(_DIFFERENCE) | row for row in differences]
+    points = {group.name: group.point for group in groups.groups}
+    of_groups = [
+        dict.fromkeys(_SUMMARY) | {"mean": Estimate(), "point": points[row["group"]]} | dict(row)
+        for row in summaries
+    ]
+    of_pairs = [
+        dict.fromkeys(_DIFFERENCE) | {"point": _common_point(points, row)} | row
+        for row in differences
+    ]
     return Comparison(
         sentences, notes, of_groups, of_pairs, groups.metrics, groups.counted, largest, replay
     )
+
+
+def _common_point(points: Mapping[str, str], row: Row) -> str:
+    """Return the point of a sweep at which both groups of a pair are; empty if there is none."""
+    point = points[row["group"]]
+    return point if point == points[row["other"]] else ""
 
 
 def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:

@@ -161,10 +161,8 @@ def key_words(key: str) -> str:
     Example:
         key_words("signals.water_visibility.period_s")  # "water visibility: period (s)"
     """
+    key = key.rpartition(":")[2]  # of module:Class only the class
     parts = [part for part in key.split(".") if part not in _LEFT_OUT]
-    for place, part in enumerate(parts):
-        if ":" in part:  # of module:Class only the class, also of package.module:Class
-            parts = [part.rpartition(":")[2], *parts[place + 1 :]]
     unit = next((ending for ending in _UNITS if parts and parts[-1].endswith(ending)), "")
     if unit:
         parts[-1] = parts[-1].removesuffix(unit)
