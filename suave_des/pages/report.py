@@ -132,12 +132,11 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
     """Put missions into columns for the page's charts, at most MOST_DRAWN of them.
 
     Returns:
-        groups: their names, as the tables have them, and the numbers of their looks, as in figures;
-            titles of the
-        metrics by column; columns: group number, run, seed, and each metric and swept parameter,
-        None where there is no value; swept: names of parameters; every: 1, or n if only each nth
-        run is there; missions: how many there are;
-        is_paired: whether runs of the same seed and number share their random numbers.
+        groups: their names, as the tables have them, their managers' own names, and the numbers of
+            their looks, as in figures; titles of the metrics by column; columns: group number, run,
+            seed, and each metric and swept parameter, None where there is no value; swept: names of
+            parameters; every: 1, or n if only each nth run is there; missions: how many there are;
+            is_paired: whether runs of the same seed and number share their random numbers.
     """
     groups = grouped(missions).groups
     frame = at_horizons(missions.frame, missions.swept)
@@ -160,6 +159,7 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
     names = [each.name for each in groups]
     return {
         "groups": names,
+        "managers": list(map(missions.named, names)),
         "looks": looks(names),
         "titles": titles,
         "columns": columns,
@@ -191,11 +191,22 @@ def _made(folder: Path) -> dict[str, Any]:
         "folder": str(folder),
         "command": shlex.join(about.command),
         "manifest": {
-            key: value if isinstance(value, dict) else json.dumps(value).strip('"')
+            key: {name: _text(part) for name, part in value.items()}
+            if isinstance(value, dict)
+            else _text(value)
             for key, value in (read_json(path) if path.exists() else {}).items()
             if key != "command"
         },
     }
+
+
+def _text(value: Any) -> str:
+    """Write a value of a manifest for readers: lists and mappings without their brackets."""
+    if isinstance(value, dict):
+        return "; ".join(f"{name}: {_text(part)}" for name, part in value.items()) or "none"
+    if isinstance(value, list):
+        return ", ".join(map(_text, value)) or "none"
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 # Ways

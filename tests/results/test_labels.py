@@ -74,10 +74,9 @@ def test_a_campaign_file_s_label_stands_in_tables_figures_and_the_report(labelle
         assert not re.search(r"^(none|bt - none) ", shown, re.MULTILINE)
     assert command_here("figure", "out", "--out", "f.svg", cwd=labelled).returncode == 0
     assert "No adaptation" in (labelled / "f.svg").read_text()
-    assert content_of(report_page([labelled / "out"]))["results"]["drawn"]["groups"] == [
-        "No adaptation",
-        "bt",
-    ]
+    drawn = content_of(report_page([labelled / "out"]))["results"]["drawn"]
+    assert drawn["groups"] == ["No adaptation", "bt"]
+    assert drawn["managers"] == ["none", "bt"]  # for the command that replays a mission
 
 
 def test_managers_are_named_by_their_names_or_labels_and_replays_by_names(labelled):
