@@ -550,6 +550,16 @@ def write_file(file: Path, content: str | bytes) -> None:
     write_files(final.parent, {final.name: content})
 
 
+def check_folder(folder: Path) -> None:
+    """Raise an InputError if there is no folder of a name."""
+    remedy = "give the folder that suave-des run or campaign wrote with --out"
+    _check(
+        folder,
+        (_is_circle(folder), "is a link in a circle", remedy),
+        (not folder.is_dir(), "no such folder", remedy),
+    )
+
+
 def _is_circle(file: Path) -> bool:
     try:
         file.stat()

@@ -32,6 +32,12 @@ capital within a word.
 _MARKDOWN = str.maketrans(
     {**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"}
 )
+LATEX_NEEDS = r"% needs \usepackage{array,booktabs}"
+_LATEX_WIDTH, _LATEX_SMALL_WIDTH = 56, 72
+"""Characters in a row, of all columns together, that fit the text width of LaTeX's article, in its
+own size and in small print.
+"""
+_NEGATIVE = re.compile(r"(?<![\w.])-\d[\d.,]*")
 _LATEX = str.maketrans(
     {
         **{character: f"\\{character}" for character in "&%$#_{}"},
@@ -41,6 +47,7 @@ _LATEX = str.maketrans(
         "<": r"\textless{}",
         ">": r"\textgreater{}",
         "|": r"\textbar{}",
+        "\N{MINUS SIGN}": "$-$",
     }
 )
 
@@ -127,25 +134,29 @@ class Table:
         """Write the table for LaTeX with booktabs, its title as caption, with a label for
         references and a note below.
 
-        Headings `over` those of the table are over as many columns each, all but the first.
+        Headings `over` those of the table are over as many columns each, all but the first. A wide
+        table is in small print, and breaks what is in its first column.
         """
         columns = len(self.headings)
+        widths = self._widths(None)
         lines = [r"\begin{table}", r"  \centering", rf"  \caption{{{latex_text(self.title)}}}"]
         lines += [rf"  \label{{{label}}}"] if label else []
-        lines += [rf"  \begin{{tabular}}{{{self._alignment}}}", r"    \toprule"]
+        alignment = self._alignment
+        if sum(widths) > _LATEX_WIDTH:
+            lines.append(r"  \footnotesize")
+            if sum(widths) > _LATEX_SMALL_WIDTH:
+                alignment = r">{\raggedright\arraybackslash}p{0.33\linewidth}" + alignment[1:]
+        lines += [rf"  \begin{{tabular}}{{{alignment}}}", r"    \toprule"]
         if over:
             each = (columns - 1) // len(over)
             begins = range(2, columns + 1, each)
-            lines.append(
-                "    "
-                + "".join(rf" & \multicolumn{{{each}}}{{c}}{{{latex_text(it)}}}" for it in over)
-                + r" \\"
-            )
+            heads = [rf"\multicolumn{{{each}}}{{c}}{{{latex_text(it)}}}" for it in over]
+            lines.append(_latex_row(["", *heads]))
             lines.append(
                 "    "
                 + " ".join(rf"\cmidrule(lr){{{begin}-{begin + each - 1}}}" for begin in begins)
             )
-        lines.append(f"    {' & '.join(map(latex_text, self.headings))} \\\\")
+        lines.append(_latex_row(map(latex_text, self.headings)))
         if not self.rows or len(self.rows[0]) > 1:
             lines.append(r"    \midrule")
         for row in self.rows:
@@ -155,9 +166,7 @@ class Table:
                     rf"    \multicolumn{{{columns}}}{{l}}{{{latex_text(row[0])}}} \\",
                 ]
             else:
-                lines.append(
-                    f"    {' & '.join([latex_text(row[0]), *map(_latex_number, row[1:])])} \\\\"
-                )
+                lines.append(_latex_row([latex_text(row[0]), *map(_latex_number, row[1:])]))
         below = [rf"  \par\smallskip\footnotesize {latex_text(note)}"] if note else []
         return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", *below, r"\end{table}"])
 
@@ -268,7 +277,7 @@ class Written(ABC):
         ]
         notes = [""] * (len(tables) - 1) + [" ".join(self.remarks())]
         parts = [table.latex(note=note) for table, note in zip(tables, notes, strict=True)]
-        return "\n".join([r"% needs \usepackage{booktabs}", *parts]) + "\n"
+        return "\n".join([LATEX_NEEDS, *parts]) + "\n"
 
     def csv(self) -> str:
         """Write all statistics as one table."""
@@ -331,12 +340,13 @@ def latex_text(text: str) -> str:
     return text.translate(_LATEX)
 
 
+def _latex_row(cells: Iterable[str]) -> str:
+    return f"    {' '.join(' & '.join(cells).split())} \\\\"
+
+
 def _latex_number(cell: str) -> str:
     """Write a cell of numbers: with a minus, and powers of ten."""
     mantissa, is_power, exponent = cell.partition("e-")
     if is_power:
         return rf"${mantissa} \cdot 10^{{-{int(exponent)}}}$"
-    return " to ".join(
-        f"${latex_text(part)}$" if part.startswith("-") else latex_text(part)
-        for part in cell.split(" to ")
-    )
+    return _NEGATIVE.sub(r"$\g<0>$", latex_text(cell))

@@ -82,3 +82,19 @@ def test_names_break_after_separators_and_before_capitals_and_numbers_keep_their
     assert broken_name("tests.helpers.own:MyManager", 14) == "tests.helpers.\n  own:My\n  Manager"
     assert broken_name("metacontrol (n = 20)", 14) == "metacontrol\n  (n = 20)"
     assert broken_name("first\n_second", 7) == "first\n_second"
+
+
+def test_latex_has_a_minus_before_each_negative_number_and_units_outside_of_formulas():
+    cells = ("-0.82 (-0.90 to -0.70)", "-3.3 points", "", "-1e-05")
+    table = Table(("a", "b", "c", "d", "e"), [("x-1 \N{MINUS SIGN} y", *cells)])
+    row = r"x-1 $-$ y & $-0.82$ ($-0.90$ to $-0.70$) & $-3.3$ points & & $-1 \cdot 10^{-5}$ \\"
+    assert row in table.latex()
+
+
+def test_a_wide_table_is_in_small_print_in_latex_and_a_wider_one_breaks_its_names():
+    def latex(name_length: int) -> str:
+        return Table(("a", "b"), [("n" * name_length, "1234")]).latex()
+
+    assert "footnotesize" not in latex(50)
+    assert r"\footnotesize" in latex(60) and r"\begin{tabular}{lr}" in latex(60)
+    assert r"{>{\raggedright\arraybackslash}p{0.33\linewidth}r}" in latex(80)

@@ -256,8 +256,9 @@ def _begun_in(folder: str) -> Iterator[None]:
         is_missing = error.file is not None and not Path(error.file).exists()
         if not is_missing or folder in ("", str(Path.cwd())):
             raise
-        remedy = f"the campaign was begun in {folder}, where relative paths begin: resume it there"
-        raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+        problem = f"{error.problem}; the campaign was begun in {folder}, where relative paths begin"
+        remedy = "give the command there"
+        raise InputError(problem, file=error.file, place=error.place, remedy=remedy) from None
 
 
 def _with_runs(command: Sequence[str], runs: int) -> tuple[str, ...]:
@@ -458,8 +459,8 @@ def _work(
                     if isinstance(each, Remark):
                         remarks.add(each)
                     else:
-                        finished.append((key, each))
-                        failed += isinstance(each, MissionFailure)
+                        finished += [(key, each), *campaign.copies(key, each)]
+                failed += sum(isinstance(each, MissionFailure) for _, each in finished)
                 store.append(finished)
                 done += len(finished)
                 if on_progress is not None:

@@ -9,14 +9,14 @@ import signal
 import sys
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import chain, product
+from itertools import chain, compress, product
 from types import FrameType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, check_range
 from suave_des.campaign.variation import Variation, cell_of, short_mission
@@ -136,15 +136,56 @@ class Campaign:
         """Yield the missions that have yet to be run, in order.
 
         `settled` returns the runs of a manager at a point that need not be run; it is called when
-        their turn comes.
+        their turn comes. Missions that are the same as at an earlier point are copies of these,
+        unless only the earlier ones are there, as campaigns of earlier versions may have it.
         """
+        runs = range(1, self.spec.runs + 1)
         for point, manager in product(range(self.points), range(len(self.spec.managers))):
             known = settled(point, manager)
-            yield from (
-                MissionKey(point, manager, run)
-                for run in range(1, self.spec.runs + 1)
-                if run not in known
+            first = self._alike[manager][point]
+            wanted = runs if first == point else sorted(settled(first, manager))
+            yield from (MissionKey(point, manager, run) for run in wanted if run not in known)
+
+    @cached_property
+    def _alike(self) -> list[Sequence[int]]:
+        """By manager, for each point, the first one at which its missions are the same; that itself
+        if knowledge states are recorded, which name their point.
+        """
+        sweep = self.variation.sweep
+        found: list[Sequence[int]] = []
+        for manager in self.spec.managers:
+            read = [_reads(manager, self.variation.paths[name]) for name in sweep.parameters]
+            firsts: dict[str, int] = {}
+            if all(read) or self.spec.record_knowledge:
+                found.append(range(sweep.points))
+                continue
+            each = (
+                repr([*compress(values.values(), read)])
+                for values in map(sweep.values, range(sweep.points))
             )
+            found.append([firsts.setdefault(own, point) for point, own in enumerate(each)])
+        return found
+
+    @cached_property
+    def _later(self) -> dict[tuple[int, int], list[int]]:
+        """The later points whose missions are the same, by point and manager."""
+        found: dict[tuple[int, int], list[int]] = defaultdict(list)
+        for manager, firsts in enumerate(self._alike):
+            for point, first in enumerate(firsts):
+                if first != point:
+                    found[first, manager].append(point)
+        return dict(found)
+
+    def copies(self, key: MissionKey, outcome: Row | MissionFailure) -> Iterator[MissionOutcome]:
+        """Yield the outcomes of missions that are the same as one, at later points of the sweep."""
+        for point in self._later.get(key[:2], ()):
+            copied = key._replace(point=point)
+            if isinstance(outcome, MissionFailure):
+                yield copied, outcome._replace(point=point)
+            else:
+                swept = map(cell_of, self.variation.sweep.values(point).values())
+                further = outcome[len(COLUMNS) + len(self.variation.paths) :]
+                yield copied, (*outcome[: len(COLUMNS)], *swept, *further)
 
     def scenarios(self) -> Iterator[LoadedScenario]:
         """Yield scenarios that together have every swept value of what managers and functions are
@@ -183,6 +224,23 @@ class Campaign:
     def too_long(self) -> str:
         """The cause where a mission took too long."""
         return f"not done after {self.spec.time_out_s:g} s (time-out)"
+
+
+_SETTINGS_READ: Final[Mapping[str, tuple[str, ...]]] = {
+    "none": (),
+    "random": ("random",),
+    "metacontrol": ("metacontrol",),
+    "bt": ("bt",),
+    "bt_extended": ("bt",),
+}
+"""Whose settings a manager reads; others than these may read all."""
+
+
+def _reads(manager: str, path: str) -> bool:
+    """Whether a manager's missions depend on the value at a key path of the scenario."""
+    part, _, rest = path.partition(".")
+    section = rest.partition(".")[0]
+    return part != "managers" or section in _SETTINGS_READ.get(manager, (section,))
 
 
 Executor = Callable[[Campaign, Iterable[MissionKey], int], Iterator[list[Finished]]]

@@ -62,6 +62,14 @@ class CampaignResult:
         return self.campaign.spec.out
 
     @property
+    def labels(self) -> dict[str, str]:
+        """What tables and figures show instead of the names of managers, as the campaign file has
+        it.
+        """
+        file = self.campaign.file
+        return {} if file is None else file.settings.labels
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
         return self.campaign.columns
@@ -146,8 +154,10 @@ class CampaignResult:
         """
         spec = self.campaign.spec
         sweep = self.campaign.variation.sweep
-        about = {"scenario": self.campaign.loaded.scenario.name}
+        about: dict[str, Any] = {"scenario": self.campaign.loaded.scenario.name}
         about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
+        if labels := self.labels:
+            about["labels"] = labels
         columns = (*SUMMARY_COLUMNS, *sweep.parameters)
         files: dict[str, FileContent] = {
             store.RUNS_FILE: csv_pieces(self.columns, self.stream()),

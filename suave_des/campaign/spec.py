@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from pydantic import Field, ValidationError
 
 from suave_des.campaign.variation import plain
-from suave_des.errors import InputError, shown
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.imports import look_beside
 from suave_des.registry import is_built_in, manager_class
 from suave_des.scenario.loader import Replacements
@@ -80,6 +80,8 @@ class CampaignSettings(CampaignKeys):
     """Version of the format: 1. It marks a campaign file."""
     scenario: str
     """Scenario to start from: a file named relative to this one, or the name of a shipped one."""
+    labels: dict[str, Annotated[str, Field(min_length=1)]] = Field(default_factory=dict)
+    """Names under which tables and figures show managers, by their own."""
 
 
 class CampaignSpec(CampaignKeys):
@@ -247,6 +249,14 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
     if settings.ensemble is not None:
         ensemble = find_named(settings.ensemble, "scenarios/ensembles", layer, ("ensemble",))
         settings = settings.model_copy(update={"ensemble": str(ensemble)})
+    for name, shown_as in settings.labels.items():
+        others = {settings.labels.get(each, each) for each in settings.managers if each != name}
+        if name not in settings.managers:
+            remedy = did_you_mean(name, settings.managers, "its managers")
+            raise layer.error(f"there is no manager {shown(name)}", ("labels", name), remedy)
+        if shown_as in others:
+            problem = f"several managers would be shown as {shown(shown_as)}"
+            raise layer.error(problem, ("labels", name), "give each its own label")
     scenario = find_named(settings.scenario, "scenarios", layer, ("scenario",))
     file = CampaignFile(settings, scenario, inputs, layer)
     look_beside(file.path)

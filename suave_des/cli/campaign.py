@@ -165,7 +165,8 @@ def _summary(result: CampaignResult) -> Table:
         )
         found = "" if cells["found_share"] is None else percent(cells["found_share"])
         measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
-        rows.append([*swept, cells["manager"], str(cells["n"]), found, *measured])
+        manager = result.labels.get(cells["manager"], cells["manager"])
+        rows.append([*swept, manager, str(cells["n"]), found, *measured])
     title = f"{result.campaign.loaded.scenario.name}, seed {result.campaign.spec.seed}: means ± half their 95% intervals"
     means = [heading for metric in PAPER_METRICS for heading in (METRICS[metric].brief, "std")]
     headings = [*parameters, "manager", "missions", "found", *means]

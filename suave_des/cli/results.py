@@ -135,7 +135,7 @@ def compare(
     Runs that share their random numbers are compared in pairs, which takes fewer missions. A few
     real missions can be assisted by simulated ones.
     """
-    from suave_des.records.missions import read_missions, with_labels
+    from suave_des.records.missions import read_missions
     from suave_des.results.assisted import compare_assisted
     from suave_des.results.compare import compare_groups
     from suave_des.results.groups import grouped
@@ -158,9 +158,9 @@ def compare(
         }
         check_no_use(unused, "with --assisted-by")
     labels = _labels(label)
-    missions = with_labels(read_missions(results), labels)
+    missions = read_missions(results, labels)
     simulated = [
-        with_labels(read_missions([folder]), labels)
+        read_missions([folder], labels)
         for folder in (assisted_by, population)
         if folder is not None
     ]
@@ -488,6 +488,7 @@ def report(
             metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR"
         ),
     ] = None,
+    label: Labels = None,
     show: Open = False,
 ) -> None:
     """Make a page about a campaign: conclusion, tables, charts.
@@ -503,5 +504,5 @@ def report(
         check_output_file(page_file, overwrite=True)
     else:
         check_beside(page_file.parent, [page_file.name])
-    write_page(page_file, report_page(results, paths), show=show)
+    write_page(page_file, report_page(results, paths, _labels(label)), show=show)
     print(f"the report is {page_file}")

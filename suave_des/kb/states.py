@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
+from suave_des.files import check_folder
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
     C_STATUS,
@@ -457,10 +458,7 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedKnowledge]]:
     Raises:
         InputError: there is none, or a file cannot be read.
     """
-    if not folder.is_dir():
-        raise InputError(
-            "no such folder", file=folder, remedy="give the folder that suave-des run --out wrote"
-        )
+    check_folder(folder)
     is_any_found = False
     for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
         if (each / KNOWLEDGE_FILE).is_file():

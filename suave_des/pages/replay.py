@@ -18,6 +18,7 @@ from suave_des.compiling import Array
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.events import ComponentStatus, PipelineDetected
+from suave_des.files import check_folder
 from suave_des.kb.explain import LEFT_OUT, Derivation, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.states import ManagingSettings
@@ -80,11 +81,10 @@ def missions_in(
             _check_number(len(chosen))
             missions += [record_of(*opened.run(manager, run, point)) for manager in chosen]
         else:
+            check_folder(folder)
             problem = f"has neither a mission ({MISSION_FILE}) nor a campaign that can be run again ({STORE_FILE})"
             remedy = "give the folder that run or campaign wrote with --out"
-            raise InputError(
-                problem if folder.is_dir() else "no such folder", file=folder, remedy=remedy
-            )
+            raise InputError(problem, file=folder, remedy=remedy)
     _check_number(len(missions))
     for mission, folder in zip(missions, folders, strict=False):
         if mission.settings.pipeline.vertices_m != missions[0].settings.pipeline.vertices_m:

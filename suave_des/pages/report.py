@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -54,18 +55,23 @@ _CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
 """Metrics in charts."""
 
 
-def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
+def report_page(
+    folders: Sequence[Path],
+    runs: int = PATHS,
+    labels: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Make the report of campaigns, or of other results that `compare` reads.
 
     Args:
         folders: of campaigns, or with the exemplar's own CSV files; or single files.
         runs: how many runs of each manager to run again for their ways and timelines; 0: none.
+        labels: as of read_missions.
 
     Raises:
         InputError: results cannot be read or compared, or an extra is not installed.
     """
     library = plotly_script()
-    missions = read_missions(folders)
+    missions = read_missions(folders, labels)
     scenarios = [name for name in dict.fromkeys(missions.frame["scenario"]) if name]
     title = ", ".join([*scenarios, *dict.fromkeys(missions.frame["manager"])])
     content = {
@@ -74,7 +80,7 @@ def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
         "folders": [str(folder) for folder in folders],
         "made": [_made(folder) for folder in folders],
         "results": _results(missions),
-        "ways": _ways(folders, missions.frame, runs),
+        "ways": _ways(folders, missions, runs),
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
     size = len(text.encode(errors="backslashreplace"))  # as it is written
@@ -126,12 +132,11 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
     """Put missions into columns for the page's charts, at most MOST_DRAWN of them.
 
     Returns:
-        groups: their names, as the tables have them, and the numbers of their looks, as in figures;
-            titles of the
-        metrics by column; columns: group number, run, seed, and each metric and swept parameter,
-        None where there is no value; swept: names of parameters; every: 1, or n if only each nth
-        run is there; missions: how many there are;
-        is_paired: whether runs of the same seed and number share their random numbers.
+        groups: their names, as the tables have them, their managers' own names, and the numbers of
+            their looks, as in figures; titles of the metrics by column; columns: group number, run,
+            seed, and each metric and swept parameter, None where there is no value; swept: names of
+            parameters; every: 1, or n if only each nth run is there; missions: how many there are;
+            is_paired: whether runs of the same seed and number share their random numbers.
     """
     groups = grouped(missions).groups
     frame = at_horizons(missions.frame, missions.swept)
@@ -154,6 +159,7 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
     names = [each.name for each in groups]
     return {
         "groups": names,
+        "managers": list(map(missions.named, names)),
         "looks": looks(names),
         "titles": titles,
         "columns": columns,
@@ -185,17 +191,28 @@ def _made(folder: Path) -> dict[str, Any]:
         "folder": str(folder),
         "command": shlex.join(about.command),
         "manifest": {
-            key: value if isinstance(value, dict) else json.dumps(value).strip('"')
+            key: {name: _text(part) for name, part in value.items()}
+            if isinstance(value, dict)
+            else _text(value)
             for key, value in (read_json(path) if path.exists() else {}).items()
             if key != "command"
         },
     }
 
 
+def _text(value: Any) -> str:
+    """Write a value of a manifest for readers: lists and mappings without their brackets."""
+    if isinstance(value, dict):
+        return "; ".join(f"{name}: {_text(part)}" for name, part in value.items()) or "none"
+    if isinstance(value, list):
+        return ", ".join(map(_text, value)) or "none"
+    return value if isinstance(value, str) else json.dumps(value)
+
+
 # Ways
 
 
-def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[str, Any]:
+def _ways(folders: Sequence[Path], missions: Missions, runs: int) -> dict[str, Any]:
     """Run some missions of a campaign again, to have their ways: the first runs, and the quickest,
     median and slowest.
 
@@ -203,6 +220,7 @@ def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[s
     bed, its visibility as measured; its modes are those of the function that moves the vehicle,
     with the times at which they changed.
     """
+    frame = missions.frame
     ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": ""}
     if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():
         return ways | {
@@ -217,7 +235,7 @@ def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[s
         opened = opened_campaign(folders[0])
         vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
         paths = list(
-            _paths(opened, frame, managers, max(1, min(runs, _MOST_WAYS // len(managers))))
+            _paths(opened, missions, managers, max(1, min(runs, _MOST_WAYS // len(managers))))
         )
     except SuaveDesError as error:
         return ways | {
@@ -231,14 +249,15 @@ def _ways(folders: Sequence[Path], frame: pandas.DataFrame, runs: int) -> dict[s
 
 
 def _paths(
-    opened: MissionRunner, frame: pandas.DataFrame, groups: Sequence[str], runs: int
+    opened: MissionRunner, missions: Missions, groups: Sequence[str], runs: int
 ) -> Iterator[dict[str, Any]]:
+    frame = missions.frame
     known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
     is_swept = opened.campaign.variation.sweep.points > 1
     for number, manager in enumerate(groups):
         for run in _representative_runs(frame, groups, runs):
             if (manager, run) in known.index:
-                result, loaded = opened.run(manager, run)
+                result, loaded = opened.run(missions.named(manager), run)
                 off_s = result.metrics.search_time_s - float(known[manager, run])
                 if is_swept or abs(off_s) < _TOLERANCE_S:
                     changes = adaptations(record_of(result, loaded))

@@ -205,6 +205,7 @@ class Manifest(Recorded):
     perturbations: dict[str, object] = {}
     runs_per_draw: Annotated[int, Field(ge=1, le=GREATEST)] = 1
     campaign_sha256: str | None = None
+    labels: dict[str, str] = {}
     command: list[FileName] = []
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final
 
 import pandas
 
@@ -30,6 +32,7 @@ Source = pandas.DataFrame | str | Path | Sequence[str | Path]
 """Missions: a data frame with the columns of runs.csv, or folders and files."""
 SHARING = "runs_sharing_draw"
 """Column of missions, and attribute of a frame: how many runs in a row share their draws."""
+_NO_LABELS: Final[Mapping[str, str]] = MappingProxyType({})
 PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
 
 
@@ -42,12 +45,18 @@ class Missions:
             varies; with `runs_sharing_draw` where that is known.
         notes: what readers of the comparison should know about the files.
         folders: of the campaigns that can be run again, by source.
+        labels: of managers that are shown under another name than their own, by that.
     """
 
     frame: pandas.DataFrame
     swept: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     folders: Mapping[str, Path] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+    def named(self, shown_as: str) -> str:
+        """Return the manager that is shown under a name."""
+        return next((name for name, label in self.labels.items() if label == shown_as), shown_as)
 
 
 def missions_in(source: Source) -> Missions:
@@ -61,26 +70,28 @@ def missions_in(source: Source) -> Missions:
     )
 
 
-def read_missions(paths: Sequence[Path]) -> Missions:
+def read_missions(paths: Sequence[Path], labels: Mapping[str, str] = _NO_LABELS) -> Missions:
     """Read the missions in folders of `suave-des campaign` or `reproduce`, or of the exemplar, or
     in single CSV files.
 
+    Args:
+        paths: folders and files.
+        labels: what to show instead of the name of a manager, besides what campaign files say.
+
     Raises:
         InputError: one of them has no missions, is given twice, or has missions of several
-            scenarios.
+            scenarios; or there is no manager of a label, or two would be shown alike.
     """
     if not paths:
         raise InputError(
             "no results are given",
             remedy="give the --out folders of suave-des campaign, or CSV files",
         )
-    seen = set[Path]()
-    for path in paths:
-        if real(path) in seen:
-            raise InputError("is given twice", file=path, remedy="name each folder of results once")
-        seen.add(real(path))
+    _check_each_once(paths)
     named = dict(zip(_short_names(paths), paths, strict=True))
-    sources = {name: _read_source(path) for name, path in named.items()}
+    read = {name: _read_source(path) for name, path in named.items()}
+    _check_labels(labels, [each.frame for each in read.values()])
+    sources = {name: _labelled(each, labels) for name, each in read.items()}
     frames = [each.frame.assign(source=name) for name, each in sources.items()]
     folders = {name: path for name, path in named.items() if (path / STORE_FILE).is_file()}
     for folder in folders.values():
@@ -90,29 +101,36 @@ def read_missions(paths: Sequence[Path]) -> Missions:
         tuple(dict.fromkeys(chain.from_iterable(each.swept for each in sources.values()))),
         _notes(sources.values()),
         folders,
+        dict(chain.from_iterable(each.labels.items() for each in sources.values())),
     )
 
 
-def with_labels(missions: Missions, labels: Mapping[str, str]) -> Missions:
-    """Name managers as readers are to see them.
+def _check_each_once(paths: Iterable[Path]) -> None:
+    seen = set[Path]()
+    for path in paths:
+        if real(path) in seen:
+            raise InputError("is given twice", file=path, remedy="name each folder of results once")
+        seen.add(real(path))
 
-    Args:
-        labels: what to show instead of the name of a manager.
 
-    Raises:
-        InputError: there is no such manager, or two would be shown alike.
-    """
-    known = list(dict.fromkeys(missions.frame["manager"]))
+def _check_labels(labels: Iterable[str], frames: Iterable[pandas.DataFrame]) -> None:
+    managers = dict.fromkeys(chain.from_iterable(frame["manager"] for frame in frames))
     for name in labels:
-        if name not in known:
-            raise unknown(f"there is no mission of {shown(name)}", name, known, "there are")
+        if name not in managers:
+            raise unknown(f"there is no mission of {shown(name)}", name, managers, "there are")
+
+
+def _labelled(missions: Missions, further: Mapping[str, str]) -> Missions:
+    """Show managers of one source under the names that its manifest and others say."""
+    known = list(dict.fromkeys(missions.frame["manager"]))
+    labels = {**missions.labels, **further}
     names = [labels.get(name, name) for name in known]
     for label in names:
         if names.count(label) > 1:
             problem = f"several managers would be shown as {shown(label)}"
             raise InputError(problem, place="labels", remedy="give each its own label")
     managers = missions.frame["manager"].map(dict(zip(known, names, strict=True)))
-    return replace(missions, frame=missions.frame.assign(manager=managers))
+    return replace(missions, frame=missions.frame.assign(manager=managers), labels=labels)
 
 
 def _read_source(path: Path) -> Missions:
@@ -138,7 +156,7 @@ def _read_file(file: Path, *, is_of_folder: bool = False) -> Missions:
         notes += tuple(_unfinished(folder, manifest.missions))
     elif is_ours:
         frame = frame.assign(**{SHARING: _sharing_seen(frame, read.swept)})
-    return Missions(frame, read.swept, notes)
+    return Missions(frame, read.swept, notes, labels=manifest.labels)
 
 
 def _read_exemplars(folder: Path) -> Missions:

@@ -178,7 +178,8 @@ def compare_groups(
     """
     statistics.library()
     widths = _half_widths(half_widths, groups.metrics)
-    pairs = _pairs(groups.groups, against)
+    labels = groups.missions.labels
+    pairs = _pairs(groups.groups, labels.get(against or "", against))
     values = {metric.name: _values(groups.groups, metric.name) for metric in groups.metrics}
     asked = [(metric, *pair) for metric in groups.metrics for pair in pairs]
     found = []
@@ -190,7 +191,7 @@ def compare_groups(
     _correct(found, "mean_p")
     first_metric = groups.metrics[0]
     together = () if unpaired else pairs
-    largest = _largest(together, first_metric, values[first_metric.name], groups.missions.folders)
+    largest = _largest(together, first_metric, values[first_metric.name], groups.missions)
     summaries = [_summary(group, metric) for metric in groups.metrics for group in groups.groups]
     return concluded(groups, summaries, found, *largest)
 
@@ -446,7 +447,7 @@ def _largest(
     pairs: Sequence[tuple[Group, Group]],
     metric: Metric,
     values: _Values,
-    folders: Mapping[str, Path],
+    missions: Missions,
 ) -> tuple[Table, str]:
     """Return the least and the greatest difference of each pair, and the command that replays the
     largest of all.
@@ -464,7 +465,7 @@ def _largest(
         cells = [text for value, run in ends for text in (metric.difference(value), str(run))]
         rows.append((f"{first.name} - {second.name}", *cells))
         size, run = max((abs(value), run) for value, run in ends)
-        command = _replay_command(first, second, run, folders)
+        command = _replay_command(first, second, run, missions)
         if command:
             replays.append((size, command))
     headings = ("difference", "least", "run", "greatest", "run")
@@ -472,14 +473,14 @@ def _largest(
     return Table(headings, rows, title), max(replays)[1]
 
 
-def _replay_command(first: Group, second: Group, run: int, folders: Mapping[str, Path]) -> str:
+def _replay_command(first: Group, second: Group, run: int, missions: Missions) -> str:
     """Return the command that replays a run of two groups; empty if none does."""
     both = [each.frame.iloc[0] for each in (first, second)]
-    managers = list(dict.fromkeys(str(each["manager"]) for each in both))
+    managers = list(dict.fromkeys(missions.named(str(each["manager"])) for each in both))
     sources = list(dict.fromkeys(str(each["source"]) for each in both))
     is_one_pair = len(managers) == 1 or len(sources) == 1
-    if first.point or not is_one_pair or not folders.keys() >= set(sources):
+    if first.point or not is_one_pair or not missions.folders.keys() >= set(sources):
         return ""
-    places = [str(folders[source]) for source in sources]
+    places = [str(missions.folders[source]) for source in sources]
     chosen = ["--run", str(run), "--managers", ",".join(managers)]
     return shlex.join(["suave-des", "replay", *places, *chosen])

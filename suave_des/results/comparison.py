@@ -18,7 +18,7 @@ from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.results.conclusions import conclusion, overall_conclusion
 from suave_des.results.groups import Groups, listed
 from suave_des.results.statistics import A12, RANK_BISERIAL
-from suave_des.tables import EFFECT, Section, Table, Written, capital
+from suave_des.tables import EFFECT, LATEX_NEEDS, Section, Table, Written, capital
 
 Row = Mapping[str, Any]
 """A row of a frame by column, None where there is nothing."""
@@ -180,43 +180,78 @@ class Comparison(Written):
         and differences.
         """
         notes = [f"% Note: {note}." for note in self.notes]
-        lines = [r"% needs \usepackage{booktabs}", *notes, self._latex_of_means()]
-        if self.of_pairs:
-            lines.append(self._latex_of_differences())
+        lines = [LATEX_NEEDS, *notes, self._latex_of_means(), *self._latex_of_differences()]
         return "\n".join(lines) + "\n"
+
+    @cached_property
+    def _has_headings(self) -> bool:
+        """Whether tables have a heading for each point of a sweep, at which managers are
+        compared.
+        """
+        return any(each["point"] for each in self.of_pairs)
+
+    def _by_point(self, rows: Sequence[Row], metric: Metric) -> list[Row]:
+        """Return the rows of a metric, those of a point of a sweep together."""
+        points = dict.fromkeys(each["point"] for each in (*self.of_groups, *self.of_pairs))
+        own = _of_metric(rows, metric)
+        return [each for point in points for each in own if each["point"] == point]
 
     def _latex_of_means(self) -> str:
         metrics = [each for each in self.metrics if each.name in PAPER_METRICS] or self.metrics
-        by_group: dict[str, list[str]] = {}
+        rows: dict[str, list[str]] = {}
         for metric in metrics:
-            for each in _of_metric(self.of_groups, metric):
+            for each in self._by_point(self.of_groups, metric):
+                name = each["group"]
+                if self._has_headings:
+                    rows.setdefault(each["point"], [each["point"].removeprefix(", ")])
+                    name = name.removesuffix(each["point"])
                 cells = metric.number(each["mean"].value), metric.number(each["std"])
-                by_group.setdefault(each["group"], [each["group"]]).extend(cells)
-        shown = [row for row in by_group.values() if any(row[1:])]
+                rows.setdefault(each["group"], [name]).extend(cells)
+        shown = [row for row in rows.values() if len(row) == 1 or any(row[1:])]
         headings = ("Manager", *("Mean", "Std") * len(metrics))
         table = Table(headings, shown, "Means and standard deviations.")
         over = [capital(metric.heading) for metric in metrics]
         return table.latex(over, label="tab:means", note=self._sizes())
 
-    def _latex_of_differences(self) -> str:
+    def _latex_of_differences(self) -> Iterator[str]:
+        """Yield one table of all metrics; where it has points of a sweep, one of each metric, as a
+        page holds no more.
+        """
+        note = " ".join(self._methods())
+        found = [(metric, rows) for metric in self.metrics if (rows := self._latex_rows(metric))]
+        if self._has_headings:
+            for metric, rows in found:
+                title = f"Differences between managers: {metric.heading}."
+                label = f"tab:differences-{metric.name.replace('_', '-')}"
+                yield _latex_differences(rows, title, label, note)
+        elif self.of_pairs:
+            together = [row for metric, own in found for row in ((capital(metric.heading),), *own)]
+            title = "Differences between managers."
+            yield _latex_differences(together, title, "tab:differences", note)
+
+    def _latex_rows(self, metric: Metric) -> list[tuple[str, ...]]:
+        """Return the rows of differences in a metric, with each point of a sweep above its own."""
         rows: list[tuple[str, ...]] = []
-        tested = [each for each in self.of_pairs if each["test"]]
-        for metric in self.metrics:
-            own = _of_metric(tested, metric)
-            if own:
-                rows.append((capital(metric.heading),))
-            for each in own:
-                name, _, mean, interval, _, p, effect = _difference_row(each, metric)
-                rows.append((name, mean, interval, effect, p))
-        headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
-        table = Table(headings, rows, "Differences between managers.")
-        text = table.latex(label="tab:differences", note=" ".join(self._methods()))
-        return text.replace("p (Holm)", "$p$ (Holm)")
+        before = ""
+        for each in self._by_point([each for each in self.of_pairs if each["test"]], metric):
+            point = each["point"]
+            if point != before:
+                before = point
+                rows.append((point.removeprefix(", "),))
+            names = (each[side].removesuffix(point) for side in ("group", "other"))
+            _, _, mean, interval, _, p, effect = _difference_row(each, metric)
+            rows.append((" \N{MINUS SIGN} ".join(names), mean, interval, effect, p))
+        return rows
 
     def _sizes(self) -> str:
         sizes = self.summaries.drop_duplicates("group").set_index("group")["n"]
-        if sizes.nunique() == 1:
-            return f"{number_of(int(sizes.iloc[0]), self.counted)} for each manager."
+        low = int(sizes.min())
+        high = int(sizes.max())
+        where = " at each point" if self._has_headings else ""
+        if low == high:
+            return f"{number_of(low, self.counted)} for each manager{where}."
+        if where:
+            return f"{low} to {number_of(high, self.counted)} for each manager{where}."
         return "; ".join(f"{name}: {number_of(n, self.counted)}" for name, n in sizes.items()) + "."
 
     def _content(self) -> dict[str, Any]:
@@ -224,6 +259,12 @@ class Comparison(Written):
             **super()._content(),
             "largest_differences": {"rows": self.largest.rows, "replay": self.replay},
         }
+
+
+def _latex_differences(rows: Sequence[tuple[str, ...]], title: str, label: str, note: str) -> str:
+    headings = ("Difference", "Mean", "95% interval", "Effect", "p (Holm)")
+    text = Table(headings, rows, title).latex(label=label, note=note)
+    return text.replace("p (Holm)", "$p$ (Holm)")
 
 
 def _of_metric(rows: Sequence[Row], metric: Metric) -> list[Row]:
@@ -354,11 +395,24 @@ def concluded(
         row["conclusion"] = conclusion(row, by_name[row["metric"]])
     sentences = " ".join(_conclusions(groups, summaries, differences))
     notes = (*groups.missions.notes, *groups.notes, *_worse_paired(differences))
-    of_groups = [dict.fromkeys(_SUMMARY) | {"mean": Estimate()} | dict(row) for row in summaries]
-    of_pairs = [dict.fromkeys(_DIFFERENCE) | row for row in differences]
+    points = {group.name: group.point for group in groups.groups}
+    of_groups = [
+        dict.fromkeys(_SUMMARY) | {"mean": Estimate(), "point": points[row["group"]]} | dict(row)
+        for row in summaries
+    ]
+    of_pairs = [
+        dict.fromkeys(_DIFFERENCE) | {"point": _common_point(points, row)} | row
+        for row in differences
+    ]
     return Comparison(
         sentences, notes, of_groups, of_pairs, groups.metrics, groups.counted, largest, replay
     )
+
+
+def _common_point(points: Mapping[str, str], row: Row) -> str:
+    """Return the point of a sweep at which both groups of a pair are; empty if there is none."""
+    point = points[row["group"]]
+    return point if point == points[row["other"]] else ""
 
 
 def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:

@@ -8,6 +8,7 @@ import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
+from operator import attrgetter
 from pathlib import Path
 from textwrap import fill
 from types import MappingProxyType
@@ -32,7 +33,7 @@ from suave_des.estimates import Estimate, mean_of
 from suave_des.files import write_file
 from suave_des.records.metrics import METRICS, PAPER_METRICS, Metric
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
-from suave_des.records.missions import Missions, read_missions, with_labels
+from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
 from suave_des.results.groups import (
     Group,
@@ -270,6 +271,8 @@ def _legend_columns(labels: Sequence[str]) -> int:
 _MOST_PARAMETERS = 3
 _MOST_CELLS = 10
 """Values of a parameter in a heat map."""
+_MOST_WITH_DECIMALS = 6
+"""Columns of a heat map; in more there is room for whole numbers only."""
 _MOST_VALUES = 16
 """A parameter with more values is a sampled one: its missions are drawn in so many bins of equal
 numbers at most.
@@ -340,7 +343,8 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
 
 
 def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.Picture:
-    """Draw means over two swept parameters as numbers in a grid, a row of panels for each manager.
+    """Draw means over two swept parameters as numbers in a grid, with half their 95% intervals, a
+    row of panels for each manager.
 
     Args:
         missions: of a sweep; other swept parameters are averaged over.
@@ -369,16 +373,18 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         problem = f"{len(columns)} by {len(rows)} means are too many for numbers"
         remedy = f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
         raise InputError(problem, place="parameters", remedy=remedy)
-    height = len(managers) * (0.24 * len(rows) + 0.3) + 0.9
+    height = len(managers) * (0.34 * len(rows) + 0.3) + 0.9
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
     keys = pandas.MultiIndex.from_tuples(cells, names=["curve", up, across])
     for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
-        means = pandas.Series([_mean(runs[metric]).value for runs in cells.values()], keys)
-        ends = means.min(), means.max()
+        means = pandas.Series([_mean(runs[metric]) for runs in cells.values()], keys)
+        values = [mean.value for mean in means]
+        ends = np.nanmin(values), np.nanmax(values)
         for axes, manager in zip(of_metric, managers, strict=True):
-            grid = means[manager].unstack(across).reindex(index=rows, columns=columns)
-            image = _draw_grid(axes, grid.to_numpy(float), METRICS[metric], ends)
+            grid = means[manager].unstack(across, fill_value=Estimate())
+            grid = grid.reindex(index=rows, columns=columns, fill_value=Estimate())
+            image = _draw_grid(axes, grid.to_numpy(), METRICS[metric], ends)
             axes.set_title(style.text(folded(manager)))
         figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
         lowest = of_metric[-1]
@@ -387,7 +393,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         lowest.set_yticks(range(len(rows)), _ticks(rows))
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
     counts = [len(runs) for runs in cells.values()]
-    _write_below(figure, _averaged(frame, counts, others))
+    _write_below(figure, f"{_averaged(frame, counts, others)}; ± half their 95% intervals")
     return figure
 
 
@@ -398,15 +404,23 @@ def _in_order(parameter: pandas.Series) -> list[Any]:
 
 
 def _draw_grid(
-    axes: Axes, grid: NDArray[np.float64], metric: Metric, ends: tuple[float, float]
+    axes: Axes, grid: NDArray[np.object_], metric: Metric, ends: tuple[float, float]
 ) -> AxesImage:
     """Draw means as numbers on their colours, which reach from one end to the other."""
     low, high = ends
-    image = axes.imshow(grid, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
-    for (row, column), value in np.ndenumerate(grid):
-        ink = "white" if value < (low + high) / 2.0 else style.BLACK
-        number = metric.number(value) if np.isfinite(value) else ""
-        axes.text(column, row, number, color=ink, ha="center", va="center", fontsize=6.5)
+    text = metric.number if grid.shape[1] <= _MOST_WITH_DECIMALS else "{:.0f}".format
+    values = np.vectorize(attrgetter("value"), otypes=[float])(grid)
+    image = axes.imshow(values, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
+    for (row, column), mean in np.ndenumerate(grid):
+        ink = "white" if mean.value < (low + high) / 2.0 else style.BLACK
+        look: dict[str, Any] = {"color": ink, "ha": "center"}
+        number = text(mean.value) if np.isfinite(mean.value) else ""
+        if mean.has_interval:
+            half = f"±{text((mean.high - mean.low) / 2.0)}"
+            axes.text(column, row + 0.02, number, va="bottom", fontsize=6.5, **look)
+            axes.text(column, row - 0.04, half, va="top", fontsize=5.5, **look)
+        else:
+            axes.text(column, row, number, va="center", fontsize=6.5, **look)
     axes.grid(visible=False)
     return image
 
@@ -595,8 +609,7 @@ def draw_results(
     """
     check_picture(out)
     if not (folders[0] / TRAJECTORY_FILE).is_file():
-        missions = with_labels(read_missions(folders), labels)
-        figure = draw_missions(missions, kind, parameters)
+        figure = draw_missions(read_missions(folders, labels), kind, parameters)
     elif len(folders) > 1:
         raise InputError(
             "has a mission, of which one is drawn at a time",

@@ -137,6 +137,7 @@ def grouped(
             time limit, or are of other conditions.
     """
     check_swept(missions, by, "by")
+    managers = [missions.labels.get(name, name) for name in managers]
     frame = _of_managers(missions, managers, simulated)
     if simulated:
         return _assisted(missions, frame, managers, metrics, simulated)

@@ -152,13 +152,17 @@ _OTHER_MODES = {
 _OFF = (domain.UNGROUND_MODE, "inactive")
 
 
+_LEFT_OUT = ("signals", "calibration", "revision", "managers", "functions")
+
+
 def key_words(key: str) -> str:
     """Return what a key of a scenario is called in a figure, with its unit.
 
     Example:
         key_words("signals.water_visibility.period_s")  # "water visibility: period (s)"
     """
-    parts = [part for part in key.split(".") if part not in ("signals", "calibration", "revision")]
+    key = key.rpartition(":")[2]  # of module:Class only the class
+    parts = [part for part in key.split(".") if part not in _LEFT_OUT]
     unit = next((ending for ending in _UNITS if parts and parts[-1].endswith(ending)), "")
     if unit:
         parts[-1] = parts[-1].removesuffix(unit)

@@ -81,4 +81,5 @@ def test_a_campaign_that_cannot_be_resumed_here_says_where_it_was_begun(experime
     elsewhere = experiment.parent / "elsewhere"
     done = command_here("campaign", "--resume", "../experiment/out", cwd=elsewhere)
     assert done.returncode == 2
-    assert f"campaign.yaml: no such file (the campaign was begun in {experiment}" in done.stderr
+    begun = f"campaign.yaml: no such file; the campaign was begun in {experiment}, where"
+    assert begun in done.stderr

@@ -1,6 +1,9 @@
 """Campaign files: sweeps, perturbations, and what is refused."""
 
 import itertools
+import sqlite3
+from collections import Counter
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.missions import Campaign
 from suave_des.campaign.variation import Sweep, vary
 from suave_des.errors import InputError
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, read_missions
+from suave_des.records.store import STORE_FILE, MissionKey
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import AWKWARD, rows_of
@@ -262,3 +267,54 @@ def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_byt
         run_campaign("seams2023", managers, 3, 3, sweep=sweep, record_knowledge=True).rows
         == plain.rows
     )
+
+
+SETTINGS = {
+    "managers.metacontrol.reasoning_period_s": [1.0, 4.0],
+    "managers.random.adaptation_period_s": [10.0, 20.0],
+    "managers.bt.tick_period_s": [0.1, 2.0],
+}
+READ_BY = {"none": 0, "random": 1, "metacontrol": 1, "bt": 1, "bt_extended": 1, "threshold": 3}
+"""How many of these settings each manager may read."""
+
+
+@pytest.mark.parametrize("path", SETTINGS)
+def test_missions_that_a_swept_setting_cannot_touch_are_the_same_under_it(path):
+    loaded = load_scenario("seams2023")
+    campaign = run_campaign("seams2023", list(READ_BY), 1, sweep={path: SETTINGS[path]}).campaign
+    simulators = [Simulator(with_values(loaded, {path: value})) for value in SETTINGS[path]]
+    left_out = {key.manager for key in planned(campaign) if key.point == 1} ^ set(range(6))
+    assert len(left_out) in (3, 4)
+    for number in left_out:
+        manager = campaign.spec.managers[number]
+        first, second = (simulator.run(manager, 1, 1).metrics for simulator in simulators)
+        assert first == second
+
+
+def planned(campaign: Campaign) -> list[MissionKey]:
+    return list(campaign.missions(lambda point, manager: ()))
+
+
+def test_they_are_run_once_and_have_a_row_at_each_point():
+    sweep = {"visibility.period_s": [40.0, 80.0], **SETTINGS}
+    found = run_campaign("seams2023", list(READ_BY), 2, sweep=sweep)
+    runs_of = Counter(found.campaign.spec.managers[key.manager] for key in planned(found.campaign))
+    assert runs_of == {name: 2 * 2 * 2**read for name, read in READ_BY.items()}
+    assert len(found.rows) == found.campaign.planned == 6 * 2 * 16
+    loaded = load_scenario("seams2023")
+    values = dict(zip(sweep, (80.0, 4.0, 10.0, 2.0), strict=True))
+    number = 2 * 6 * (8 + 4 + 1)
+    row = dict(zip(found.columns, found.rows[number + 3], strict=True))
+    paths = {"signals.water_visibility.period_s": 80.0, **{k: values[k] for k in SETTINGS}}
+    metrics = Simulator(with_values(loaded, paths)).run("random", 2, 1).metrics
+    assert {name: row[name] for name in sweep} == values
+    assert (row["manager"], row["run"]) == ("random", 2)
+    assert row["search_time_s"] == metrics.search_time_s
+
+
+def test_of_a_campaign_that_has_only_the_first_of_them_the_others_are_run(tmp_path):
+    sweep = {"managers.metacontrol.reasoning_period_s": [1.0, 4.0]}
+    whole = run_campaign("seams2023", ["none"], 2, sweep=sweep, out=tmp_path / "out")
+    with closing(sqlite3.connect(tmp_path / "out" / STORE_FILE)) as store, store:
+        store.execute("DELETE FROM outcomes WHERE point = 1 AND run = 2")
+    assert resume_campaign(tmp_path / "out").rows == whole.rows

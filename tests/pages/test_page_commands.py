@@ -97,6 +97,15 @@ def test_replay_says_what_is_wrong(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("asked", [("replay", "a"), ("kb", "infer", "--at", "a@3")], ids=" ".join)
+def test_a_folder_that_is_a_link_in_a_circle_is_told_as_one(asked, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    status, _, error = command(*asked)
+    assert status == 2 and "a: is a link in a circle" in error
+
+
 @pytest.mark.parametrize(
     ("content", "told"),
     [

@@ -192,6 +192,8 @@ IN_SIGHT = """(inner, phase) => {
         ("both", DESKTOP, False),
         ("both", (1920, 1080), False),
         ("both", (1920, 1080), True),
+        ("both", (1280, 800), True),
+        ("both", (1366, 768), True),
     ],
 )
 def test_analyze_and_plan_are_in_sight_on_a_projector(name, size, is_enlarged, browser, request):

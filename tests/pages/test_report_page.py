@@ -1,5 +1,8 @@
 """The report, opened in a browser as a reader would."""
 
+import json
+import shutil
+
 import pandas
 import pytest
 
@@ -127,6 +130,17 @@ def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign)
         "document.getElementById('run-time').data.find(each => each.name === 'adaptation').x"
     )
     assert len(drawn) == row.adaptations > 0
+
+
+def test_what_a_manifest_says_is_written_as_text(campaign, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(campaign, folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest |= {"sweep": {"grid": {"start.x_m": [1, 2.5]}}, "points": 2}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    page = report_page([folder], runs=0)
+    for written in ('"managers":"none, bt"', '"failures":"none"', '"grid":"start.x_m: 1, 2.5"'):
+        assert written in page
 
 
 def test_names_are_text_never_markup(campaign, tmp_path, browser):

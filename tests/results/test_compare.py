@@ -7,6 +7,7 @@ import shutil
 import sqlite3
 import time
 from contextlib import closing
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -522,3 +523,35 @@ def test_a_manager_that_reacts_at_once_has_a_reaction_time_of_zero(tmp_path):
     for comparison in (compare_folders([tmp_path / "out"]), compare_frame(frame)):
         found = summary(comparison, "oracle", "mean_reaction_time_s")
         assert (found.n, found.mean) == (3, 0.0)
+
+
+def by_two_parameters() -> Comparison:
+    """Three managers at two by two points of a sweep: each a constant slower than the one before."""
+    names = ["none", "metacontrol", "tests.managers:Reactive"]
+    columns = ["manager", "run", "visibility.minimum", "managers.metacontrol.reasoning_period_s"]
+    frame = pandas.DataFrame(product(names, range(1, 26), [1.0, 2.0], [0.5, 5.0]), columns=columns)
+    slower_s = frame["manager"].map(names.index) * (10.0 + frame["run"] % 3)
+    frame = frame.assign(
+        scenario="s",
+        seed=1,
+        search_time_s=100.0 + frame["run"] + slower_s,
+        distance_inspected_m=50.0 - slower_s,
+        pipeline_found=True,
+    )
+    return compare_frame(frame, by=columns[2:], metrics=["search_time_s", "distance_inspected_m"])
+
+
+def test_latex_of_a_sweep_has_the_points_as_headings_and_fits_a_page():
+    tables = by_two_parameters().latex().split("\\begin{table}")[1:]
+    point = "minimum 1, reasoning\\_period\\_s 0.5"
+    labels = ["means", "differences-search-time-s", "differences-distance-inspected-m"]
+    for table, label in zip(tables, labels, strict=True):
+        assert f"\\label{{tab:{label}}}" in table
+        assert table.count(f"\\multicolumn{{5}}{{l}}{{{point}}} \\\\") == 1
+        assert table.count("\\multicolumn{5}{l}{minimum") == 4
+        shown = [line.strip() for line in table.splitlines() if line.endswith("\\\\")]
+        assert max(map(len, shown)) < 110
+        assert not any("  " in line or " - " in line for line in shown)
+    # By hand: 10 s and the rest of a run's number by 3, of 25 runs; ± 2.064 times 0.8165 / 5.
+    assert "none $-$ metacontrol & $-11.00$ & $-11.3$ to $-10.7$ & $-1.00$ &" in tables[1]
+    assert "\\par\\smallskip\\footnotesize 25 missions for each manager at each point." in tables[0]

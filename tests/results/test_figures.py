@@ -67,6 +67,18 @@ def test_the_map_shows_every_mode_and_what_happened(mission):
     assert style.VERMILION not in style.OTHER_MODES  # the colour of failures
 
 
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("signals.water_visibility.period_s", "water visibility: period (s)"),
+        ("managers.metacontrol.reasoning_period_s", "metacontrol: reasoning period (s)"),
+        ("managers.lab.mine:Mine.gain_s", "Mine: gain (s)"),
+    ],
+)
+def test_axes_name_what_is_swept_without_modules(key, words):
+    assert style.key_words(key).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
 def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign):
     figure = draw_distributions(grouped(read_missions([campaign])))
     for axes in figure.axes:
@@ -312,8 +324,10 @@ class TestDifferences:
 def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs_as_a_sweep_does():
     frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
     figure = draw_heat_map(missions_of(frame), ["depth", "start.y_m"])
-    assert [text.get_text() for text in figure.axes[0].texts] == ["115.00"] * 4
-    assert "means of n = 2 runs, each averaged over start: x (m)" in texts_of(figure)
+    # half the interval of 110 and 120: 12.7062 (Student's t) times 7.0711 / sqrt(2)
+    assert [text.get_text() for text in figure.axes[0].texts] == ["115.00", "±63.53"] * 4
+    words = "means of n = 2 runs, each averaged over start: x (m); ± half their 95% intervals"
+    assert words in texts_of(figure)
     with pytest.raises(InputError, match="of two swept parameters, and there are 3"):
         draw_heat_map(missions_of(frame))
     text = "means of n = 2 runs, each averaged over the parameters of the other panels"

@@ -1,9 +1,13 @@
 """Names of managers as a paper's readers are to see them."""
 
+import json
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from suave_des.pages.report import report_page
 from tests.helpers.command import command_here
 
 PUBLISHED = Path(__file__).parents[2] / "scenarios" / "published" / "seams2023_runs.csv"
@@ -39,3 +43,74 @@ def test_figures_take_them_too(tmp_path):
 def test_a_label_that_cannot_be_used_is_bad_input(tmp_path, label, problem):
     done = command_here("compare", str(PUBLISHED), "--label", label, cwd=tmp_path)
     assert done.returncode == 2 and problem in done.stderr
+
+
+CAMPAIGN = """
+campaign: 1
+scenario: seams2023
+managers: [none, bt]
+labels: {none: No adaptation}
+runs: 3
+"""
+
+
+@pytest.fixture
+def labelled(tmp_path: Path) -> Path:
+    """A folder with the campaign of a file that has a label, in `out`."""
+    (tmp_path / "c.yaml").write_text(CAMPAIGN)
+    done = command_here("campaign", "c.yaml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0 and "No adaptation " in done.stdout
+    return tmp_path
+
+
+def content_of(page: str) -> dict[str, Any]:
+    return json.loads(re.search(r'application/json"[^>]*>(.*?)</script>', page, re.DOTALL).group(1))
+
+
+def test_a_campaign_file_s_label_stands_in_tables_figures_and_the_report(labelled):
+    for form in ("table", "latex"):
+        shown = command_here("compare", "out", "--format", form, cwd=labelled).stdout
+        assert "No adaptation" in shown
+        assert not re.search(r"^(none|bt - none) ", shown, re.MULTILINE)
+    assert command_here("figure", "out", "--out", "f.svg", cwd=labelled).returncode == 0
+    assert "No adaptation" in (labelled / "f.svg").read_text()
+    drawn = content_of(report_page([labelled / "out"]))["results"]["drawn"]
+    assert drawn["groups"] == ["No adaptation", "bt"]
+    assert drawn["managers"] == ["none", "bt"]  # for the command that replays a mission
+
+
+def test_managers_are_named_by_their_names_or_labels_and_replays_by_names(labelled):
+    for name in ("none", "No adaptation"):
+        asked = ("compare", "out", "--managers", f"bt,{name}", "--against", name)
+        assert "No adaptation" in command_here(*asked, cwd=labelled).stdout
+    replayed = command_here("compare", "out", cwd=labelled).stdout
+    assert re.search(
+        r"suave-des replay out --run \d --managers none,bt", " ".join(replayed.split())
+    )
+
+
+def test_a_report_of_labelled_managers_has_their_ways(labelled, monkeypatch):
+    monkeypatch.chdir(labelled)
+    paths = content_of(report_page([Path("out")]))["ways"]["paths"]
+    assert {path["group"] for path in paths} == {0, 1}
+
+
+def test_the_command_s_label_goes_before_the_file_s(labelled):
+    shown = command_here("compare", "out", "--label", "none=Nobody", cwd=labelled).stdout
+    assert "Nobody" in shown and "No adaptation" not in shown
+
+
+@pytest.mark.parametrize(
+    ("labels", "problem"),
+    [
+        ("{non: x}", "there is no manager 'non' (did you mean 'none'?"),
+        ("{none: bt}", "several managers would be shown as 'bt'"),
+        ("{none: ''}", "labels.none"),
+    ],
+)
+def test_labels_of_a_file_that_cannot_be_used_are_told_with_their_line(tmp_path, labels, problem):
+    text = CAMPAIGN
+    (tmp_path / "c.yaml").write_text(text.replace("{none: No adaptation}", labels))
+    done = command_here("campaign", "c.yaml", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 2 and "c.yaml: line 5, labels.non" in done.stderr
+    assert problem in done.stderr

@@ -244,7 +244,7 @@ function drawRun() {
 
 function drawCommand() {
   const canReplay = DATA.folders.length === 1 && Object.keys(made[0].manifest).length > 0 && columns.run[0] !== null;
-  const command = `suave-des replay ${quoted(DATA.folders[0])} --run ${state.run} --managers ${quoted(groups[state.group] ?? '')} --open`;
+  const command = `suave-des replay ${quoted(DATA.folders[0])} --run ${state.run} --managers ${quoted(drawn.managers[state.group] ?? '')} --open`;
   byId('run-command').replaceChildren(...(canReplay ? [element('span', {}, 'watch it:'), element('code', {}, command), element('button', {
     type: 'button', onclick: (event) => { navigator.clipboard?.writeText(command); event.target.textContent = 'copied'; },
   }, 'copy')] : []));
