@@ -138,7 +138,7 @@ class Table:
         table is in small print, and breaks what is in its first column.
         """
         columns = len(self.headings)
-        widths = self._widths(None)
+        widths = self._widths(math.inf)
         lines = [r"\begin{table}", r"  \centering", rf"  \caption{{{latex_text(self.title)}}}"]
         lines += [rf"  \label{{{label}}}"] if label else []
         alignment = self._alignment

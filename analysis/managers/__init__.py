@@ -1,0 +1,1 @@
+"""Programs that make decision tables of managers that were published."""

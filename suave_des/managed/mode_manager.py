@@ -84,7 +84,7 @@ class ModeManager:
             return False
         if not self.nodes[function].accepts(chosen):
             self.refusals += 1
-            self.log("mode_manager", "refused", f"{function} -> {mode}")
+            self.log("mode_manager", ModeRefused(function, mode))
             return False
         before, self._requested[function] = self._requested.get(function, ""), mode
         self.requests += 1

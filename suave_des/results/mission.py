@@ -150,7 +150,8 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
         if event == requested and (change := events.read(events.ModeRequested, detail)):
             function, mode = change
             if function in in_use:
-                effects_s = (at_s for at_s, new in mode_set if at_s >= t_s and new == change)
+                effect = events.ModeSet(*change)
+                effects_s = (at_s for at_s, new in mode_set if at_s >= t_s and new == effect)
                 effect_s = next(effects_s, t_s)
                 cause = _cause(record, function, modes[function], Span(effect_s, effect_s, mode))
                 found.append(Adaptation(effect_s, function, modes[function], mode, cause))
