@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from importlib.util import cache_from_source, find_spec
 from pathlib import Path
 
@@ -21,6 +22,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from suave_des.caches import private_cache
+from suave_des.resources import find
 from tests.helpers.command import command
 from tests.helpers.owl_text import suave_copy
 from tests.helpers.quick_workers import _warm_process, quick_campaigns, quick_workers
@@ -116,3 +118,25 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the folder of cached inferences when the run is over."""
     if not hasattr(config, "workerinput"):
         shutil.rmtree(os.environ["SUAVE_DES_CACHE_DIR"], ignore_errors=True)
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+    """Writes a file in a fresh current folder and returns its path, relative as a user would give
+    it.
+    """
+    monkeypatch.chdir(tmp_path)
+
+    def write_file(name: str, content: str | bytes) -> Path:
+        path = Path(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write_file
+
+
+@pytest.fixture(scope="session")
+def shipped_modes() -> str:
+    """Text of the shipped modes file."""
+    return find("suave_modes.yaml", "scenarios").read_text(encoding="utf-8")

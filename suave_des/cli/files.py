@@ -72,8 +72,8 @@ def import_config(
     Keys without a counterpart are reported. Files may be of any revision, with or without leading
     slashes.
     """
+    from suave_des.exemplar.configurations import import_config as imported_from
     from suave_des.registry import manager_names
-    from suave_des.scenario.exemplar import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
     for target in targets:
@@ -116,7 +116,7 @@ def export_config(
     import-config gives the same scenario again. What the exemplar cannot express is reported.
     """
     from suave_des.campaign.spec import CampaignSettings, read_campaign_file
-    from suave_des.scenario.exemplar_export import export_config as exported
+    from suave_des.exemplar.export import export_config as exported
     from suave_des.scenario.loader import load_scenario
 
     file = read_campaign_file(scenario)

@@ -12,19 +12,19 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
+from tests.scenario.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.exemplar.configurations import import_config
+from suave_des.exemplar.keys import REVISIONS
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.resources import shipped_folder
 from suave_des.results.figures import draw_folder
-from suave_des.scenario.exemplar import import_config
-from suave_des.scenario.exemplar_keys import REVISIONS
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.command import ends_within
-from tests.scenario.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
 
 NUMBERS = (
     *(

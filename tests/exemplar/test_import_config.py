@@ -9,8 +9,8 @@ import yaml
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import import_config
-from suave_des.scenario.exemplar_keys import EXPERIMENT, PATHS, REVISIONS, is_read
+from suave_des.exemplar.configurations import import_config
+from suave_des.exemplar.keys import EXPERIMENT, PATHS, REVISIONS, is_read
 from suave_des.scenario.loader import load_scenario
 from tests.helpers import rows_of
 

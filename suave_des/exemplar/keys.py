@@ -1,6 +1,6 @@
 """The keys of the exemplar's own configuration files, and what tells its revisions apart.
 
-The table, exemplar_keys.csv, says which revisions read each key, what it is here, and its default;
+The table, keys.csv, says which revisions read each key, what it is here, and its default;
 the page docs/reference/exemplar-files.md shows it. Source: kas-lab/suave (Apache-2.0) at the tags
 v1.2.1, v1.3.0, v1.4.0 and v1.5.0; `2023` made the published runs, `2025` is d5e97be, `HEAD` its
 main branch in summer 2026. What the code of 1.2 to 1.4 does otherwise was not read: there it counts
@@ -79,7 +79,7 @@ class Key(NamedTuple):
 
 _TABLE, _REVISIONS_TABLE = (
     [*csv.DictReader(Path(__file__).with_name(name).read_text(encoding="utf-8").splitlines())]
-    for name in ("exemplar_keys.csv", "exemplar_revisions.csv")
+    for name in ("keys.csv", "revisions.csv")
 )
 KEYS = tuple(Key(**{**row, "default": json.loads(row["default"] or "null")}) for row in _TABLE)
 """The table; the runner gives its parameters to each mission, and draws from its intervals in this

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from suave_des.errors import shown
-from suave_des.scenario.exemplar_files import Parameter
-from suave_des.scenario.exemplar_keys import KEYS, PATHS, RUNNER, WATER_CURRENT, WAVE
+from suave_des.exemplar.files import Parameter
+from suave_des.exemplar.keys import KEYS, PATHS, RUNNER, WATER_CURRENT, WAVE
 
 
 def with_wave(

@@ -1,4 +1,4 @@
-"""The exemplar's own configuration files, imported as a scenario and a campaign; exemplar_export is
+"""The exemplar's own configuration files, imported as a scenario and a campaign; export is
 the way back.
 """
 
@@ -17,9 +17,9 @@ from pydantic import AfterValidator, BaseModel, Field, Json
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
-from suave_des.scenario.exemplar_current import with_wave
-from suave_des.scenario.exemplar_files import EVENTS, PARAMETERS, Parameter, given_files
-from suave_des.scenario.exemplar_keys import (
+from suave_des.exemplar.current import with_wave
+from suave_des.exemplar.files import EVENTS, PARAMETERS, Parameter, given_files
+from suave_des.exemplar.keys import (
     CAMPAIGN,
     DRAWN,
     EXPERIMENT,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from suave_des.errors import InputError, did_you_mean
-from suave_des.scenario.exemplar_keys import (
+from suave_des.exemplar.keys import (
     NODES,
     RUNNER,
     is_every_node,

@@ -11,9 +11,9 @@ import yaml
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.scenario.exemplar import EXTENDED, TREES, at, import_config
-from suave_des.scenario.exemplar_files import EVENTS, PARAMETERS
-from suave_des.scenario.exemplar_keys import (
+from suave_des.exemplar.configurations import EXTENDED, TREES, at, import_config
+from suave_des.exemplar.files import EVENTS, PARAMETERS
+from suave_des.exemplar.keys import (
     DRAWN,
     FIRST_WITH_BRINGUP,
     FIRST_WITH_RUNNER,

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import import_config
-from suave_des.scenario.exemplar_export import MISSION_FILE, RUNNER_FILE, export_config
-from suave_des.scenario.exemplar_keys import REVISIONS
+from suave_des.exemplar.configurations import import_config
+from suave_des.exemplar.export import MISSION_FILE, RUNNER_FILE, export_config
+from suave_des.exemplar.keys import REVISIONS
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.yamlfile import parse_yaml
 

@@ -1,0 +1,1 @@
+"""The exemplar's own configuration files: read as scenarios, and written from them."""
