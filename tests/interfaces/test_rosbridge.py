@@ -23,6 +23,7 @@ from websockets.sync.client import connect
 
 from suave_des import InputError, Mission
 from suave_des.campaign.campaign import fly_campaign
+from suave_des.errors import MissionError
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
 from tests.helpers.command import command_here, wait_until
 
@@ -473,10 +474,21 @@ def test_a_port_in_use_is_bad_input(client):
         pass
 
 
-def test_a_campaign_without_a_server_says_what_flies_its_missions(tmp_path):
-    words = "campaign", "seams2023", "--managers", "client:x", "--out", "x"
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("campaign", "seams2023", "--managers", "client:x", "--out", "x"),
+        ("run", "seams2023", "--manager", "client:x"),
+    ],
+)
+def test_without_a_server_a_command_says_what_flies_its_missions(words, tmp_path):
     done = command_here(*words, cwd=tmp_path)
     assert done.returncode == 2 and "suave-des serve SCENARIO --rosbridge" in done.stderr
+
+
+def test_without_a_server_a_mission_has_no_client():
+    with pytest.raises(MissionError, match="are clients of a server"):
+        Mission("seams2023", "client:x").advance(10.0)
 
 
 def test_without_websockets_it_says_what_to_install(monkeypatch, tmp_path):
