@@ -29,25 +29,31 @@ class ClientManager(NoManager):
     @classmethod
     def check(cls, loaded: LoadedScenario) -> None:
         """Check that a bridge serves."""
+        cls.offered()
+
+    @classmethod
+    def offered(cls) -> Callable[[str, Task], bool]:
+        """Return what calls the services that clients offer.
+
+        Raises:
+            InputError: no bridge serves.
+        """
         if cls.call is None:
             raise InputError(
                 "managers client:NAME are clients of a server",
                 remedy="fly their missions by suave-des serve SCENARIO --rosbridge",
             )
+        return cls.call
 
     def task_requested(self, task: Task) -> None:
         """Pass a task that begins on, or set its modes."""
-        if not self._pass_on(REQUEST_TASK, task):
+        if not self.offered()(REQUEST_TASK, task):
             super().task_requested(task)
 
     def task_cancelled(self, task: Task) -> None:
         """Pass a task that is over on, or set its functions to fd_unground."""
-        if not self._pass_on(CANCEL_TASK, task):
+        if not self.offered()(CANCEL_TASK, task):
             super().task_cancelled(task)
-
-    def _pass_on(self, service: str, task: Task) -> bool:
-        call = type(self).call
-        return call is not None and call(service, task)
 
 
 def client_manager(name: str) -> type[ClientManager]:

@@ -10,17 +10,20 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from http.client import HTTPConnection
+from math import cos, sin
 from pathlib import Path
 from socket import SHUT_RDWR
 from typing import Self
 
 import pytest
 from doc_blocks import ROOT, blocks_of
+from scipy.spatial.transform import Rotation
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from suave_des import InputError, Mission
 from suave_des.campaign.campaign import fly_campaign
+from suave_des.errors import MissionError
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
 from tests.helpers.command import command_here, wait_until
 
@@ -222,18 +225,36 @@ def test_all_that_a_long_step_publishes_arrives_before_its_answer():
 
 def test_the_clock_and_the_pose_are_those_of_the_mission(simulator):
     mission = Mission(simulator, run=1, seed=8)
-    mission.advance(10.0)
+    mission.advance(45.0)
     with served() as (_, client):
         client.send("subscribe", topic="/mavros/local_position/pose")
         client.send("subscribe", topic="clock", type="rosgraph_msgs/msg/Clock")
-        client.advance(10.05)
+        client.advance(45.05)
         *_, clock = (each for each in client.published if each["topic"] == "clock")
         *_, posed = (each["msg"] for each in client.published if each["topic"] != "clock")
-    assert clock["msg"] == {"clock": {"sec": 10, "nanosec": 0}}
-    assert posed["header"] == {"stamp": {"sec": 10, "nanosec": 0}, "frame_id": "map"}
+    assert clock["msg"] == {"clock": {"sec": 45, "nanosec": 0}}
+    assert posed["header"] == {"stamp": {"sec": 45, "nanosec": 0}, "frame_id": "map"}
     position, turned = posed["pose"]["position"], posed["pose"]["orientation"]
     assert [*position.values()] == pytest.approx(mission.pose[:3], abs=1e-6)
-    assert turned["z"] == pytest.approx(0.0, abs=0.05) and turned["w"] == pytest.approx(1, abs=0.05)
+    ahead = Rotation.from_quat([turned[axis] for axis in "xyzw"]).apply([1.0, 0.0, 0.0])
+    _, pitch_rad, yaw_rad = mission.pose[3:]  # first roll, then pitch, then yaw (Fossen, 2.2)
+    level = cos(pitch_rad)
+    forwards = [cos(yaw_rad) * level, sin(yaw_rad) * level, -sin(pitch_rad)]
+    assert ahead == pytest.approx(forwards, abs=1e-9)
+
+
+def test_the_first_sight_of_the_pipeline_is_published_at_once():
+    with served() as (server, client):
+        for topic in ("/clock", "/pipeline/detected"):
+            client.send("subscribe", topic=topic)
+        client.advance(1e6)
+        published = list(client.published)
+    first = next(number for number, each in enumerate(published) if each["msg"].get("data"))
+    *_, clock = (each["msg"]["clock"] for each in published[:first] if each["topic"] == "/clock")
+    (row,) = server.rows
+    assert clock["sec"] + clock["nanosec"] / 1e9 == pytest.approx(
+        row["detection_time_s"], abs=0.1 + 1e-6
+    )
 
 
 def test_a_throttled_topic_is_dropped_or_kept_in_its_queue():
@@ -453,10 +474,21 @@ def test_a_port_in_use_is_bad_input(client):
         pass
 
 
-def test_a_campaign_without_a_server_says_what_flies_its_missions(tmp_path):
-    words = "campaign", "seams2023", "--managers", "client:x", "--out", "x"
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("campaign", "seams2023", "--managers", "client:x", "--out", "x"),
+        ("run", "seams2023", "--manager", "client:x"),
+    ],
+)
+def test_without_a_server_a_command_says_what_flies_its_missions(words, tmp_path):
     done = command_here(*words, cwd=tmp_path)
     assert done.returncode == 2 and "suave-des serve SCENARIO --rosbridge" in done.stderr
+
+
+def test_without_a_server_a_mission_has_no_client():
+    with pytest.raises(MissionError, match="are clients of a server"):
+        Mission("seams2023", "client:x").advance(10.0)
 
 
 def test_without_websockets_it_says_what_to_install(monkeypatch, tmp_path):
