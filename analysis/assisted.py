@@ -526,7 +526,7 @@ def write(out: Path, covered: pandas.DataFrame, gained: pandas.DataFrame) -> Non
     for name, table in tables.items():
         table.to_csv(out / f"{name}.csv", index=False, float_format="%.4g", lineterminator="\n")
     written = [pandas.read_csv(out / f"{name}.csv") for name in tables]
-    studies.figure_of(draw, written[0], 3.2).savefig(out / "assisted.png", dpi=160)
+    studies.figure_of(draw, written[0], height=3.2).savefig(out / "assisted.png", dpi=160)
     conclusion = conclude(*written)
     (out / "conclusion.md").write_text(conclusion + "\n", encoding="utf-8")
     print(conclusion)

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import studies
 from matplotlib.figure import Figure
 
 from calibration.cases import (
@@ -32,6 +33,8 @@ from calibration.loss import Evaluation, evaluate, resampling_spread
 from suave_des import InputError
 from suave_des.results import style
 
+COLUMNS = 4
+"""Of panels."""
 LOSS = (
     "mean over the scenarios, their managers and conditions of the energy distance between missions as vectors (search"
     " time / 40 s, distance inspected / 12 m, x of detection / 1.5 m), plus the mean absolute difference of the shares"
@@ -58,31 +61,33 @@ def table(found: Sequence[Profile]) -> list[list[object]]:
     return rows
 
 
-def draw_profiles(found: Sequence[Profile], best: Evaluation, threshold: float) -> Figure:
+def draw_profiles(
+    figure: Figure, found: Sequence[Profile], best: Evaluation, threshold: float
+) -> None:
     """Draw the loss along each parameter, a panel each, with the interval that the data admit."""
-    columns = 4
-    rows = -(-len(found) // columns)
-    with style.publication():
-        figure = Figure(figsize=(style.WIDTH_IN, 1.5 * rows), layout="constrained")
-        panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-        for panel, profile in zip(panels, found, strict=False):
-            panel.axvspan(profile.low, profile.high, color="#D6E6F2", lw=0)
-            panel.axhline(threshold, color=style.GREY, lw=0.8, ls="--")
-            points = sorted(
-                [*zip(profile.values, profile.losses, strict=True), (profile.best, best.loss)]
-            )
-            panel.plot(
-                [x for x, _ in points], [y for _, y in points], color=style.BLUE, marker=".", ms=4
-            )
-            panel.plot([profile.best], [best.loss], marker="D", color=style.VERMILION, ms=4)
-            panel.set_xlim(profile.parameter.lower, profile.parameter.upper)
-            panel.set_ylim(0.0, threshold + 4.0 * (threshold - best.loss))
-            panel.set_title(_title(profile.parameter), fontsize=6.5)
-            panel.tick_params(labelsize=6.5)
-        for panel in panels[len(found) :]:
-            panel.set_visible(False)
-        figure.supylabel("distance to the published runs", fontsize=8)
-    return figure
+    panels = figure.subplots(_lines(found), COLUMNS, sharey=True, squeeze=False).ravel()
+    for panel, profile in zip(panels, found, strict=False):
+        panel.axvspan(profile.low, profile.high, color="#D6E6F2", lw=0)
+        panel.axhline(threshold, color=style.GREY, lw=0.8, ls="--")
+        points = sorted(
+            [*zip(profile.values, profile.losses, strict=True), (profile.best, best.loss)]
+        )
+        panel.plot(
+            [x for x, _ in points], [y for _, y in points], color=style.BLUE, marker=".", ms=4
+        )
+        panel.plot([profile.best], [best.loss], marker="D", color=style.VERMILION, ms=4)
+        panel.set_xlim(profile.parameter.lower, profile.parameter.upper)
+        panel.set_ylim(0.0, threshold + 4.0 * (threshold - best.loss))
+        panel.set_title(_title(profile.parameter), fontsize=6.5)
+        panel.tick_params(labelsize=6.5)
+    for panel in panels[len(found) :]:
+        panel.set_visible(False)
+    figure.supylabel("distance to the published runs", fontsize=8)
+
+
+def _lines(found: Sequence[Profile]) -> int:
+    """How many lines of panels profiles need."""
+    return -(-len(found) // COLUMNS)
 
 
 def _title(parameter: FreeParameter) -> str:
@@ -234,7 +239,9 @@ def main() -> None:
     if found:
         with (chosen.out / "parameters.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(table(found))
-        draw_profiles(found, here, threshold).savefig(chosen.out / "profiles.png", dpi=160)
+        height = 1.5 * _lines(found)
+        figure = studies.figure_of(draw_profiles, found, here, threshold, height=height)
+        figure.savefig(chosen.out / "profiles.png", dpi=160)
     show(problem, best, found)
     print(f"\nThe fitted scenarios and the record are in {chosen.out}")
 

@@ -60,14 +60,12 @@ def study(runs: int, workers: int, chosen: list[float] | None = None) -> pandas.
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
     """Draw a panel for each metric: difference to the shipped margin, with its interval."""
-    panels = figure.subplots(1, len(studies.METRICS))
-    for panel, (metric, title) in zip(panels, studies.METRICS.items(), strict=True):
-        own = rows[rows["metric"] == metric]
+    for panel, metric, own in studies.metric_panels(figure, rows):
         studies.draw_intervals(panel, own, own["margin_m"])
         panel.axhline(0.0, color="0.5", lw=0.8)
         panel.axvline(SHIPPED_M, color="0.5", lw=0.8, ls=":")
         panel.set_xlabel("visibility expected beyond the altitude (m)")
-        panel.set_ylabel(f"less that of 0.25 m, as shipped:\n{title}")
+        panel.set_ylabel(f"less that of 0.25 m, as shipped:\n{studies.METRICS[metric]}")
 
 
 def conclude(rows: pandas.DataFrame) -> str:

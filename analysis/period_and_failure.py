@@ -59,9 +59,8 @@ def study(
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
     """Draw a panel for each metric: differences by period and time of the failure."""
-    panels = figure.subplots(1, len(studies.METRICS), sharey=True)
-    for panel, (metric, title) in zip(panels, studies.METRICS.items(), strict=True):
-        own = rows[rows["metric"] == metric].set_index(["failure_s", "period_s"])
+    for panel, metric, of_metric in studies.metric_panels(figure, rows, sharey=True):
+        own = of_metric.set_index(["failure_s", "period_s"])
         table = own["mean_difference"].unstack()
         colours = "RdBu" if metric == "distance_inspected_m" else "RdBu_r"
         image = panel.imshow(
@@ -87,8 +86,9 @@ def draw(figure: Figure, rows: pandas.DataFrame) -> None:
         panel.set_xticks(range(len(table.columns)), [f"{each:g}" for each in table.columns])
         panel.set_yticks(range(len(table.index)), [f"{each:g}" for each in table.index])
         panel.set_xlabel("period of the visibility (s)")
+        title = studies.METRICS[metric]
         figure.colorbar(image, ax=panel).set_label(f"metacontrol - none: {title}")
-    panels[0].set_ylabel("failure of thruster 1 at (s)")
+    figure.axes[0].set_ylabel("failure of thruster 1 at (s)")
 
 
 def conclude(rows: pandas.DataFrame) -> str:

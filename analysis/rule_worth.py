@@ -57,14 +57,13 @@ def ranked(rows: pandas.DataFrame) -> list[str]:
 
 def draw(figure: Figure, rows: pandas.DataFrame) -> None:
     """Draw a panel for each metric: the difference that each rule's absence makes."""
-    panels = figure.subplots(1, len(studies.METRICS), sharey=True)
     order = ranked(rows)[::-1]
-    for panel, (metric, title) in zip(panels, studies.METRICS.items(), strict=True):
-        own = rows[rows["metric"] == metric].set_index("rule").loc[order]
-        studies.draw_intervals(panel, own, range(len(order)), across=True)
+    for panel, metric, own in studies.metric_panels(figure, rows, sharey=True):
+        in_order = own.set_index("rule").loc[order]
+        studies.draw_intervals(panel, in_order, range(len(order)), across=True)
         panel.axvline(0.0, color="0.5", lw=0.8)
         panel.set_yticks(range(len(order)), order)
-        panel.set_xlabel(f"without the rule - with all:\n{title}")
+        panel.set_xlabel(f"without the rule - with all:\n{studies.METRICS[metric]}")
 
 
 def conclude(rows: pandas.DataFrame) -> str:

@@ -26,7 +26,6 @@ from SALib.sample import morris as sample_morris
 
 from calibration.cases import read_cases, read_problem
 from suave_des import Simulator, with_values
-from suave_des.results import style
 
 MANAGERS = ("none", "random", "metacontrol")
 METRICS = {
@@ -45,34 +44,31 @@ def means(loaded: Any, paths: tuple[str, ...], runs: int, values: tuple[float, .
     return found
 
 
-def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray]) -> None:
+def draw(figure: Figure, names: list[str], effects: dict[tuple[str, str], np.ndarray]) -> None:
     """One panel a metric: mu* of each parameter and manager, the most important parameters on
     top.
     """
-    with style.publication():
-        figure = Figure(figsize=(style.WIDTH_IN, 4.2), layout="constrained")
-        panels = figure.subplots(1, len(METRICS))
-        for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
-            order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
-            for offset, manager, hatch in zip(
-                (0.26, 0.0, -0.26), MANAGERS, ("", "////", "...."), strict=True
-            ):
-                panel.barh(
-                    np.arange(len(names)) + offset,
-                    effects[manager, metric][order],
-                    height=0.24,
-                    facecolor=studies.COLOURS[manager],
-                    edgecolor="white",
-                    linewidth=0.0,
-                    hatch=hatch,
-                    label=manager,
-                )
-            panel.set_yticks(range(len(names)), [names[index] for index in order])
-            panel.tick_params(axis="y", length=0)
-            panel.grid(axis="y", visible=False)
-            panel.set_xlabel(f"effect (mu*) on the\n{title}")
-        panels[0].legend(loc="lower right")
-    figure.savefig(path, dpi=160)
+    panels = figure.subplots(1, len(METRICS))
+    for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
+        order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
+        for offset, manager, hatch in zip(
+            (0.26, 0.0, -0.26), MANAGERS, ("", "////", "...."), strict=True
+        ):
+            panel.barh(
+                np.arange(len(names)) + offset,
+                effects[manager, metric][order],
+                height=0.24,
+                facecolor=studies.COLOURS[manager],
+                edgecolor="white",
+                linewidth=0.0,
+                hatch=hatch,
+                label=manager,
+            )
+        panel.set_yticks(range(len(names)), [names[index] for index in order])
+        panel.tick_params(axis="y", length=0)
+        panel.grid(axis="y", visible=False)
+        panel.set_xlabel(f"effect (mu*) on the\n{title}")
+    panels[0].legend(loc="lower right")
 
 
 def main() -> None:
@@ -124,7 +120,8 @@ def main() -> None:
             ["manager", "metric", "parameter", "mu", "mu_star", "mu_star_conf95", "sigma"]
         )
         writer.writerows(rows)
-    draw(chosen.out / "sensitivity.png", names, effects)
+    figure = studies.figure_of(draw, names, effects, height=4.2)
+    figure.savefig(chosen.out / "sensitivity.png", dpi=160)
     print(
         f"{len(samples)} sets of values, {len(samples) * len(MANAGERS) * chosen.runs} missions; see {chosen.out}"
     )

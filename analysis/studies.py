@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -161,7 +161,7 @@ def write(
         writer.writerow(rows.columns)
         writer.writerows([_cell(value) for value in row] for row in rows.itertuples(index=False))
     written = pandas.read_csv(table)
-    figure_of(draw, written, height).savefig(chosen.out / f"{name}.png", dpi=160)
+    figure_of(draw, written, height=height).savefig(chosen.out / f"{name}.png", dpi=160)
     conclusion = conclude(written).strip()
     (chosen.out / "conclusion.md").write_text(conclusion + "\n", encoding="utf-8")
     print(conclusion)
@@ -171,12 +171,21 @@ def _cell(value: Any) -> Any:
     return f"{value:.4f}".rstrip("0").rstrip(".") if isinstance(value, float) else value
 
 
-def figure_of(draw: Draw, rows: pandas.DataFrame, height: float) -> Figure:
-    """Draw a figure in the look of all figures."""
+def figure_of(draw: Callable[..., None], *drawn: Any, height: float) -> Figure:
+    """Draw a figure in the look of all figures: `draw` gets it, and what is to be drawn."""
     with style.publication():
         figure = Figure(figsize=(style.WIDTH_IN, height), layout="constrained")
-        draw(figure, rows)
+        draw(figure, *drawn)
     return figure
+
+
+def metric_panels(
+    figure: Figure, rows: pandas.DataFrame, **look: Any
+) -> Iterator[tuple[Axes, str, pandas.DataFrame]]:
+    """Yield a panel for each metric, side by side, with the metric's name and its rows."""
+    panels = figure.subplots(1, len(METRICS), **look)
+    for panel, metric in zip(panels, METRICS, strict=True):
+        yield panel, metric, rows[rows["metric"] == metric]
 
 
 def draw_intervals(

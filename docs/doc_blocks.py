@@ -46,6 +46,7 @@ PAGES = (
     *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
     *sorted((ROOT / "docs" / "guides").glob("*.md")),
     *(ROOT / "docs" / "reference" / name for name in ("cli.md", "csv.md", "python-api.md")),
+    *sorted((ROOT / "docs" / "reference" / "api").glob("*.md")),
     *(ROOT / "docs" / "background" / name for name in ("determinism.md", "fidelity.md")),
 )
 """Pages whose blocks are run; other pages have tests of their own."""

@@ -53,6 +53,10 @@ def is_since(revision: str, first: str) -> bool:
     return _ORDER.index(revision) >= _ORDER.index(first)
 
 
+def _is_between(revision: str, first: str, last: str) -> bool:
+    return is_since(revision, first) and is_since(last, revision)
+
+
 class Key(NamedTuple):
     """A parameter of a node, or a key of an experiment.
 
@@ -74,7 +78,7 @@ class Key(NamedTuple):
 
     def is_read_by(self, revision: str) -> bool:
         """Whether the code of a revision reads it."""
-        return is_since(revision, self.since) and is_since(self.until, revision)
+        return _is_between(revision, self.since, self.until)
 
 
 _TABLE, _REVISIONS_TABLE = (
@@ -118,7 +122,7 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
     given = list(filter(found.__contains__, _TELLING))
     for each in given:
         before = fitting
-        fitting = [revision for revision in before if _has(revision, each)]
+        fitting = [revision for revision in before if _is_between(revision, *_TELLING[each])]
         if fitting != before:
             telling = each
     if len(fitting) == 1:
@@ -130,12 +134,6 @@ def revision_of(found: Collection[str], name: str | None) -> tuple[str, str]:
         f"the files fit revisions {', '.join(fitting)} of the exemplar, which differ in their code"
     )
     raise InputError(problem, remedy=f"say which it is, as in --revision {fitting[-1]}")
-
-
-def _has(revision: str, name: str) -> bool:
-    """Whether a revision has what tells revisions apart."""
-    first, last = _TELLING[name]
-    return is_since(revision, first) and is_since(last, revision)
 
 
 def read_by(revision: str) -> tuple[Key, ...]:

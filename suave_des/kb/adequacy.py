@@ -407,18 +407,11 @@ def _threshold_moved(rule: Rule, _: _Offered) -> Iterator[Rule]:
                 yield _with_term(rule, at, Lit(text, XSD + "decimal"))
 
 
-def _status_exchanged(rule: Rule, offered: _Offered) -> Iterator[Rule]:
-    return _literals_exchanged(rule, offered, range(len(rule.body)))
-
-
-def _conclusion_changed(rule: Rule, offered: _Offered) -> Iterator[Rule]:
-    return _literals_exchanged(rule, offered, range(len(rule.body), len(rule.atoms)))
-
-
-def _literals_exchanged(rule: Rule, offered: _Offered, atoms: range) -> Iterator[Rule]:
-    """Exchange the literals of some atoms by others that rules mention of the same property."""
+def _literals_exchanged(rule: Rule, offered: _Offered, *, in_head: bool) -> Iterator[Rule]:
+    """Exchange the literals of head or body by others that rules mention of the same property."""
     for at, term in _terms(rule):
-        if at.atom not in atoms or rule.atoms[at.atom].kind != "data":
+        is_in_head = at.atom >= len(rule.body)
+        if is_in_head != in_head or rule.atoms[at.atom].kind != "data":
             continue
         if isinstance(term, Lit) and term.datatype not in EXACT:
             known = offered.literals[rule.atoms[at.atom].predicate]
@@ -439,10 +432,10 @@ MUTATION_OPERATORS: Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None
     "comparison shifted": _comparison_shifted,
     "atom dropped": _atom_dropped,
     "variable exchanged": _variable_exchanged,
-    "conclusion changed": _conclusion_changed,
+    "conclusion changed": partial(_literals_exchanged, in_head=True),
     "rule removed": lambda rule, offered: [None],
     "threshold moved": _threshold_moved,
-    "status exchanged": _status_exchanged,
+    "status exchanged": partial(_literals_exchanged, in_head=False),
     "individual exchanged": _individual_exchanged,
 }
 

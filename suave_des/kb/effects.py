@@ -178,10 +178,13 @@ def _concerned(one: _Side, other: _Side, measured: set[str]) -> Collection[str] 
     to one another.
     """
     if _ANY in one | other:
-        are_numbers = (all(isinstance(each, Decimal) for each in side) for side in (one, other))
-        return measured if any(are_numbers) else None
+        return measured if any(map(_is_of_numbers, (one, other))) else None
     found = [name for name in measured if name in one | other]
     return found if len(found) < 2 else None
+
+
+def _is_of_numbers(side: _Side) -> bool:
+    return all(isinstance(each, Decimal) for each in side)
 
 
 def _numbers_of(base: Ontology, one: str | Decimal) -> set[Decimal]:

@@ -455,8 +455,8 @@ def unknown_to_missions(material: Material) -> Iterator[Finding]:
                 )
     for name in sorted(_expected(material.base.model)):
         if not material.measures(name):
-            problem = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
-            yield material.about(Level.NOTE, name, problem)
+            nothing = "so what designs expect of it is compared with nothing"
+            yield material.about(Level.NOTE, name, f"missions do not measure {name}, {nothing}")
 
 
 def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:

@@ -77,15 +77,15 @@ _OWN_CELLS: TypeAdapter[tuple[Cell, ...]] = TypeAdapter(
     _tuple_of(tuple(_METRICS.values())), config=Recorded.model_config
 )
 _FURTHER_CELLS: TypeAdapter[list[Cell]] = TypeAdapter(list[Cell], config=Recorded.model_config)
-_FAILURE: TypeAdapter[tuple[str, int, float | None, str, bool, int]] = TypeAdapter(
+FAILURE: TypeAdapter[tuple[str, int, float | None, str, bool, int]] = TypeAdapter(
     tuple[str, BoundedWhole, BoundedNumber | None, str, bool, BoundedWhole],
     config=Recorded.model_config,
 )
-
-
-_WRITTEN: TypeAdapter[dict[str, list[str]]] = TypeAdapter(
+"""What a campaign keeps of a mission that failed."""
+WRITTEN: TypeAdapter[dict[str, list[str]]] = TypeAdapter(
     dict[FileName, list[str]], config=Recorded.model_config
 )
+"""What a campaign keeps of the files that it wrote: SHA-256 by name."""
 
 
 def row_of(cells: list[object]) -> tuple[Cell, ...]:
@@ -94,18 +94,6 @@ def row_of(cells: list[object]) -> tuple[Cell, ...]:
     """
     own = tuple(cells[: len(_METRICS)])
     return *_OWN_CELLS.validate_python(own), *_FURTHER_CELLS.validate_python(cells[len(own) :])
-
-
-def failure_of(cells: list[object]) -> tuple[str, int, float | None, str, bool, int]:
-    """Check what a campaign keeps of a mission that failed; a ValueError likewise."""
-    return _FAILURE.validate_python(tuple(cells))
-
-
-def written_of(noted: object) -> dict[str, list[str]]:
-    """Check what a campaign keeps of the files that it wrote: SHA-256 by name; a ValueError
-    likewise.
-    """
-    return _WRITTEN.validate_python(noted)
 
 
 class MissionFile(Recorded):

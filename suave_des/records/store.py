@@ -246,7 +246,7 @@ class Store:
         if self.is_new:
             return {}
         with self.reading():
-            return contents.written_of(self.about(_WRITTEN, default={}))
+            return contents.WRITTEN.validate_python(self.about(_WRITTEN, default={}))
 
     # Outcomes.
 
@@ -397,7 +397,7 @@ def read_written(folder: Path) -> Noted:
     path = folder / STORE_FILE
     with suppress(SuaveDesError), store_read(path):
         if path.is_file():
-            return contents.written_of(read_note(path, _WRITTEN, {}))
+            return contents.WRITTEN.validate_python(read_note(path, _WRITTEN, {}))
     return {}
 
 
@@ -508,7 +508,7 @@ def _outcome(record: tuple[int, int, int, int, str, int], path: Path | None) -> 
     cells = json_value(content)
     if kind == _ROW:
         return key, contents.row_of(cells)
-    return key, MissionFailure(*contents.failure_of(cells))
+    return key, MissionFailure(*contents.FAILURE.validate_python(tuple(cells)))
 
 
 def _crc(*parts: object) -> int:

@@ -61,15 +61,15 @@ def test_a_small_repetition_gives_the_committed_figures_of_the_first_runs(study,
     assert again.to_numpy() == pytest.approx(before.to_numpy(), abs=1e-3)
 
 
-def test_the_effects_of_parameters_are_drawn(study, tmp_path):
+def test_the_effects_of_parameters_are_drawn(study):
     module = study("sensitivity")
     effects = {
         (manager, metric): np.arange(2.0)
         for manager in module.MANAGERS
         for metric in module.METRICS
     }
-    module.draw(tmp_path / "effects.png", ["a", "b"], effects)
-    assert (tmp_path / "effects.png").stat().st_size > 1_000
+    figure = module.studies.figure_of(module.draw, ["a", "b"], effects, height=2.0)
+    assert len(figure.axes) == len(module.METRICS)
 
 
 def predictions() -> pandas.DataFrame:
@@ -282,7 +282,7 @@ def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, n
         rows
     ).strip()
     assert (FOLDER / name / f"{name}.png").stat().st_size < 500_000
-    assert module.studies.figure_of(module.draw, rows, 3.0).axes
+    assert module.studies.figure_of(module.draw, rows, height=3.0).axes
 
 
 def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(study):
