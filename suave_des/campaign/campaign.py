@@ -114,7 +114,7 @@ def _begin(
     loaded: LoadedScenario | None,
     on_progress: OnProgress | None,
     settings_of: Callable[[Sequence[str]], dict[str, dict[str, Any]]],
-    executor: Executor = in_process,
+    executor: Executor | None = None,
 ) -> CampaignResult:
     """Run a new campaign."""
     if spec.out is not None:
@@ -300,7 +300,7 @@ def _checked(
     stack: ExitStack,
     spec: CampaignSpec,
     read: Callable[[], Campaign],
-    executor: Executor = in_process,
+    executor: Executor | None = None,
 ) -> _Checked:
     """Read and check a campaign, while its workers start; `stack` ends them.
 
@@ -308,6 +308,7 @@ def _checked(
         InputError: something given cannot be used.
     """
     spec.check()
+    executor = in_process if executor is None else executor
     if spec.processes > 1 and spec.scheduler is None:
         executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes
     campaign = read()

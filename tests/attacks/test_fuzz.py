@@ -12,7 +12,7 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
-from tests.scenario.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
+from tests.exemplar.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError, SuaveDesError
