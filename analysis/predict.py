@@ -84,6 +84,9 @@ SAID_BY = {
 """Columns that may say which condition a run is of: the parameter, what is added to it, and how
 near it is.
 """
+PREDICTED = ("bt", "metacontrol", "random", "none")
+PREDICTED_IN_EXTENDED = ("bt_extended",)
+"""Managers; not PLANTA, whose real missions are slower than its code explains."""
 KEYS = ["experiment", "manager", "condition", "metric"]
 
 
@@ -113,8 +116,15 @@ def made_of(experiment: str, folder: Path = FOLDER) -> dict[str, str]:
 def simulate(experiment: str, runs: int, workers: int, folder: Path = FOLDER) -> pandas.DataFrame:
     """Run an experiment's missions; their rows, with the number of the condition."""
     campaign = folder / f"{experiment}_campaign.yaml"
+    managers = PREDICTED_IN_EXTENDED if experiment.startswith("extended") else PREDICTED
     frame = run_campaign(
-        campaign, runs=runs, seed=studies.SEED, ensemble=ENSEMBLE, workers=workers, progress=False
+        campaign,
+        managers,
+        runs,
+        seed=studies.SEED,
+        ensemble=ENSEMBLE,
+        workers=workers,
+        progress=False,
     )
     starts = list(dict.fromkeys(frame["start.y_m"]))
     return frame.assign(
