@@ -1,1 +1,1 @@
-"""Programs that make decision tables of managers that were published."""
+"""Managers of others as decision tables, made from what is published of them."""

@@ -103,7 +103,7 @@ def table(settings: str, decide: Decide, least_m: dict[str, float]) -> str:
         sees = function == SEARCH
         _check_independence(by_state, 1 if sees else 0)
         for (visibility, thrusters, now), then in by_state.items():
-            if sees and thrusters != THRUSTERS[0] or not sees and visibility != VISIBILITIES[0]:
+            if (sees and thrusters != THRUSTERS[0]) or (not sees and visibility != VISIBILITIES[0]):
                 continue
             said = reports(thrusters) if function == MOTION else ["any"]
             if function == FOLLOW and thrusters != THRUSTERS[0]:

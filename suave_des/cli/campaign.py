@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 
 _RUNS = 200
 """Of reproduce, for each manager."""
+_PUBLISHED_MANAGERS = ("none", "random", "metacontrol", "bt", "rosa", "planta")
+"""Those that have been written for SUAVE: `reproduce --managers all`."""
 _FAILURES_SHOWN = 20
 _BLOCKS = 10
 """Into which training missions are divided, for their means."""
@@ -237,12 +239,13 @@ def reproduce(
     options: Annotated[
         Given,
         Fields(
-            ("runs", "workers", "seed", "out", "overwrite", "time_out_s"),
+            ("managers", "runs", "workers", "seed", "out", "overwrite", "time_out_s"),
             {
+                "managers": "Managers, separated by commas; all: also bt, rosa and planta.",
                 "runs": "Missions for each manager; the paper has 20.",
                 "out": "Folder for result files; without it, none are written.",
             },
-            {"runs": str(_RUNS)},
+            {"managers": "the paper's", "runs": str(_RUNS)},
         ),
     ],
     quiet: Quiet = False,
@@ -260,14 +263,19 @@ def reproduce(
     if "out" in options:
         check_beside(options["out"], [PAPER_FILE])
     settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}
+    managers = settings.pop("managers", [*PAPER_ORDER])
+    managers = _PUBLISHED_MANAGERS if [*managers] == ["all"] else managers
     with progress.shown("reproduce", quiet=quiet) as show:
         result = run_campaign(
-            DEFAULT_SCENARIO, list(PAPER_ORDER), on_progress=show, **settings, **files.replacements
+            DEFAULT_SCENARIO, managers, on_progress=show, **settings, **files.replacements
         )
     comparison = compare_with_paper(result.frame())
     console = output()
     for metric in PAPER_METRICS:
         print_table(console, comparison.table(metric))
+        console.print()
+    if not set(managers) <= set(PAPER_ORDER):
+        print_table(console, _summary(result))
         console.print()
     for line in comparison.remarks():
         console.print(fill(line, min(console.width, TEXT_WIDTH)))

@@ -7,6 +7,7 @@ docs/guides/managers.md.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from decimal import Decimal
 from functools import cache, lru_cache
 from itertools import product
 from operator import attrgetter
@@ -18,7 +19,8 @@ import yaml
 from suave_des.domain import BATTERY_LEVEL, THRUSTER_NAMES, WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, line_error, shown
 from suave_des.kb.decision_table import SHIPPED, DecisionTable, read_table
-from suave_des.kb.space import component_reports
+from suave_des.kb.scale import Scale
+from suave_des.kb.space import Reports, component_reports
 from suave_des.knowledge.state import (
     NO_GROUNDING,
     UNGROUNDED,
@@ -84,7 +86,8 @@ class TableManager(Metacontrol):
 
     def loop_settings(self) -> LoopSettings:
         """Return what the loop works with: the table."""
-        scenario, settings = self.system.scenario, self._table.settings
+        scenario = self.system.scenario
+        settings = self._table.settings
         revision = scenario.revision.metacontrol if settings.as_metacontrol else _AT_ONCE
         period_s = settings.period_s or scenario.managers.metacontrol.reasoning_period_s
         is_given = "latency_s" in settings.model_fields_set
@@ -190,33 +193,36 @@ def _states(
     table: DecisionTable, function: str, loaded: LoadedScenario
 ) -> Iterator[KnowledgeState]:
     """Yield the states of missions on which the decision on a function can depend."""
-    from suave_des.scenario_knowledge import measured_attributes
-
-    measured = measured_attributes(loaded.scenario)
-    values = [
-        [(name, scale.value(place)) for place in range(len(scale) if name in measured else 1)]
-        for name, scale in table.attributes.items()
-    ]
-    groups = [each for each in table.settings.interchangeable if set(each) <= table.components]
-    failing = {each.thruster for each in loaded.scenario.thruster_events if each.event == "failure"}
-    # one failure, and recovering reports every thruster
-    most = len(THRUSTER_NAMES) if failing else 0
-    reports = [
-        each
-        for each in component_reports(groups, (FAILED, RECOVERED), most)
-        if [status for _, status in each].count(FAILED) <= len(failing)
-    ]
+    values = [_values(scale, name, loaded) for name, scale in table.attributes.items()]
     related = table.related(function)
     designs = [(NO_GROUNDING, *table.designs.get(name, ())) for name in related]
-    for known, reported, now in product(product(*values), reports, product(*designs)):
-        groundings = {
-            name: design
-            for name, design in zip(related, now, strict=True)
-            if design != NO_GROUNDING
-        }
+    objectives = [ObjectiveState(name, UNGROUNDED) for name in related]
+    for measured, reports, now in product(
+        product(*values), _reports(table, loaded), product(*designs)
+    ):
+        groundings = dict(zip(related, now, strict=True))
+        known = dict(zip(table.attributes, measured, strict=True))
         yield KnowledgeState.of(
-            [ObjectiveState(name, UNGROUNDED) for name in related],
-            groundings=groundings,
-            components=dict(reported),
-            measurements={name: value for name, value in known if value is not None},
+            objectives,
+            groundings={name: each for name, each in groundings.items() if each != NO_GROUNDING},
+            components=dict(reports),
+            measurements={name: value for name, value in known.items() if value is not None},
         )
+
+
+def _values(scale: Scale, attribute: str, loaded: LoadedScenario) -> list[Decimal | None]:
+    """A value at each place of an attribute that is measured, and None."""
+    from suave_des.scenario_knowledge import measured_attributes
+
+    is_measured = attribute in measured_attributes(loaded.scenario)
+    return [scale.value(place) for place in range(len(scale) if is_measured else 1)]
+
+
+def _reports(table: DecisionTable, loaded: LoadedScenario) -> list[Reports]:
+    """What thrusters can report: once one has failed, recovering makes each report."""
+    events = loaded.scenario.thruster_events
+    failing = {each.thruster for each in events if each.event == "failure"}
+    groups = [each for each in table.settings.interchangeable if set(each) <= table.components]
+    most = len(THRUSTER_NAMES) if failing else 0
+    every = component_reports(groups, (FAILED, RECOVERED), most)
+    return [each for each in every if str(each).count(repr(FAILED)) <= len(failing)]

@@ -55,7 +55,7 @@ class TableSettings(Strict):
     """The settings at the beginning of a table."""
 
     trigger: Literal["period", "event"] = "period"
-    """When it decides: at ticks of a period, or when a task, component or measured value changes."""
+    """When it decides: in periods, or when a task, component or measured value changes."""
     period_s: Period | None = None
     """Time between decisions; by default managers.metacontrol.reasoning_period_s."""
     latency_s: DelayDistribution = 0.0
@@ -121,7 +121,7 @@ class DecisionTable:
         return _representatives(self.settings.interchangeable, components, self.components)
 
     def related(self, function: str) -> tuple[str, ...]:
-        """Functions on whose designs the decisions on a function depend: itself, and maybe others."""
+        """Functions on whose designs a function's decisions depend: itself, and maybe others."""
         rules = itertools.chain.from_iterable(
             itertools.chain.from_iterable(each.values())
             for each in self._cells.get(function, {}).values()
@@ -155,13 +155,13 @@ class DecisionTable:
             f"no row decides {function} where {', '.join([*nows, *words])}",
             file=self.path,
             place=f"beside line {' and '.join(map(str, beside[:2]))}" if beside else None,
-            remedy="add one, or let another cover this; of a knowledge base kb policy --max-failed 6"
-            " writes all rows",
+            remedy="add one, or let another cover this; kb policy --max-failed 6 writes all rows",
         )
 
     def _found(self, function: str, state: KnowledgeState, places: Sequence[int]) -> _Rule | None:
         cell = self._cells[function].get(tuple(places), {})
-        reports, now = self.reports(state.components), _now(state, function)
+        reports = self.reports(state.components)
+        now = _now(state, function)
         for asked in itertools.product((reports, None), (now, None)):
             for rule in cell.get(asked, ()):
                 if all(_now(state, name) == design for name, design in rule.others.items()):
@@ -186,7 +186,8 @@ class DecisionTable:
 
     def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
         """Look the decisions up: as many as are made at a time."""
-        decisions, changes = [], 0
+        decisions = []
+        changes = 0
         for decision in self._decisions(inference.state):
             if decision.design not in (None, inference.state.grounded(decision.function)):
                 changes += 1
@@ -305,20 +306,27 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
     if not read:
         remedy = "write a row for each region, as suave-des kb policy --csv does"
         raise line_error(path, len(head) + 1, "has no rows below its header", remedy)
-    attributes = {}
-    for number, name in enumerate(_attributes(header)):
-        ends = {end for row in read for region in row.regions[number] for _, end in region}
-        attributes[name] = Scale(tuple(sorted(filter(Decimal.is_finite, ends))))
+    scales = _scales(header, read)
     named = {name for row in read for name, _ in row.reports or ()}
     groups = [each for each in settings.interchangeable if set(each) & named]
     return DecisionTable(
         path,
         settings,
-        attributes,
+        scales,
         frozenset(named.union(*groups)),
         _designs(read),
-        _cells(path, read, list(attributes.values())),
+        _cells(path, read, list(scales.values())),
     )
+
+
+def _scales(header: Iterable[str], rows: Sequence[_Row]) -> dict[str, Scale]:
+    """The places of each attribute: between and at the numbers of its column."""
+    found = {}
+    for number, name in enumerate(_attributes(header)):
+        regions = itertools.chain.from_iterable(row.regions[number] for row in rows)
+        ends = {end for _, end in itertools.chain.from_iterable(regions)}
+        found[name] = Scale(tuple(sorted(filter(Decimal.is_finite, ends))))
+    return found
 
 
 def _settings(path: Path, head: Sequence[str], changes: Mapping[str, object]) -> TableSettings:
@@ -344,18 +352,22 @@ def _content(
         raise line_error(
             path, above + reader.line_num, f"is not valid CSV: {error}", remedy
         ) from None
-    for name in header:
-        if header.count(name) > 1 or not name:
-            problem = f"the column {shown(name)} is there twice" if name else "a column has no name"
-            raise line_error(path, above + 1, problem, "give each column a name of its own")
-    if not any(name.endswith(_THEN) for name in header):
-        problem = "no column says what is decided"
-        raise line_error(path, above + 1, problem, f"add one such as f_maintain_motion{_THEN}")
+    _check_header(path, above + 1, header)
     for line, row in rows:
         if len(row) != len(header):
             problem = f"has {len(row)} cells, but there are {len(header)} columns"
             raise line_error(path, line, problem, "write a cell, if only an empty one, for each")
     return header, rows
+
+
+def _check_header(path: Path, line: int, header: Sequence[str]) -> None:
+    for name in header:
+        if header.count(name) > 1 or not name:
+            problem = f"the column {shown(name)} is there twice" if name else "a column has no name"
+            raise line_error(path, line, problem, "give each column a name of its own")
+    if not any(name.endswith(_THEN) for name in header):
+        problem = "no column says what is decided"
+        raise line_error(path, line, problem, f"add one such as f_maintain_motion{_THEN}")
 
 
 def _attributes(header: Iterable[str]) -> list[str]:
@@ -458,12 +470,11 @@ def _cells(
 
 @lru_cache(maxsize=4096)
 def _places(regions: Sequence[TestedRegion], scale: Scale) -> tuple[int, ...]:
-    values = [scale.value(place) for place in range(len(scale))]
-    return tuple(
-        place
-        for place, value in enumerate(values)
-        if not regions or any(is_in(region, value) for region in regions)
-    )
+    def is_inside(place: int) -> bool:
+        value = scale.value(place)
+        return not regions or any(is_in(region, value) for region in regions)
+
+    return tuple(filter(is_inside, range(len(scale))))
 
 
 def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
@@ -479,9 +490,12 @@ def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
                 continue
             if all(other.others.get(name, now) == now for name, now in rule.others.items()):
                 first, second = sorted((rule, other), key=lambda each: each.line)
-                problem = f"{function}: {second.then} here, and {first.then} in line {first.line}, for one state"
-                remedy = "let the two rows differ in what they ask for; components that count alone are missing from the setting interchangeable"
-                raise line_error(path, second.line, problem, remedy)
+                both = f"{second.then} here, and {first.then} in line {first.line}"
+                remedy = (
+                    "let them ask for different states; the setting interchangeable says which"
+                    " components count alike"
+                )
+                raise line_error(path, second.line, f"{function}: {both}, for one state", remedy)
 
 
 def _agree(one: _Asked, other: _Asked) -> bool:

@@ -46,7 +46,6 @@ from suave_des.tables import Table
 if TYPE_CHECKING:
     import pandas
 
-    from suave_des.campaign.progress import OnProgress
     from suave_des.kb.knowledge_base import KnowledgeBase
 
 #: Metrics of missions that are always compared; others are where they differ.
@@ -298,9 +297,7 @@ def compare_missions(
     other: Replacements,
     *,
     managers: Sequence[str] = (_MANAGER, _MANAGER),
-    seed: int = 1,
-    workers: int = 1,
-    on_progress: OnProgress | None = None,
+    **campaign: Any,
 ) -> MissionDifference:
     """Run the same missions with two knowledge bases or tables, and compare them pair by pair.
 
@@ -309,6 +306,7 @@ def compare_missions(
         runs: number of missions with each knowledge base.
         one, other: ontologies, rules and values of the scenario, as load_scenario takes them.
         managers: the manager with each.
+        campaign: seed, workers and on_progress, as run_campaign takes them; one worker by default.
 
     Raises:
         InputError: something cannot be used, or missions fail.
@@ -318,7 +316,7 @@ def compare_missions(
     frames = []
     for manager, replacements in zip(managers, (one, other), strict=True):
         result = run_campaign(
-            scenario, [manager], runs, seed, workers, on_progress=on_progress, **replacements
+            scenario, [manager], runs, **{"workers": 1, **campaign}, **replacements
         )
         frames.append(result.frame().drop(columns="manager").set_index("run"))
     before, after = frames

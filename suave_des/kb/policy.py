@@ -38,8 +38,9 @@ class Policy:
             scale; the `components` that report; how many `states` it stands for; of each function
             the grounding `_now` and what happens to it `_then`, empty where the function has no
             objective; inferred `statuses`; `marks`, which are any of "inconsistent", "none left"
-            and "flip-flop"; the `problem` of an inconsistent state; functions whose mode is requested
-            `again` although it stays; and as objects one such `state`, its `reports` in words and the functions that are `flipping`.
+            and "flip-flop"; the `problem` of an inconsistent state; functions whose mode is
+            requested `again` although it stays; and as objects one such `state`, its `reports` in
+            words and the functions that are `flipping`.
         functions: that have an objective in a state.
         without_effect: measured attributes that no rule and no design refers to.
         no_proof: why rules may do more than compare; if there are any reasons, the ranges are

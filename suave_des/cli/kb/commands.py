@@ -20,7 +20,9 @@ from suave_des.cli.kb.options import KnowledgeOptions, MaxFailed, ReasonerOption
 from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet, Seed, Workers
 
 if TYPE_CHECKING:
+    from suave_des.kb.decision_table import DecisionTable
     from suave_des.kb.difference import MissionDifference
+    from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.knowledge.ontology import Ontology
     from suave_des.knowledge.rules import Rule
 
@@ -215,7 +217,8 @@ def diff(
         Path,
         typer.Argument(
             metavar="A",
-            help="An ontology, a .swrl file of rules to add, or a decision table: a .csv file, rosa, planta.",
+            help="An ontology, a .swrl file of rules to add, or a decision table (.csv, or rosa,"
+            " planta).",
         ),
     ],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
@@ -227,41 +230,47 @@ def diff(
     scenario's. Decisions are compared in every state; missions with the same number use common
     random numbers.
     """
-    from suave_des.kb.decision_table import find_table, manager_of
+    from suave_des.kb.decision_table import manager_of
     from suave_des.kb.difference import compare_axioms, compare_deciders
 
-    managers = [manager_of(file) for file in (one, other)]
-    both = [
-        options.with_file(file) if manager is None else options
-        for file, manager in zip((one, other), managers, strict=True)
-    ]
-    before, after = (each.knowledge() for each in both)
-    removed, added = list[str](), list[str]()
+    tables = [manager_of(file) for file in (one, other)]
+    both = [_side(options, file) for file in (one, other)]
+    changed = list[str]()
     with counted("states", errors()) as on_count:
-        if managers == [None, None]:
-            removed, added = compare_axioms(before.base, after.base)
-            difference = before.diff(after, max_failed, on_count)
-        else:
-            base = after if managers[1] is None else before
-            deciders = [
-                knowledge if manager is None else find_table(file)
-                for file, manager, knowledge in zip(
-                    (one, other), managers, (before, after), strict=True
-                )
-            ]
+        if any(tables):
+            deciders = [_decider(options, file) for file in (one, other)]
+            base = both[tables.index(None) if None in tables else 0].knowledge()
             difference = compare_deciders(base, deciders, max_failed, on_count)
+        else:
+            before, after = (each.knowledge() for each in both)
+            removed, added = compare_axioms(before.base, after.base)
+            changed += [f"  - {text}" for text in removed]
+            changed += [f"  + {text}" for text in added]
+            difference = before.diff(after, max_failed, on_count)
     missions = None
-    last = list[str]()
     if mission_options.missions is not None:
-        missions, last = _compared_missions(both, managers, mission_options)
-    if removed or added:
+        missions = _compared_missions(both, tables, mission_options)
+    if changed:
         print(f"axioms and rules: {len(removed)} removed, {len(added)} added")
-        print(*(f"  - {text}" for text in removed), *(f"  + {text}" for text in added), sep="\n")
+        print(*changed, sep="\n")
     print(*difference.lines(), sep="\n")
     if missions is not None:
         print()
-        print(shown(missions.table(difference)))
-        print(*last, sep="\n")
+        print(shown(missions[0].table(difference)))
+        print(*missions[1], sep="\n")
+
+
+def _side(options: ReasonerOptions, file: Path) -> ReasonerOptions:
+    """Return the options with what is compared; a decision table changes none."""
+    from suave_des.kb.decision_table import manager_of
+
+    return options if manager_of(file) else options.with_file(file)
+
+
+def _decider(options: ReasonerOptions, file: Path) -> KnowledgeBase | DecisionTable:
+    from suave_des.kb.decision_table import find_table, manager_of
+
+    return find_table(file) if manager_of(file) else options.with_file(file).knowledge()
 
 
 def _compared_missions(
