@@ -191,13 +191,15 @@ def _made(folder: Path) -> dict[str, Any]:
         "folder": str(folder),
         "command": shlex.join(about.command),
         "manifest": {
-            key: {name: _text(part) for name, part in value.items()}
-            if isinstance(value, dict)
-            else _text(value)
+            key: _texts(value) if isinstance(value, dict) else _text(value)
             for key, value in (read_json(path) if path.exists() else {}).items()
             if key != "command"
         },
     }
+
+
+def _texts(values: Mapping[str, Any]) -> dict[str, str]:
+    return {name: _text(value) for name, value in values.items()}
 
 
 def _text(value: Any) -> str:

@@ -304,6 +304,23 @@ def _keys(data: dict[str, Any], path: str) -> list[str]:
     return ["managers", named, *(keys if keys != [""] else [])]
 
 
+def _has(holder: Any, key: str) -> bool:
+    return isinstance(holder, dict) and key in holder
+
+
+def _did_you_mean(key: str, holder: dict[str, Any], *, is_top: bool) -> str:
+    """Return the remedy for an unknown key; at the top of a scenario one that a section has is
+    found.
+    """
+    named = list(map(str, holder))
+    if is_top and "signals" in holder:
+        sections = sorted(name for name, below in holder.items() if _has(below, key))
+        if sections:
+            return f"did you mean {' or '.join(f'{name}.{key}' for name in sections)}?"
+        named += ["visibility", *holder["signals"]]
+    return did_you_mean(key, sorted(named))
+
+
 def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
     """The mapping or list with the value at a key path of plain data, and its key; an InputError if
     there is none.
@@ -321,10 +338,8 @@ def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
                 f"{path}: {above} is a plain value", remedy="leave out what follows it"
             )
         elif part not in holder:
-            named = list(map(str, holder))
-            if holder is data and "signals" in data:
-                named += ["visibility", *data["signals"]]
-            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(named)))
+            remedy = _did_you_mean(part, holder, is_top=holder is data)
+            raise InputError(f"{path}: unknown key", remedy=remedy)
         here = holder[key]
     return holder, key
 

@@ -269,6 +269,12 @@ def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_byt
     )
 
 
+def test_a_key_without_its_section_is_told_with_it(tmp_path):
+    path = write(tmp_path, HEAD + "sweep:\n  metacontrol.reasoning_period_s: [1, 2]\n")
+    with pytest.raises(InputError, match=r"line 7, .*did you mean managers\.metacontrol or"):
+        run_campaign(path)
+
+
 SETTINGS = {
     "managers.metacontrol.reasoning_period_s": [1.0, 4.0],
     "managers.random.adaptation_period_s": [10.0, 20.0],

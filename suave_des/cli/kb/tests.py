@@ -280,7 +280,8 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
         )
     for about, knowledge, tests in suites:
         situations = [situation for test in tests for situation in test.situations]
-        with counted("states", errors()) as on_count:
+        hint = ", fewer with --max-failed 0" if max_failed else ""
+        with counted(f"states{hint}", errors()) as on_count:
             found = measure_coverage(knowledge, situations, max_failed, on_count)
         print("", shown(found.table()).rstrip("\n"), *found.lines(), sep="\n")
         if file is not None and found.proposed:
