@@ -12,7 +12,6 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
-from tests.exemplar.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError, SuaveDesError
@@ -24,6 +23,7 @@ from suave_des.resources import shipped_folder
 from suave_des.results.figures import draw_folder
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
+from tests.exemplar.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER_15
 from tests.helpers.command import ends_within
 
 NUMBERS = (
