@@ -84,9 +84,6 @@ SAID_BY = {
 """Columns that may say which condition a run is of: the parameter, what is added to it, and how
 near it is.
 """
-PREDICTED = ("bt", "metacontrol", "random", "none")
-PREDICTED_IN_EXTENDED = ("bt_extended",)
-"""Managers; not PLANTA, whose real missions are slower than its code explains."""
 KEYS = ["experiment", "manager", "condition", "metric"]
 
 
@@ -113,13 +110,21 @@ def made_of(experiment: str, folder: Path = FOLDER) -> dict[str, str]:
     return found
 
 
+def predicted(experiment: str) -> tuple[str, ...]:
+    """Return the managers that are predicted: not PLANTA, whose real missions are slower than its
+    code explains.
+    """
+    if experiment.startswith("extended"):
+        return ("bt_extended",)
+    return ("bt", "metacontrol", "random", "none")
+
+
 def simulate(experiment: str, runs: int, workers: int, folder: Path = FOLDER) -> pandas.DataFrame:
     """Run an experiment's missions; their rows, with the number of the condition."""
     campaign = folder / f"{experiment}_campaign.yaml"
-    managers = PREDICTED_IN_EXTENDED if experiment.startswith("extended") else PREDICTED
     frame = run_campaign(
         campaign,
-        managers,
+        predicted(experiment),
         runs,
         seed=studies.SEED,
         ensemble=ENSEMBLE,
@@ -404,7 +409,7 @@ def assigned(experiment: str, files: Sequence[Path]) -> pandas.DataFrame:
     """
     runs = read_real(files).frame
     places = [(path, line) for path in files for line in read_runs(path).frame.index]
-    managers = _plain(FOLDER / f"{experiment}_campaign.yaml")["managers"]
+    managers = predicted(experiment)
     numbers = pandas.Series(0, runs.index)
     fits = _fitting(experiment, runs)
     for manager, own in runs.groupby("manager", sort=False):
