@@ -61,6 +61,11 @@ def is_built_in(name: str) -> bool:
     return name in _BUILT_IN or name.startswith(("fixed:", "client:", "table:"))
 
 
+def is_client(name: str) -> bool:
+    """Whether a manager is a client of `suave-des serve`."""
+    return name.startswith("client:")
+
+
 def takes_argument(name: str) -> bool:
     """Whether the part of a name before the colon is not a module, as in fixed:MODE."""
     return name.partition(":")[0] in _FAMILIES

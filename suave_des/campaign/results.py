@@ -21,6 +21,7 @@ from suave_des.records import store
 from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRICS, Row
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.records.store import MissionFailure, MissionKey, MissionOutcome
+from suave_des.registry import is_client
 
 if TYPE_CHECKING:
     import pandas
@@ -143,7 +144,10 @@ class CampaignResult:
         kept = f"{self.done} of {self.campaign.planned} missions {'is' if self.done == 1 else 'are'} done"
         if self.folder is None:
             return kept
-        return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
+        kept = f"{kept}, and kept in {self.folder}"
+        if any(is_client(name) for name in self.campaign.spec.managers):
+            return kept  # no campaign of its own could fly the rest
+        return f"{kept}; suave-des campaign --resume {self.folder} runs the rest"
 
     def write(self, kept: store.Store, provenance: Mapping[str, Any]) -> None:
         """Write the campaign's files, with its provenance in the manifest, into the folder of its

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from http.client import HTTPConnection
 from math import cos, sin
@@ -22,7 +22,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from suave_des import InputError, Mission
-from suave_des.campaign.campaign import fly_campaign
+from suave_des.campaign.campaign import CampaignInterrupted, fly_campaign
+from suave_des.campaign.missions import Campaign, Finished, MissionKey
 from suave_des.errors import MissionError
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
 from tests.helpers.command import command_here, wait_until
@@ -484,6 +485,19 @@ def test_a_port_in_use_is_bad_input(client):
 def test_without_a_server_a_command_says_what_flies_its_missions(words, tmp_path):
     done = command_here(*words, cwd=tmp_path)
     assert done.returncode == 2 and "suave-des serve SCENARIO --rosbridge" in done.stderr
+
+
+def test_the_rest_of_an_interrupted_campaign_is_not_said_to_be_for_another_command(tmp_path):
+    def interrupted(
+        campaign: Campaign, missions: Iterable[MissionKey], total: int
+    ) -> Iterator[list[Finished]]:
+        yield [campaign.failed(next(iter(missions)), "the client left")]
+        raise KeyboardInterrupt
+
+    with Bridge(port=0), pytest.raises(CampaignInterrupted) as raised:
+        fly_campaign(interrupted, "seams2023", "client:mine", runs=2, out=tmp_path / "out")
+    assert "0 of 2 missions" in str(raised.value)
+    assert "--resume" not in str(raised.value)
 
 
 def test_without_a_server_a_mission_has_no_client():
