@@ -597,7 +597,7 @@ class RuleQuestions:
         rules = self._usable.content.enabled_rules
         fewer = self._followed((each for each in rules if each is not rule), state)
         more = set(known).difference(fewer)
-        return any(matching.matched(atom, each, {}) for atom in rule.head for each in more)
+        return next(matching.concluding(rule, more), None) is not None
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
         fact = matching.stated(atom, binding)

@@ -288,3 +288,11 @@ def test_a_rule_that_fires_is_said_to_and_is_no_error_and_explains_what_it_concl
     for fact in concluded:
         (derivation,) = knowledge.explain(state, str(fact)).facts
         assert derivation.rule == "R", fact
+
+
+def test_a_rule_fires_where_what_it_concludes_has_no_variable(small):
+    # i and j are different, so that nobody differs from one of them; from which is not known.
+    differs = Atom("different", DIFFERENT, (Variable("x"), Named(NS + "nobody")))
+    rule = Rule("r", (differs,), (Atom("class", NS + "C", (Named(NS + "nobody"),)),))
+    answer = RuleQuestions(with_rules(small, [rule])).why_not("r", KnowledgeState())
+    assert str(answer) == "r: it fires, and concludes C(nobody)"
