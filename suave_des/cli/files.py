@@ -74,6 +74,7 @@ def import_config(
     """
     from suave_des.exemplar.configurations import import_config as imported_from
     from suave_des.registry import manager_names
+    from suave_des.resources import shipped_folder
 
     targets = [out] if campaign is None else [out, campaign]
     for target in targets:
@@ -85,7 +86,10 @@ def import_config(
             )
         check_output_file(target, overwrite=overwrite)
     given = {"revision": revision, "campaign": campaign, "runner_seed": runner_seed}
-    imported = imported_from(files, out, managers=manager_names(), **given)  # type: ignore[arg-type]
+    # tables from what is published of a manager are not the one that a configuration names
+    tables = {path.stem for path in shipped_folder("scenarios/managers").glob("*.csv")}
+    managers = [name for name in manager_names() if name not in tables]
+    imported = imported_from(files, out, managers=managers, **given)  # type: ignore[arg-type]
     for target, text in zip(
         targets, filter(None, (imported.scenario, imported.campaign)), strict=True
     ):

@@ -89,6 +89,17 @@ def test_progress_is_on_stderr_unless_quiet(arguments, quiet, command, monkeypat
     assert not re.search(r"\d of \d+ missions", ended.out)
 
 
+def test_reproduce_shows_all_managers_that_were_written_for_the_exemplar(command):
+    ended = command("reproduce", "--managers", "all", "--runs", "2", "--workers", "1", "--quiet")
+    assert ended.status == 0
+    (first,) = (
+        number for number, line in enumerate(ended.out.splitlines()) if "missions  found" in line
+    )
+    rows = ended.out.splitlines()[first + 1 : first + 7]
+    managers = ["none", "random", "metacontrol", "bt", "rosa", "planta"]
+    assert [row.split()[:2] for row in rows] == [[name, "2"] for name in managers]
+
+
 class TestRun:
     def test_tells_the_mission_as_a_timeline(self, command):
         ended = command("run", "seams2023", "--manager", "none", "--seed", "1")

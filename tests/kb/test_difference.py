@@ -1,5 +1,6 @@
 """kb diff: axioms added and removed, states decided differently, and missions compared in pairs."""
 
+import gzip
 import re
 from dataclasses import replace
 from decimal import Decimal
@@ -284,3 +285,42 @@ def test_a_difference_for_all_values_is_told_as_such(places, said):
         f"  {said}",
         "  for instance a state",
     ]
+
+
+@pytest.fixture
+def own_table(tmp_path):
+    """Metacontrol's decisions as a table."""
+    kept = Path(__file__).parents[1] / "data" / "metacontrol_table.csv.gz"
+    file = tmp_path / "own.csv"
+    file.write_bytes(gzip.decompress(kept.read_bytes()))
+    return file
+
+
+def test_a_knowledge_base_and_its_own_table_decide_alike(own_table, command):
+    status, text, _ = command("diff", "suave.owl", own_table, "--max-failed", "1")
+    assert (status, text) == (0, "0 of 3744 states are decided differently\n")
+
+
+def test_tables_are_compared_in_every_region_of_either(command):
+    status, text, _ = command("diff", "rosa", "planta", "--max-failed", "0")
+    assert status == 0
+    lines = text.splitlines()
+    higher = lines.index("f_generate_search_path, now fd_spiral_low: A fd_spiral_high, B stays")
+    assert lines[higher + 1 : higher + 3] == ["  not measured: 3 states", "  >= 3.25: 6 states"]
+    assert "  1.245 <= . < 1.25: 6 states" in lines  # PLANTA rounds
+
+
+def test_missions_of_a_table_are_compared_with_metacontrols(own_table, command):
+    fixed = ("--max-failed", "0", "--missions", "2", "--set", "latencies.inference_s=1")
+    status, text, _ = command("diff", "suave.owl", own_table, *fixed, "--quiet")
+    assert status == 0 and text.endswith("no mission differs\n")
+
+
+def test_a_design_that_the_ontology_does_not_have_is_named_with_its_line(own_table, command):
+    own_table.write_text(own_table.read_text().replace("fd_follow_pipeline", "fd_folow", 1))
+    own_table.write_text(own_table.read_text().replace(",fd_folow_now", ",f_follow_pipeline_now"))
+    status, _, said = command("diff", own_table, "rosa")
+    assert status == 2
+    assert "line 2: the ontology has no design fd_folow of f_follow_pipeline" in said.replace(
+        "'", ""
+    )
