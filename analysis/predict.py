@@ -110,26 +110,11 @@ def made_of(experiment: str, folder: Path = FOLDER) -> dict[str, str]:
     return found
 
 
-def predicted(experiment: str) -> tuple[str, ...]:
-    """Return the managers that are predicted: not PLANTA, whose real missions are slower than its
-    code explains.
-    """
-    if experiment.startswith("extended"):
-        return ("bt_extended",)
-    return ("bt", "metacontrol", "random", "none")
-
-
 def simulate(experiment: str, runs: int, workers: int, folder: Path = FOLDER) -> pandas.DataFrame:
     """Run an experiment's missions; their rows, with the number of the condition."""
     campaign = folder / f"{experiment}_campaign.yaml"
     frame = run_campaign(
-        campaign,
-        predicted(experiment),
-        runs,
-        seed=studies.SEED,
-        ensemble=ENSEMBLE,
-        workers=workers,
-        progress=False,
+        campaign, runs=runs, seed=studies.SEED, ensemble=ENSEMBLE, workers=workers, progress=False
     )
     starts = list(dict.fromkeys(frame["start.y_m"]))
     return frame.assign(
@@ -409,7 +394,7 @@ def assigned(experiment: str, files: Sequence[Path]) -> pandas.DataFrame:
     """
     runs = read_real(files).frame
     places = [(path, line) for path in files for line in read_runs(path).frame.index]
-    managers = predicted(experiment)
+    managers = _plain(FOLDER / f"{experiment}_campaign.yaml")["managers"]
     numbers = pandas.Series(0, runs.index)
     fits = _fitting(experiment, runs)
     for manager, own in runs.groupby("manager", sort=False):
