@@ -231,7 +231,8 @@ def diff(
     random numbers.
     """
     from suave_des.kb.decision_table import manager_of
-    from suave_des.kb.difference import compare_axioms, compare_deciders
+    from suave_des.kb.difference import compare_axioms
+    from suave_des.kb.table_difference import compare_deciders
 
     tables = [manager_of(file) for file in (one, other)]
     both = [_side(options, file) for file in (one, other)]

@@ -1,0 +1,56 @@
+"""Compare what decision tables decide in every state, with each other or with a knowledge base."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+
+from suave_des.errors import did_you_mean, line_error, shown
+from suave_des.kb.decision_table import DecisionTable
+from suave_des.kb.difference import PolicyDifference, compare_decisions
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.situations import Decide, OnCount
+from suave_des.kb.space import PolicySpace, States, decide_all
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.reasoner import regions_of
+
+
+def compare_deciders(
+    knowledge: KnowledgeBase,
+    both: Sequence[KnowledgeBase | DecisionTable],
+    max_failed: int,
+    on_count: OnCount,
+) -> PolicyDifference:
+    """Compare what two tables, or a table and a knowledge base, decide in every state that either
+    can tell apart.
+
+    Args:
+        knowledge: has the tasks and designs of the states.
+        max_failed, on_count: as of KnowledgeBase.policy.
+
+    Raises:
+        InputError: there would be too many states, or a table has no row for one of them, or a
+            design that the knowledge base does not have.
+        KnowledgeError: the reasoner takes too long for one of them.
+    """
+    space = reduce(PolicySpace.common, (each.space for each in both), knowledge.space)
+    states = States.of(knowledge.base, knowledge.settings, max_failed, space)
+    decide: list[Decide] = []
+    for each in both:
+        if isinstance(each, DecisionTable):
+            _check_designs(each, knowledge.base)
+            decide.append(each.outcome)
+        else:
+            decide.append(decide_all(each.base, states, each.outcome, on_count))
+    bases = [each.base for each in both if not isinstance(each, DecisionTable)]
+    no_proof = dict.fromkeys(reason for base in bases for reason in regions_of(base).reasons)
+    return compare_decisions(states, decide[0], decide[1], tuple(no_proof), infer=False)
+
+
+def _check_designs(table: DecisionTable, base: Ontology) -> None:
+    for function, designs in table.designs.items():
+        for design, line in designs.items():
+            if design not in base.designs(function):
+                problem = f"the ontology has no design {shown(design)} of {function}"
+                remedy = did_you_mean(design, base.designs(function))
+                raise line_error(table.path, line, problem, remedy)
