@@ -73,6 +73,7 @@ _TICK_S: Final = 0.005
 _LONGEST_S: Final = 0.05
 """Wall time that may pass by itself at once; in more, this process was stopped or busy."""
 _FLUSH_S: Final = 1.0
+_LEVELS = ("info", "warning", "error", "none")
 _MOST_CLIENTS: Final = 32
 _MOST_NAMES: Final = 100
 """Subscriptions, topics and services of one client, each."""
@@ -529,7 +530,12 @@ class Bridge:
         client.services[service] = name
 
     def _set_level(self, client: _Client, message: Json) -> None:
-        client.level = _text(message, "level")
+        level = _text(message, "level")
+        if level not in _LEVELS:
+            raise InputError(
+                f"there is no level {shown(level)}", remedy=did_you_mean(level, _LEVELS)
+            )
+        client.level = level
 
 
 def _whole(name: str) -> str:

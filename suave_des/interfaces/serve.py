@@ -263,9 +263,8 @@ def check_factor(factor: float) -> None:
 def object_of(content: Any, known: Sequence[str]) -> Json:
     """Return a copy of an object, which may have no other keys than the known ones."""
     if not isinstance(content, dict):
-        raise InputError(
-            f"expected an object, got {shown(content)}", remedy='such as {"advance_s": 2.0}'
-        )
+        problem = f"expected an object, got {shown(content)}"
+        raise InputError(problem, remedy=f"its keys may be {', '.join(known)}")
     if unknown := [key for key in content if key not in known]:
         raise InputError(f"unknown key {shown(unknown[0])}", remedy=did_you_mean(unknown[0], known))
     return dict(content)

@@ -348,6 +348,10 @@ def test_in_real_time_a_mission_begins_when_a_client_takes_part():
         ('{"op": "advertise", "topic": "/mine"}', "type is nothing"),
         ('{"op": "advertise_service", "service": "/x", "type": "y"}', "nobody here would call"),
         ('{"op": "call_service"}', "service is nothing"),
+        (
+            '{"op": "set_level", "level": "errors"}',
+            "there is no level 'errors' (did you mean 'error'",
+        ),
     ],
 )
 def test_what_it_cannot_use_gets_a_status_message_and_changes_nothing(client, text, words):
