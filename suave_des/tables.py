@@ -33,10 +33,10 @@ _MARKDOWN = str.maketrans(
     {**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"}
 )
 LATEX_NEEDS = r"% needs \usepackage{array,booktabs}"
-_LATEX_WIDTH, _LATEX_SMALL_WIDTH = 56, 72
-"""Characters in a row, of all columns together, that fit the text width of LaTeX's article, in its
-own size and in small print.
-"""
+_LATEX_WIDTH_PT, _LATEX_COLUMN_PT = 345.0, 12.0
+"""Text width of LaTeX's article, and what stands between two columns."""
+_LATEX_CHARACTER_PT, _LATEX_SMALL_CHARACTER_PT = 5.0, 4.25
+"""Widths of a digit in its own size and in small print."""
 _NEGATIVE = re.compile(r"(?<![\w.])-\d[\d.,]*")
 _LATEX = str.maketrans(
     {
@@ -138,14 +138,15 @@ class Table:
         table is in small print, and breaks what is in its first column.
         """
         columns = len(self.headings)
-        widths = self._widths(math.inf)
+        characters = sum(self._widths(math.inf))
+        room_pt = _LATEX_WIDTH_PT - _LATEX_COLUMN_PT * columns
         lines = [r"\begin{table}", r"  \centering", rf"  \caption{{{latex_text(self.title)}}}"]
         lines += [rf"  \label{{{label}}}"] if label else []
         alignment = self._alignment
-        if sum(widths) > _LATEX_WIDTH:
+        if characters * _LATEX_CHARACTER_PT > room_pt:
             lines.append(r"  \footnotesize")
-            if sum(widths) > _LATEX_SMALL_WIDTH:
-                alignment = r">{\raggedright\arraybackslash}p{0.33\linewidth}" + alignment[1:]
+            if characters * _LATEX_SMALL_CHARACTER_PT > room_pt:
+                alignment = r">{\raggedright\arraybackslash}p{0.31\linewidth}" + alignment[1:]
         lines += [rf"  \begin{{tabular}}{{{alignment}}}", r"    \toprule"]
         if over:
             each = (columns - 1) // len(over)

@@ -96,5 +96,5 @@ def test_a_wide_table_is_in_small_print_in_latex_and_a_wider_one_breaks_its_name
         return Table(("a", "b"), [("n" * name_length, "1234")]).latex()
 
     assert "footnotesize" not in latex(50)
-    assert r"\footnotesize" in latex(60) and r"\begin{tabular}{lr}" in latex(60)
-    assert r"{>{\raggedright\arraybackslash}p{0.33\linewidth}r}" in latex(80)
+    assert r"\footnotesize" in latex(66) and r"\begin{tabular}{lr}" in latex(66)
+    assert r"{>{\raggedright\arraybackslash}p{0.31\linewidth}r}" in latex(80)

@@ -662,6 +662,16 @@ def draw_mission(
     return draw_timeline(record, rules) if kind == TIMELINE else draw_map(record)
 
 
+def _check_kind(kind: str) -> None:
+    """Check that a figure is one of campaigns without a sweep."""
+    if kind in (MAP, TIMELINE):
+        remedy = "give a folder that suave-des run --out has written"
+        raise InputError(f"{kind} is a figure of one mission", place="kind", remedy=remedy)
+    if kind not in (AUTO, DISTRIBUTIONS, DIFFERENCES):
+        known = (DISTRIBUTIONS, DIFFERENCES, SWEEP, HEAT_MAP)
+        raise unknown(f"there is no figure {shown(kind)} of a campaign", kind, known, place="kind")
+
+
 @style.publication()
 def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str] = ()) -> Figure:
     """Draw missions: the means of a sweep, or of others the distributions, unless another kind is
@@ -686,9 +696,7 @@ def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str
         raise InputError(
             "parameters are those of a sweep", place="parameters", remedy="leave them out"
         )
-    if kind not in (AUTO, DISTRIBUTIONS, DIFFERENCES):
-        known = (DISTRIBUTIONS, DIFFERENCES, SWEEP, HEAT_MAP)
-        raise unknown(f"there is no figure {shown(kind)} of a campaign", kind, known, place="kind")
+    _check_kind(kind)
     is_of_means = kind == DIFFERENCES
     groups = grouped(missions, averages=is_of_means)
     figure = draw_differences(groups) if is_of_means else draw_distributions(groups)

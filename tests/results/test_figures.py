@@ -332,3 +332,9 @@ def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs_as_a_swee
         draw_heat_map(missions_of(frame))
     text = "means of n = 2 runs, each averaged over the parameters of the other panels"
     assert text in texts_of(draw_sweep(missions_of(frame)))
+
+
+@pytest.mark.parametrize("kind", ["map", "timeline"])
+def test_a_figure_of_one_mission_is_not_one_of_a_campaign(kind, campaign):
+    with pytest.raises(InputError, match=rf"{kind} is a figure of one mission .give a folder"):
+        draw_missions(read_missions([campaign]), kind)
