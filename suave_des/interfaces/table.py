@@ -16,23 +16,34 @@ from typing import Any, ClassVar
 
 import yaml
 
-from suave_des.domain import BATTERY_LEVEL, THRUSTER_NAMES, WATER_VISIBILITY
+from suave_des.domain import (
+    BATTERY_LEVEL,
+    FOLLOW_PIPELINE,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    SURFACE,
+    THRUSTER_NAMES,
+    WATER_VISIBILITY,
+)
 from suave_des.errors import InputError, did_you_mean, line_error, shown
 from suave_des.kb.decision_table import SHIPPED, DecisionTable, read_table
 from suave_des.kb.scale import Scale
 from suave_des.kb.space import Reports, component_reports
 from suave_des.knowledge.state import (
     NO_GROUNDING,
+    NONE_LEFT,
+    STAYS,
     UNGROUNDED,
     KnowledgeState,
     ObjectiveState,
 )
 from suave_des.managing.base import AdaptationProcess, ManagingSubsystem, System
 from suave_des.managing.metacontrol import LoopSettings, Metacontrol
-from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, Kind
+from suave_des.monitor.diagnostics import FAILED, HULL, LEAK, RECOVERED, Diagnostic, Kind
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import MetacontrolRevision
+from suave_des.scenario_knowledge import REPORTED_STATUSES, measured_attributes
 
 _AT_ONCE = MetacontrolRevision(
     task_bridge_period_s=0.0,
@@ -68,6 +79,9 @@ class TableManager(Metacontrol):
         table = opened(path, loaded.manager_settings(cls.name))
         _check_names(table, loaded)
         for function in loaded.scenario.needed_functions():
+            if cls.name == file and function not in table.designs:
+                problem = f"no row decides {function}: {file} is not made for such missions"
+                raise InputError(problem, file=path, remedy="compare other managers in them")
             for state in _states(table, function, loaded):
                 table.rule(function, state)
 
@@ -180,13 +194,26 @@ def _check_names(table: DecisionTable, loaded: LoadedScenario) -> None:
                 )
             if design not in modes.modes(function):
                 problem = f"{function} has no mode {shown(design)}"
-                remedy = did_you_mean(design, modes.modes(function))
+                remedy = did_you_mean(design, [*modes.modes(function), STAYS, NONE_LEFT])
+                raise line_error(table.path, line, problem, remedy)
+    for component, statuses in table.components.items():
+        for status, line in statuses.items():
+            if component not in REPORTED_STATUSES:
+                problem = f"there is no component {shown(component)}"
+                raise line_error(
+                    table.path, line, problem, did_you_mean(component, REPORTED_STATUSES)
+                )
+            if status not in REPORTED_STATUSES[component]:
+                problem = f"{component} never reports {shown(status)}"
+                remedy = did_you_mean(status, REPORTED_STATUSES[component])
                 raise line_error(table.path, line, problem, remedy)
     known = sorted({*loaded.scenario.signals, WATER_VISIBILITY, BATTERY_LEVEL})
+    columns = product(loaded.scenario.needed_functions(), ("_now", "_then"))
     for name in table.attributes:
         if name not in known:
-            remedy = did_you_mean(name, known, "measured")
-            raise InputError(f"nothing measures {shown(name)}", file=table.path, remedy=remedy)
+            problem = f"nothing measures {shown(name)}, nor does it end in _now or _then"
+            remedy = did_you_mean(name, [*known, *map("".join, columns)], "columns")
+            raise InputError(problem, file=table.path, remedy=remedy)
 
 
 def _states(
@@ -195,34 +222,61 @@ def _states(
     """Yield the states of missions on which the decision on a function can depend."""
     values = [_values(scale, name, loaded) for name, scale in table.attributes.items()]
     related = table.related(function)
-    designs = [(NO_GROUNDING, *table.designs.get(name, ())) for name in related]
-    objectives = [ObjectiveState(name, UNGROUNDED) for name in related]
-    for measured, reports, now in product(
-        product(*values), _reports(table, loaded), product(*designs)
-    ):
-        groundings = dict(zip(related, now, strict=True))
-        known = dict(zip(table.attributes, measured, strict=True))
-        yield KnowledgeState.of(
-            objectives,
-            groundings={name: each for name, each in groundings.items() if each != NO_GROUNDING},
-            components=dict(reports),
-            measurements={name: value for name, value in known.items() if value is not None},
-        )
+    for task in _tasks(loaded):
+        needed = [name for name in related if name in task]
+        designs = [(NO_GROUNDING, *table.designs.get(name, ())) for name in needed]
+        objectives = [ObjectiveState(name, UNGROUNDED) for name in needed]
+        for measured, reports, now in product(
+            product(*values), _reports(table, loaded) if function in task else (), product(*designs)
+        ):
+            groundings = dict(zip(needed, now, strict=True))
+            known = dict(zip(table.attributes, measured, strict=True))
+            yield KnowledgeState.of(
+                objectives,
+                groundings={
+                    name: each for name, each in groundings.items() if each != NO_GROUNDING
+                },
+                components=dict(reports),
+                measurements={name: value for name, value in known.items() if value is not None},
+            )
+
+
+def _tasks(loaded: LoadedScenario) -> list[tuple[str, ...]]:
+    """Functions that missions need together: at launch, in each task, and after a leak."""
+    scenario = loaded.scenario
+    own = scenario.mission.functions
+    launch = scenario.revision.metacontrol.objectives_at_launch
+    after = [(SURFACE,)] if scenario.leak is not None else []
+    tasks = (
+        (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, *own.search_pipeline),
+        (MAINTAIN_MOTION, FOLLOW_PIPELINE, *own.inspect_pipeline),
+        launch,
+    )
+    return [*((*own.mission_wide, *each) for each in tasks), *after]
 
 
 def _values(scale: Scale, attribute: str, loaded: LoadedScenario) -> list[Decimal | None]:
     """A value at each place of an attribute that is measured, and None."""
-    from suave_des.scenario_knowledge import measured_attributes
-
     is_measured = attribute in measured_attributes(loaded.scenario)
     return [scale.value(place) for place in range(len(scale) if is_measured else 1)]
 
 
-def _reports(table: DecisionTable, loaded: LoadedScenario) -> list[Reports]:
-    """What thrusters can report: once one has failed, recovering makes each report."""
+def _reports(table: DecisionTable, loaded: LoadedScenario) -> Iterator[Reports]:
+    """Yield what components can report: once a thruster has failed, recovering makes each report."""
+    if not table.counts_reports:
+        yield ()
+        return
     events = loaded.scenario.thruster_events
-    failing = {each.thruster for each in events if each.event == "failure"}
-    groups = [each for each in table.settings.interchangeable if set(each) <= table.components]
-    most = len(THRUSTER_NAMES) if failing else 0
-    every = component_reports(groups, (FAILED, RECOVERED), most)
-    return [each for each in every if str(each).count(repr(FAILED)) <= len(failing)]
+    failing = {THRUSTER_NAMES[each.thruster - 1] for each in events if each.event == "failure"}
+    groups = [
+        tuple(filter(THRUSTER_NAMES.__contains__, each)) for each in table.settings.interchangeable
+    ]
+    groups += [(name,) for name in THRUSTER_NAMES if all(name not in each for each in groups)]
+    hull = [(), ((HULL, LEAK),)] if loaded.scenario.leak is not None else [()]
+    every = component_reports(groups, (FAILED, RECOVERED), len(THRUSTER_NAMES) if events else 0)
+    for reports, leak in product(every, hull):
+        failed = {name for name, status in reports if status == FAILED}
+        if all(
+            len(failed.intersection(each)) <= len(failing.intersection(each)) for each in groups
+        ):
+            yield *reports, *leak

@@ -12,16 +12,17 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property, lru_cache
-from math import isfinite
+from math import isfinite, prod
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 from suave_des.domain import THRUSTER_NAMES
-from suave_des.errors import InputError, line_error, shown
+from suave_des.errors import InputError, did_you_mean, line_error, shown
 from suave_des.files import decode, read_bytes
 from suave_des.kb.scale import Scale, TestedRegion, is_in, parse_region
 from suave_des.kb.situations import INCONSISTENT, Outcome, Situation
 from suave_des.kb.space import PolicySpace, Reports
+from suave_des.kb.states import LASTING
 from suave_des.knowledge.reasoner import Regions
 from suave_des.knowledge.state import (
     NO_GROUNDING,
@@ -36,9 +37,10 @@ from suave_des.knowledge.state import (
     grounding_name,
     objective_name,
 )
+from suave_des.monitor.diagnostics import HULL
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.models import DelayDistribution, Period, Strict
-from suave_des.scenario.yamlfile import parse_yaml, validated
+from suave_des.scenario.yamlfile import Layer, parse_yaml, validated
 
 _NOW, _THEN, _COMPONENTS, _AGAIN = "_now", "_then", "components", "again"
 _ANY: Final = "any"
@@ -76,10 +78,10 @@ class TableSettings(Strict):
 
 class _Rule(NamedTuple):
     """What a row says of one function: `others` are the designs of other functions that it asks
-    for.
+    for; None: what rows decide alike for each of these, and so where no row asks for them.
     """
 
-    others: Mapping[str, str]
+    others: Mapping[str, str] | None
     then: str
     line: int
 
@@ -105,20 +107,22 @@ class DecisionTable:
 
     Attributes:
         attributes: quality attributes with the places of their values.
-        components: those of which reports count.
+        counts_reports: whether a decision can depend on what components report.
+        components: the statuses of those in rows, each with a line; the first of a group for all.
         designs: that are in a row, with its line, by function.
     """
 
     path: Path
     settings: TableSettings
     attributes: Mapping[str, Scale]
-    components: frozenset[str]
+    counts_reports: bool
+    components: Mapping[str, Mapping[str, int]]
     designs: Mapping[str, Mapping[str, int]]
     _cells: Mapping[str, Mapping[tuple[int, ...], _Cell]]
 
     def reports(self, components: Iterable[tuple[str, str]]) -> Reports:
         """What components report, with the first of each group in the place of any other."""
-        return _representatives(self.settings.interchangeable, components, self.components)
+        return _representatives(self.settings.interchangeable, components)
 
     def related(self, function: str) -> tuple[str, ...]:
         """Functions on whose designs a function's decisions depend: itself, and maybe others."""
@@ -126,7 +130,7 @@ class DecisionTable:
             itertools.chain.from_iterable(each.values())
             for each in self._cells.get(function, {}).values()
         )
-        others = {name for rule in rules for name in rule.others}
+        others = {name for rule in rules for name in rule.others or ()}
         return function, *sorted(others - {function})
 
     def rule(self, function: str, state: KnowledgeState) -> tuple[str, int]:
@@ -146,7 +150,7 @@ class DecisionTable:
         values = zip(self.attributes.items(), places, strict=True)
         words = [f"{name} {scale.text(place)}" for (name, scale), place in values]
         reports = "; ".join(f"{name}={status}" for name, status in self.reports(state.components))
-        words += [f"components {reports or 'without a report'}"] if self.components else []
+        words += [f"components {reports or 'without a report'}"] if self.counts_reports else []
         nows = (
             f"{name} now {_now(state, name) or '(not needed)'}" for name in self.related(function)
         )
@@ -155,18 +159,22 @@ class DecisionTable:
             f"no row decides {function} where {', '.join([*nows, *words])}",
             file=self.path,
             place=f"beside line {' and '.join(map(str, beside[:2]))}" if beside else None,
-            remedy="add one, or let another cover this; kb policy --max-failed 6 writes all rows",
+            remedy="add one, or let another cover this; kb policy --max-failed 6 writes all rows,"
+            " if they are not too many",
         )
 
     def _found(self, function: str, state: KnowledgeState, places: Sequence[int]) -> _Rule | None:
         cell = self._cells[function].get(tuple(places), {})
         reports = self.reports(state.components)
         now = _now(state, function)
+        alike = None
         for asked in itertools.product((reports, None), (now, None)):
             for rule in cell.get(asked, ()):
-                if all(_now(state, name) == design for name, design in rule.others.items()):
+                if rule.others is None:
+                    alike = alike or rule
+                elif all(_now(state, name) == design for name, design in rule.others.items()):
                     return rule
-        return None
+        return alike
 
     def _beside(self, function: str, state: KnowledgeState, places: Sequence[int]) -> Iterator[int]:
         """Lines that decide in the ranges next to a place."""
@@ -234,15 +242,10 @@ class DecisionTable:
     @property
     def space(self) -> PolicySpace:
         """What it tells apart, for a comparison with others."""
-        groups = [each for each in self.settings.interchangeable if set(each) & self.components]
-        alone = sorted(self.components.difference(*groups))
-        statuses = {
-            status
-            for cells in self._cells.values()
-            for cell in cells.values()
-            for reports, _ in cell
-            for _, status in reports or ()
-        }
+        named = self.components.keys()
+        groups = [each for each in self.settings.interchangeable if set(each) & named]
+        alone = sorted(set(named).difference(*groups))
+        statuses = set(itertools.chain.from_iterable(self.components.values()))
         return PolicySpace(
             tuple(sorted(self.attributes)),
             self._regions.thresholds,
@@ -260,9 +263,9 @@ def _now(state: KnowledgeState, function: str) -> str:
 
 
 def _representatives(
-    groups: Iterable[Sequence[str]], components: Iterable[tuple[str, str]], known: Collection[str]
+    groups: Iterable[Sequence[str]], components: Iterable[tuple[str, str]]
 ) -> Reports:
-    reported = {name: status for name, status in components if name in known}
+    reported = dict(components)
     found = dict[str, str]()
     for group in groups:
         statuses = sorted(reported.pop(name) for name in group if name in reported)
@@ -297,8 +300,10 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
     """
     text = decode(path, read_bytes(path, _LIMIT_BYTES))
     lines = text.splitlines(keepends=True)
-    head = list(itertools.takewhile(lambda line: line.startswith("#"), lines))
-    settings = _settings(path, head, changes or {})
+    head = list(itertools.takewhile(lambda line: line.startswith("#") or not line.strip(), lines))
+    layer = _layer(path, head)
+    layer.data.update(changes or {})
+    settings = validated(layer, TableSettings)
     header, rows = _content(path, lines[len(head) :], len(head))
     read = [
         _row(path, line, dict(zip(header, cells, strict=True)), settings) for line, cells in rows
@@ -307,15 +312,17 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
         remedy = "write a row for each region, as suave-des kb policy --csv does"
         raise line_error(path, len(head) + 1, "has no rows below its header", remedy)
     scales = _scales(header, read)
-    named = {name for row in read for name, _ in row.reports or ()}
-    groups = [each for each in settings.interchangeable if set(each) & named]
+    components = _lines((*each, row.line) for row in read for each in row.reports or ())
+    _check_settings(layer, settings, header, components)
+    designs = _designs(read)
     return DecisionTable(
         path,
         settings,
         scales,
-        frozenset(named.union(*groups)),
-        _designs(read),
-        _cells(path, read, list(scales.values())),
+        any(row.reports is not None for row in read),
+        components,
+        designs,
+        _cells(path, read, list(scales.values()), designs),
     )
 
 
@@ -329,14 +336,42 @@ def _scales(header: Iterable[str], rows: Sequence[_Row]) -> dict[str, Scale]:
     return found
 
 
-def _settings(path: Path, head: Sequence[str], changes: Mapping[str, object]) -> TableSettings:
-    text = "".join(line[1:].removeprefix(" ") for line in head)
-    if any(line.strip() and not line.startswith("#") for line in text.splitlines()):
-        layer = parse_yaml(text, path)
-    else:
-        layer = parse_yaml("{}", path)
-    layer.data.update(changes)
-    return validated(layer, TableSettings)
+def _layer(path: Path, head: Sequence[str]) -> Layer:
+    text = "".join(line.removeprefix("#").removeprefix(" ") for line in head)
+    if all(line.startswith("#") or not line.strip() for line in text.splitlines()):
+        text = "{}"
+    try:
+        return parse_yaml(text, path)
+    except InputError as error:
+        remedy = (
+            "lines that begin with # are settings, such as # latency_s: 0.2; a note is # # note"
+        )
+        raise InputError(error.problem, file=path, place=error.place, remedy=remedy) from None
+
+
+def _check_settings(
+    layer: Layer, settings: TableSettings, header: Iterable[str], components: Iterable[str]
+) -> None:
+    functions = [name.removesuffix(_THEN) for name in header if name.endswith(_THEN)]
+    for number, name in enumerate(settings.order):
+        if name not in functions:
+            problem = f"no column decides a function {shown(name)}"
+            raise layer.error(problem, ("order", number), did_you_mean(name, functions))
+    if settings.functions_at_a_time is not None and settings.functions_at_a_time < 1:
+        problem = f"{settings.functions_at_a_time} functions cannot change"
+        raise layer.error(
+            problem, ("functions_at_a_time",), "write 1 or more; leave it out for all of them"
+        )
+    known = [*THRUSTER_NAMES, HULL, *components]
+    groups = settings.interchangeable
+    for name in (members := list(itertools.chain.from_iterable(groups))):
+        if name not in known:
+            problem, remedy = f"there is no component {shown(name)}", did_you_mean(name, known)
+        elif members.count(name) > 1:
+            problem, remedy = f"{shown(name)} is there twice", "name each component once"
+        else:
+            continue
+        raise layer.error(problem, ("interchangeable",), remedy)
 
 
 def _content(
@@ -361,6 +396,8 @@ def _content(
 
 
 def _check_header(path: Path, line: int, header: Sequence[str]) -> None:
+    if len(header) == 1 and any(sign in header[0] for sign in ";\t"):
+        raise line_error(path, line, "the header has one column", "write commas between the cells")
     for name in header:
         if header.count(name) > 1 or not name:
             problem = f"the column {shown(name)} is there twice" if name else "a column has no name"
@@ -398,7 +435,11 @@ def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSetting
             raise line_error(path, line, problem, f"write a design, {STAYS} or {shown(NONE_LEFT)}")
     reports = _reports(path, line, cells.get(_COMPONENTS, _ANY), settings)
     now = by_function(_NOW)
-    for function in map(str.strip, cells.get(_AGAIN, "").split(";")):
+    for function in filter(None, map(str.strip, cells.get(_AGAIN, "").split(";"))):
+        if f"{function}{_THEN}" not in cells:
+            functions = [name.removesuffix(_THEN) for name in cells if name.endswith(_THEN)]
+            problem = f"{_AGAIN}: no column decides a function {shown(function)}"
+            raise line_error(path, line, problem, did_you_mean(function, functions))
         if then.get(function) == STAYS and function in now:
             then[function] = now[function]
     return _Row(line, tuple(regions), reports, now, then)
@@ -428,21 +469,31 @@ def _reports(path: Path, line: int, text: str, settings: TableSettings) -> Repor
             )
             raise line_error(path, line, f"components: {shown(text)} is no report", remedy)
     reported = [(name.strip(), status.strip()) for name, _, status in pairs]
-    known = [name for name, _ in reported]
-    return _representatives(settings.interchangeable, reported, known)
+    return _representatives(settings.interchangeable, reported)
 
 
 def _designs(rows: Iterable[_Row]) -> dict[str, dict[str, int]]:
+    return _lines(
+        (function, design, row.line)
+        for row in rows
+        for function, design in (*row.then.items(), *row.now.items())
+        if design not in ("", STAYS, NONE_LEFT, NO_GROUNDING)
+    )
+
+
+def _lines(named: Iterable[tuple[str, str, int]]) -> dict[str, dict[str, int]]:
+    """The first line of each pair of names."""
     found: dict[str, dict[str, int]] = {}
-    for row in rows:
-        for function, design in (*row.then.items(), *row.now.items()):
-            if design not in ("", STAYS, NONE_LEFT, NO_GROUNDING):
-                found.setdefault(function, {}).setdefault(design, row.line)
+    for one, other, line in named:
+        found.setdefault(one, {}).setdefault(other, line)
     return found
 
 
 def _cells(
-    path: Path, rows: Iterable[_Row], scales: Sequence[Scale]
+    path: Path,
+    rows: Iterable[_Row],
+    scales: Sequence[Scale],
+    designs: Mapping[str, Collection[str]],
 ) -> dict[str, dict[tuple[int, ...], _Cell]]:
     found: dict[str, dict[tuple[int, ...], _Cell]] = {}
     number = 0
@@ -462,10 +513,36 @@ def _cells(
     for function, cells in found.items():
         for cell in cells.values():
             _check_overlaps(path, function, cell)
-            for asked, rules in cell.items():
-                if len({rule.then for rule in rules}) == 1:  # whatever the others are
-                    cell[asked] = [rules[0]._replace(others={})]
+            for rules in cell.values():
+                if _are_alike(function, rules, designs):
+                    rules.append(rules[0]._replace(others=None))
     return found
+
+
+def _are_alike(
+    function: str, rules: Sequence[_Rule], designs: Mapping[str, Collection[str]]
+) -> bool:
+    """Return whether rules decide alike for every design of the other functions that they ask for.
+
+    kb policy lists no state before a task, nor those with several functions besides the lasting
+    ones: there, too, what they decide alike holds.
+    """
+    by_needed: dict[frozenset[str], set[tuple[str, ...]]] = {}
+    names = sorted({name for rule in rules for name in rule.others or ()})
+    for rule in rules:
+        asked = {name: (rule.others or {}).get(name, "") for name in names}
+        needed = frozenset(filter(asked.get, names))
+        by_needed.setdefault(needed, set()).add(tuple(asked.values()))
+    never = set(names).difference(*by_needed)
+    return (
+        len({rule.then for rule in rules}) == 1
+        and not (never and function in LASTING)
+        and never.isdisjoint(LASTING)
+        and all(
+            len(found) == prod(1 + len(designs.get(name, ())) for name in needed)
+            for needed, found in by_needed.items()
+        )
+    )
 
 
 @lru_cache(maxsize=4096)
@@ -488,7 +565,8 @@ def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
         ):
             if rule.then == other.then:
                 continue
-            if all(other.others.get(name, now) == now for name, now in rule.others.items()):
+            asked = other.others or {}
+            if all(asked.get(name, now) == now for name, now in (rule.others or {}).items()):
                 first, second = sorted((rule, other), key=lambda each: each.line)
                 both = f"{second.then} here, and {first.then} in line {first.line}"
                 remedy = (

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import partial, reduce
 
-from suave_des.errors import did_you_mean, line_error, shown
+from suave_des.errors import InputError, did_you_mean, line_error, shown
 from suave_des.kb.decision_table import DecisionTable
 from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.situations import Decide, OnCount
+from suave_des.kb.situations import Decide, OnCount, Outcome, Situation
 from suave_des.kb.space import PolicySpace, States, decide_all
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import regions_of
@@ -39,12 +39,20 @@ def compare_deciders(
     for each in both:
         if isinstance(each, DecisionTable):
             _check_designs(each, knowledge.base)
-            decide.append(each.outcome)
+            decide.append(partial(_outcome, each))
         else:
             decide.append(decide_all(each.base, states, each.outcome, on_count))
     bases = [each.base for each in both if not isinstance(each, DecisionTable)]
     no_proof = dict.fromkeys(reason for base in bases for reason in regions_of(base).reasons)
     return compare_decisions(states, decide[0], decide[1], tuple(no_proof), infer=False)
+
+
+def _outcome(table: DecisionTable, situation: Situation) -> Outcome:
+    try:
+        return table.outcome(situation)
+    except InputError as error:
+        remedy = "kb diff compares all designs of the ontology as now: add a row, or write any"
+        raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
 
 
 def _check_designs(table: DecisionTable, base: Ontology) -> None:

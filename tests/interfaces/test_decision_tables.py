@@ -12,6 +12,8 @@ from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.errors import InputError
 from suave_des.kb.decision_table import read_table
 from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.table_difference import compare_deciders
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.registry import is_built_in
 
 VISIBILITY = "signals.water_visibility"
@@ -252,6 +254,74 @@ UNUSABLE = {
 }  # fmt: skip
 
 
+BY_REPORT = """components,f_generate_search_path_then,f_maintain_motion_then,f_follow_pipeline_then
+any,fd_spiral_low,,fd_follow_pipeline
+,,fd_all_thrusters,
+"""
+FAILED = BY_REPORT + "c_thruster_1=FALSE,,fd_recover_thrusters,\n"
+BY_OTHER = """f_generate_search_path_now,components,f_generate_search_path_then,f_maintain_motion_then,f_follow_pipeline_then
+any,any,fd_spiral_low,,fd_follow_pipeline
+fd_spiral_high,any,,fd_all_thrusters,
+fd_spiral_low,c_thruster_1=FALSE,,fd_recover_thrusters,
+"""
+UNUSABLE |= {
+    "no row for a report": (
+        BY_REPORT,
+        "no row decides f_maintain_motion where f_maintain_motion now ungrounded, components "
+        "c_thruster_1=FALSE",
+    ),
+    "no row for a component outside groups": (
+        "# interchangeable: []\n" + FAILED,
+        "no row decides f_maintain_motion where f_maintain_motion now ungrounded, components "
+        "c_thruster_6=RECOVERED",
+    ),
+    "no row for another function's design": (
+        BY_OTHER,
+        "no row decides f_maintain_motion where f_maintain_motion now ungrounded, "
+        "f_generate_search_path now ungrounded, components without a report",
+    ),
+    "unknown component": (
+        FAILED.replace("thruster_1=", "truster_1="),
+        "line 4: there is no component c_truster_1 (did you mean c_thruster_1?",
+    ),
+    "unknown status": (
+        FAILED.replace("=FALSE", "=FALS"),
+        "line 4: c_thruster_1 never reports FALS (did you mean FALSE?",
+    ),
+    "unknown component in a group": (
+        "# interchangeable: [[c_thruster_1, c_truster_2]]\n" + PLAIN,
+        "line 1, interchangeable: there is no component c_truster_2 (did you mean c_thruster_2?",
+    ),
+    "component twice in groups": (
+        "# interchangeable: [[c_thruster_1], [c_thruster_1]]\n" + PLAIN,
+        "line 1, interchangeable: c_thruster_1 is there twice",
+    ),
+    "unknown function in the order": (
+        "# order: [f_maintain_moton]\n" + PLAIN,
+        "line 1, order[0]: no column decides a function f_maintain_moton (did you mean f_maintain_motion?",
+    ),
+    "unknown function requested again": (
+        "again,f_maintain_motion_then\nf_maintain_moton,stays\n",
+        "line 2: again: no column decides a function f_maintain_moton (did you mean f_maintain_motion?",
+    ),
+    "no function at a time": (
+        "# functions_at_a_time: 0\n" + PLAIN,
+        "line 1, functions_at_a_time: 0 functions cannot change (write 1 or more; leave it out for all",
+    ),
+    "note among settings": (
+        "# a table of mine\n" + SETTINGS + PLAIN,
+        "lines that begin with # are settings, such as # latency_s: 0.2; a note is # # note",
+    ),
+    "semicolons": (PLAIN.replace(",", ";"), "line 1: the header has one column (write commas"),
+    "tabs": (PLAIN.replace(",", "\t"), "line 1: the header has one column (write commas"),
+    "unknown ending": (
+        PLAIN.replace("water_visibility", "f_follow_pipeline_nwo"),
+        "nor does it end in _now or _then (did you mean f_follow_pipeline_now?",
+    ),
+    "word in capitals": (PLAIN.replace("fd_spiral_low", "Stays"), "(did you mean stays?"),
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(("text", "said"), UNUSABLE.values(), ids=UNUSABLE)
 def test_a_table_that_cannot_be_used_is_refused_before_any_mission(text, said, table):
     manager = table(text)
@@ -270,3 +340,35 @@ def test_a_table_for_fewer_reports_than_a_mission_can_have_is_refused(own_table,
     few = [line for line in own_table.read_text().splitlines(True) if line.count("c_thruster") < 3]
     with pytest.raises(InputError, match="--max-failed 6"):
         run_campaign("seams2023", [table("".join(few))], 1)
+
+
+def decided(file, now, **components):
+    """What becomes of f_maintain_motion while the search has a design, and by which line."""
+    objectives = [ObjectiveState("f_maintain_motion"), ObjectiveState("f_generate_search_path")]
+    state = KnowledgeState.of(
+        objectives, groundings={"f_generate_search_path": now}, components=components
+    )
+    return read_table(file).rule("f_maintain_motion", state)
+
+
+def test_a_row_decides_where_a_narrower_one_asks_for_another_functions_design(table):
+    file = Path(table(BY_OTHER).removeprefix("table:"))
+    assert decided(file, "fd_spiral_high", c_thruster_1="FALSE") == ("fd_all_thrusters", 3)
+    assert decided(file, "fd_spiral_low", c_thruster_4="FALSE") == ("fd_recover_thrusters", 4)
+    with pytest.raises(InputError, match="f_generate_search_path now fd_spiral_medium"):
+        decided(file, "fd_spiral_medium", c_thruster_1="FALSE")
+
+
+def test_a_blank_line_between_settings_and_header_is_skipped(table):
+    file = Path(table(f"# latency_s: 0.25\n\n# period_s: 2\n\n{PLAIN}").removeprefix("table:"))
+    settings = read_table(file).settings
+    assert (settings.latency_s, settings.period_s) == (0.25, 2.0)
+
+
+def test_a_comparison_says_which_states_a_table_has_to_decide(table):
+    file = Path(
+        table(PLAIN.replace(",any,fd_spiral_medium", ",,fd_spiral_medium")).removeprefix("table:")
+    )
+    base = KnowledgeBase.load()
+    with pytest.raises(InputError, match="all designs of the ontology as now"):
+        compare_deciders(base, [base, read_table(file)], 1, lambda *_: None)
