@@ -6,10 +6,10 @@ docs/guides/managers.md.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from decimal import Decimal
 from functools import cache, lru_cache
-from itertools import product
+from itertools import chain, product
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar
@@ -221,23 +221,19 @@ def _states(
 ) -> Iterator[KnowledgeState]:
     """Yield the states of missions on which the decision on a function can depend."""
     values = [_values(scale, name, loaded) for name, scale in table.attributes.items()]
-    related = table.related(function)
     for task in _tasks(loaded):
-        needed = [name for name in related if name in task]
+        needed = list(filter(task.__contains__, table.related(function)))
         designs = [(NO_GROUNDING, *table.designs.get(name, ())) for name in needed]
         objectives = [ObjectiveState(name, UNGROUNDED) for name in needed]
-        for measured, reports, now in product(
-            product(*values), _reports(table, loaded) if function in task else (), product(*designs)
-        ):
-            groundings = dict(zip(needed, now, strict=True))
-            known = dict(zip(table.attributes, measured, strict=True))
+        reported = _reports(table, loaded) if function in task else ()
+        for measured, reports, now in product(product(*values), reported, product(*designs)):
+            known = zip(table.attributes, measured, strict=True)
+            grounded = zip(needed, now, strict=True)
             yield KnowledgeState.of(
                 objectives,
-                groundings={
-                    name: each for name, each in groundings.items() if each != NO_GROUNDING
-                },
+                groundings={name: each for name, each in grounded if each != NO_GROUNDING},
                 components=dict(reports),
-                measurements={name: value for name, value in known.items() if value is not None},
+                measurements={name: value for name, value in known if value is not None},
             )
 
 
@@ -262,21 +258,25 @@ def _values(scale: Scale, attribute: str, loaded: LoadedScenario) -> list[Decima
 
 
 def _reports(table: DecisionTable, loaded: LoadedScenario) -> Iterator[Reports]:
-    """Yield what components can report: once a thruster has failed, recovering makes each report."""
+    """Yield what components can report: once a thruster has failed, recovering makes each
+    report.
+    """
     if not table.counts_reports:
         yield ()
         return
     events = loaded.scenario.thruster_events
     failing = {THRUSTER_NAMES[each.thruster - 1] for each in events if each.event == "failure"}
-    groups = [
-        tuple(filter(THRUSTER_NAMES.__contains__, each)) for each in table.settings.interchangeable
-    ]
-    groups += [(name,) for name in THRUSTER_NAMES if all(name not in each for each in groups)]
+    groups = _groups(table.settings.interchangeable)
     hull = [(), ((HULL, LEAK),)] if loaded.scenario.leak is not None else [()]
     every = component_reports(groups, (FAILED, RECOVERED), len(THRUSTER_NAMES) if events else 0)
     for reports, leak in product(every, hull):
         failed = {name for name, status in reports if status == FAILED}
-        if all(
-            len(failed.intersection(each)) <= len(failing.intersection(each)) for each in groups
-        ):
+        if all(len(failed & group) <= len(failing & group) for group in map(set, groups)):
             yield *reports, *leak
+
+
+def _groups(interchangeable: Iterable[Iterable[str]]) -> list[tuple[str, ...]]:
+    """Return the thrusters in groups of interchangeable ones; any other is one by itself."""
+    groups = [tuple(filter(THRUSTER_NAMES.__contains__, each)) for each in interchangeable]
+    grouped = set(chain.from_iterable(groups))
+    return [*groups, *((name,) for name in THRUSTER_NAMES if name not in grouped)]

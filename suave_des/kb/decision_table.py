@@ -365,13 +365,13 @@ def _check_settings(
     known = [*THRUSTER_NAMES, HULL, *components]
     groups = settings.interchangeable
     for name in (members := list(itertools.chain.from_iterable(groups))):
+        place = ("interchangeable",)
         if name not in known:
-            problem, remedy = f"there is no component {shown(name)}", did_you_mean(name, known)
-        elif members.count(name) > 1:
-            problem, remedy = f"{shown(name)} is there twice", "name each component once"
-        else:
-            continue
-        raise layer.error(problem, ("interchangeable",), remedy)
+            problem = f"there is no component {shown(name)}"
+            raise layer.error(problem, place, did_you_mean(name, known))
+        if members.count(name) > 1:
+            problem = f"{shown(name)} is there twice"
+            raise layer.error(problem, place, "name each component once")
 
 
 def _content(
@@ -412,6 +412,17 @@ def _attributes(header: Iterable[str]) -> list[str]:
     return [name for name in header if name not in others and not name.endswith((_NOW, _THEN))]
 
 
+def _check_decisions(path: Path, line: int, then: Mapping[str, str]) -> None:
+    """Check that a row decides something."""
+    if not then:
+        remedy = f"write a design, {STAYS} or {shown(NONE_LEFT)} in a column that ends in {_THEN}"
+        raise line_error(path, line, "decides nothing", remedy)
+    for function, design in then.items():
+        if design in (INCONSISTENT, NO_GROUNDING):
+            problem = f"{function}: {shown(design)} is no decision"
+            raise line_error(path, line, problem, f"write a design, {STAYS} or {shown(NONE_LEFT)}")
+
+
 def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSettings) -> _Row:
     def by_function(ending: str) -> dict[str, str]:
         found = {name: cell.strip() for name, cell in cells.items() if name.endswith(ending)}
@@ -426,13 +437,7 @@ def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSetting
                 error.problem, file=path, place=f"line {line}, {name}", remedy=error.remedy
             ) from None
     then = {name: design for name, design in by_function(_THEN).items() if design}
-    if not then:
-        remedy = f"write a design, {STAYS} or {shown(NONE_LEFT)} in a column that ends in {_THEN}"
-        raise line_error(path, line, "decides nothing", remedy)
-    for function, design in then.items():
-        if design in (INCONSISTENT, NO_GROUNDING):
-            problem = f"{function}: {shown(design)} is no decision"
-            raise line_error(path, line, problem, f"write a design, {STAYS} or {shown(NONE_LEFT)}")
+    _check_decisions(path, line, then)
     reports = _reports(path, line, cells.get(_COMPONENTS, _ANY), settings)
     now = by_function(_NOW)
     for function in filter(None, map(str.strip, cells.get(_AGAIN, "").split(";"))):
@@ -527,22 +532,24 @@ def _are_alike(
     kb policy lists no state before a task, nor those with several functions besides the lasting
     ones: there, too, what they decide alike holds.
     """
-    by_needed: dict[frozenset[str], set[tuple[str, ...]]] = {}
-    names = sorted({name for rule in rules for name in rule.others or ()})
+    if len({rule.then for rule in rules}) > 1:
+        return False
+    by_needed: dict[frozenset[str], set[tuple[tuple[str, str], ...]]] = {}
+    never = set[str]()
     for rule in rules:
-        asked = {name: (rule.others or {}).get(name, "") for name in names}
-        needed = frozenset(filter(asked.get, names))
-        by_needed.setdefault(needed, set()).add(tuple(asked.values()))
-    never = set(names).difference(*by_needed)
-    return (
-        len({rule.then for rule in rules}) == 1
-        and not (never and function in LASTING)
-        and never.isdisjoint(LASTING)
-        and all(
-            len(found) == prod(1 + len(designs.get(name, ())) for name in needed)
-            for needed, found in by_needed.items()
-        )
-    )
+        asked = sorted((rule.others or {}).items())
+        never.update(name for name, _ in asked)
+        needed = tuple((name, now) for name, now in asked if now)
+        by_needed.setdefault(frozenset(name for name, _ in needed), set()).add(needed)
+    never.difference_update(*by_needed)
+    if never and not never.union([function]).isdisjoint(LASTING):
+        return False
+    return all(len(found) == _choices(needed, designs) for needed, found in by_needed.items())
+
+
+def _choices(functions: Iterable[str], designs: Mapping[str, Collection[str]]) -> int:
+    """Count the combinations of designs of functions, or none, that a table has."""
+    return prod(1 + len(designs.get(name, ())) for name in functions)
 
 
 @lru_cache(maxsize=4096)
