@@ -25,6 +25,7 @@ from suave_des import InputError, Mission
 from suave_des.campaign.campaign import CampaignInterrupted, fly_campaign
 from suave_des.campaign.missions import Campaign, Finished, MissionKey
 from suave_des.errors import MissionError
+from suave_des.interfaces.client import ClientManager
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
 from tests.helpers.command import command_here, wait_until
 
@@ -124,6 +125,12 @@ def client() -> Iterator[Client]:
     with served() as (_, client):
         client.advance(1.0)
         yield client
+
+
+@pytest.fixture
+def no_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no server in this process, though one serves the tests before."""
+    monkeypatch.setattr(ClientManager, "call", None)
 
 
 def other(client: Client, **options: object) -> Client:
@@ -412,8 +419,8 @@ def test_a_client_may_leave_in_the_middle_of_a_call(client, capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_client_that_reads_nothing_holds_nobody_up(client):
-    with other(client, max_queue=1, close_timeout=0.1) as one:
+def test_a_client_that_reads_nothing_holds_nobody_up():
+    with served() as (_, client), other(client, max_queue=1, close_timeout=0.1) as one:
         one.send("subscribe", topic="/mavros/local_position/pose")
         client.advance(100.0)
         assert client.call(f"/{MOTION}/get_mode")
@@ -479,6 +486,7 @@ def test_a_port_in_use_is_bad_input(client):
         pass
 
 
+@pytest.mark.usefixtures("no_server")
 @pytest.mark.parametrize(
     "words",
     [
@@ -504,6 +512,7 @@ def test_the_rest_of_an_interrupted_campaign_is_not_said_to_be_for_another_comma
     assert "--resume" not in str(raised.value)
 
 
+@pytest.mark.usefixtures("no_server")
 def test_without_a_server_a_mission_has_no_client():
     with pytest.raises(MissionError, match="are clients of a server"):
         Mission("seams2023", "client:x").advance(10.0)
