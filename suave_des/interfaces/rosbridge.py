@@ -225,12 +225,12 @@ class Bridge:
         """Accept clients."""
         with usable(self._host, self.port):
             self._runner.run(self._open())
-        ClientManager.call = self._call
+        ClientManager.bridges.add(self)
         return self
 
     def __exit__(self, *_: object) -> None:
         """Send what is left to send, and close all connections."""
-        ClientManager.call = None
+        ClientManager.bridges.discard(self)
         self._runner.run(self._close())
         self._runner.close()
 
@@ -249,6 +249,8 @@ class Bridge:
         """Fly a mission with whoever is connected."""
         self._session = Session(simulator, run, seed, self._factor, manager, record)
         self._mission = mission = self._session.mission
+        assert isinstance(mission.manager, ClientManager)
+        mission.manager.call = self._call
         self._joined_s = time.monotonic()
         self._in_force = dict.fromkeys(mission.modes, DEFAULT_MODE)
         self._is_detected = False

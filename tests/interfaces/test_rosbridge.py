@@ -130,7 +130,7 @@ def client() -> Iterator[Client]:
 @pytest.fixture
 def no_server(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have no server in this process, though one serves the tests before."""
-    monkeypatch.setattr(ClientManager, "call", None)
+    monkeypatch.setattr(ClientManager, "bridges", set())
 
 
 def other(client: Client, **options: object) -> Client:
@@ -438,6 +438,17 @@ def test_a_client_that_asks_and_reads_nothing_is_forgotten_when_it_leaves():
             one.send("call_service", service=f"/{MOTION}/get_mode")
             time.sleep(0.1)
         wait_until(lambda: len(server.bridge._clients) == 1, 10.0)
+
+
+def test_a_mission_goes_on_when_another_server_of_the_process_has_ended():
+    with served() as (_, client):
+        with served(values=SHORT):
+            pass
+        client.advance(1.0)
+        client.call(f"/{SEARCH}/change_mode", mode_name=HIGH)
+        client.advance(100.0)  # the pipeline is found at 81 s
+        found = client.call("/f_follow_pipeline/get_mode")
+        assert found["target_mode"] == "fd_follow_pipeline"
 
 
 def test_clients_that_connect_twice_see_the_same_mission_and_each_other(client):
