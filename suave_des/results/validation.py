@@ -791,18 +791,21 @@ class PaperComparison:
         return "\n\n".join([self.table().markdown(), *map(markdown_text, self.remarks())]) + "\n"
 
 
+_OTHERS = "the paper's other managers"
+
+
 def _claim_of_time(less_others: Sequence[float]) -> str:
     """Say whether metacontrol's search times, less those of each other, are as the paper says."""
     if max(less_others) < 0.0:
-        return "As in the paper, metacontrol finds the pipeline sooner than the others"
-    return "Unlike in the paper, metacontrol does not find the pipeline sooner than all others"
+        return f"As in the paper, metacontrol finds the pipeline sooner than {_OTHERS}"
+    return f"Unlike in the paper, metacontrol does not find the pipeline sooner than all {_OTHERS}"
 
 
 def _claim_of_distance(less_others: Sequence[float]) -> str:
     """Say whether metacontrol's distances, less those of each other, are as the paper says."""
     if min(less_others) > 0.0:
-        return "As in the paper, metacontrol inspects more of it than the others"
-    return "Unlike in the paper, metacontrol does not inspect more of it than all others"
+        return f"As in the paper, metacontrol inspects more of it than {_OTHERS}"
+    return f"Unlike in the paper, metacontrol does not inspect more of it than all {_OTHERS}"
 
 
 @plain_arguments

@@ -107,30 +107,30 @@ def claims(found):
         (
             {},
             [
-                "As in the paper, metacontrol finds the pipeline sooner than the others, on average.",
-                "As in the paper, metacontrol inspects more of it than the others, on average.",
+                "As in the paper, metacontrol finds the pipeline sooner than the paper's other managers, on average.",
+                "As in the paper, metacontrol inspects more of it than the paper's other managers, on average.",
             ],
         ),
         (
             {"random": [(90, 20, 0), (92, 21, 0)]},
             [
-                "Unlike in the paper, metacontrol does not find the pipeline sooner than all others, on average.",
-                "As in the paper, metacontrol inspects more of it than the others, on average.",
+                "Unlike in the paper, metacontrol does not find the pipeline sooner than all the paper's other managers, on average.",
+                "As in the paper, metacontrol inspects more of it than the paper's other managers, on average.",
             ],
         ),
         (
             {"none": [(200, 50, 0), (202, 51, 0)]},
             [
-                "As in the paper, metacontrol finds the pipeline sooner than the others, on average.",
-                "Unlike in the paper, metacontrol does not inspect more of it than all others, on average.",
+                "As in the paper, metacontrol finds the pipeline sooner than the paper's other managers, on average.",
+                "Unlike in the paper, metacontrol does not inspect more of it than all the paper's other managers, on average.",
             ],
         ),
         (
             {"random": [(90, 20, 0), (130, 21, 0)]},
             [
-                "As in the paper, metacontrol finds the pipeline sooner than the others, on average;"
+                "As in the paper, metacontrol finds the pipeline sooner than the paper's other managers, on average;"
                 " the difference from random could be chance.",
-                "As in the paper, metacontrol inspects more of it than the others, on average.",
+                "As in the paper, metacontrol inspects more of it than the paper's other managers, on average.",
             ],
         ),
     ],
