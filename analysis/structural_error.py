@@ -3,8 +3,8 @@
 The vehicle and the software are fitted to experiment 1 of 2025 without one of its conditions, and
 without one of its managers, for each choice, from the middle of the bounds; what was left out is
 predicted. Values that reaction times alone decide are not fitted, and random is not fitted to: what
-it does differs from run to run by far more than with any parameter. That failures before 26 s have
-no effect was seen in condition 6, under `none`, and is assumed only where these are fitted to.
+it does differs from run to run by far more than with any parameter. That failures are lost was seen
+under `none`, and is assumed only where its missions are fitted to.
 split_check.py does the same for the managers of 2023.
 
 Writes deviations.csv, with a row for each manager, condition and metric that was left out.
@@ -39,9 +39,9 @@ from suave_des import with_values
 
 METRICS = ("search_time_s", "distance_inspected_m", "mean_reaction_time_s")
 NOT_FITTED = ("latencies.inference_s.mean", "latencies.mode_change_s")
-SEEN_IN = ("none", 6)
-"""Manager and condition without which nothing says that early failures have no effect."""
-WITHOUT_EFFECT = "revision.thruster_failures.effective_from_s"
+SEEN_IN = "none"
+"""The manager without which nothing says that failures are lost: the others recover thrusters."""
+LOST = "revision.thruster_failures.loss_probability"
 FOLDER = Path(__file__).with_suffix("")
 CONFIDENCE = 0.9
 WHOLE = "managers over all conditions"
@@ -53,9 +53,8 @@ def predicted(
     case: Case, seen: Case, runs: int, evaluations: int, workers: int
 ) -> pandas.DataFrame:
     """Fit to some missions of a case; missions of the whole case with the best values."""
-    makers = seen.real[["manager", "condition"]].itertuples(index=False, name=None)
-    if SEEN_IN not in set(makers):
-        every = {WITHOUT_EFFECT: 0.0}
+    if SEEN_IN not in set(seen.real["manager"]):
+        every = {LOST: 0.0}
         case, seen = (
             replace(each, loaded=with_values(each.loaded, every)) for each in (case, seen)
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import itertools
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property, lru_cache
 from math import isfinite, prod
@@ -193,10 +193,14 @@ class DecisionTable:
         return Inference(state, lambda _: frozenset(), frozenset(), objectives, groundings)
 
     def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
-        """Look the decisions up: as many as are made at a time."""
+        """Look the decisions up: as many as are made at a time.
+
+        As in metacontrol, the state at the beginning says which functions are adapted, and the values
+        that are measured by now say to what.
+        """
         decisions = []
         changes = 0
-        for decision in self._decisions(inference.state):
+        for decision in self._decisions_by_now(inference):
             if decision.design not in (None, inference.state.grounded(decision.function)):
                 changes += 1
                 if changes > (self.settings.functions_at_a_time or changes):
@@ -208,6 +212,14 @@ class DecisionTable:
         """All that is decided in a situation."""
         decisions = tuple(self._decisions(situation.state))
         return Outcome(Reasoning(self.analyze(situation.state), Plan(decisions)))
+
+    def _decisions_by_now(self, inference: Inference) -> list[Decision]:
+        decisions = list(self._decisions(inference.state))
+        if inference.measured_since is None or not self.settings.as_metacontrol:
+            return decisions
+        adapted = {each.function for each in decisions}
+        now = replace(inference.state, measurements=inference.measured_since)
+        return [each for each in self._decisions(now) if each.function in adapted]
 
     def _decisions(self, state: KnowledgeState) -> Iterator[Decision]:
         order = {name: place for place, name in enumerate(self.settings.order)}

@@ -274,7 +274,7 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
         for expected in _expected(inference, design, attribute):
             for left, sign, right in _worse(inference, attribute, expected, required):
                 yield f"{attribute} {left} expected {sign} {right} required"
-    measured = dict(inference.state.measurements)
+    measured = inference.measurements
     for attribute, expected in _values(inference, design, "hasQAestimation"):
         if attribute in measured:
             for left, sign, right in _worse(inference, attribute, measured[attribute], expected):

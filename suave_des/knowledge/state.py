@@ -199,6 +199,8 @@ class Inference:
         facts: the inferred facts, none of which is asserted.
         objectives: name of a function's objective, by the function's name.
         groundings: name of a function design's grounding, by the design's name.
+        measured_since: values that were measured while the reasoner inferred, with which designs are
+            chosen; None: those of the state.
     """
 
     state: KnowledgeState
@@ -206,6 +208,12 @@ class Inference:
     facts: frozenset[Fact]
     objectives: Mapping[str, str] = field(compare=False, repr=False)
     groundings: Mapping[str, str] = field(compare=False, repr=False)
+    measured_since: tuple[tuple[str, Decimal], ...] | None = None
+
+    @property
+    def measurements(self) -> dict[str, Decimal]:
+        """The measured values with which designs are chosen."""
+        return dict(self.state.measurements if self.measured_since is None else self.measured_since)
 
     @cached_property
     def asserted(self) -> frozenset[Fact]:
@@ -295,6 +303,11 @@ class Plan:
     """Decisions for the objectives to adapt, by function name."""
 
     decisions: tuple[Decision, ...] = ()
+
+    @cached_property
+    def designs(self) -> dict[str, str | None]:
+        """The chosen function designs, by function; None: no one is left."""
+        return {each.function: each.design for each in self.decisions}
 
     @cached_property
     def without_design(self) -> frozenset[str]:

@@ -135,8 +135,11 @@ class System:
         """Draw when a periodic timer of the manager first ticks in this run.
 
         Nodes start at arbitrary times; a timer that the scenario's revision has in step with others
-        ticks with them.
+        ticks with them. Metacontrol's may be given.
         """
+        given = self.scenario.managers.metacontrol.first_cycle_s
+        if timer == "metacontrol" and given is not None:
+            return given
         in_step = timer in self.scenario.revision.timers_in_step
         return period_s if in_step else self.stream(f"{timer}/phase").uniform(0.0, period_s)
 
@@ -168,6 +171,8 @@ class ManagingSubsystem:
         system: what the manager sees and can do.
         period_s: time between calls of `adapt`; None: never called.
         starts_s: mission time of the first call of `adapt`.
+        reads_for_s: for how long after its beginning a call of `adapt` may still read measured
+            values, of an event-triggered manager.
         reasoning_time_s: mission time that reasoning took before adaptations; a further metric.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the
             first one, and a reasoner runs beside the simulator, which slows it down
@@ -180,8 +185,8 @@ class ManagingSubsystem:
     its hooks were called with, and on how measured values compare with fixed thresholds, may be
     event-triggered, and declares it by `depends_on`. It is not called at all of its times: after a
     call of `adapt` that returned None, or a generator that returned True (another call right then
-    would change nothing), the next one is at the first of its times after a hook was called, or a
-    measured value has crossed a threshold. The mission is the same, with two exceptions: an event
+    would change nothing), the next one is at the first of its times after a hook was called, or
+    such that a measured value has crossed a threshold before the call has read it. The mission is the same, with two exceptions: an event
     at the very time of a call may come before it; and something may happen during a call that
     changes nothing but takes time.
 
@@ -200,6 +205,7 @@ class ManagingSubsystem:
     subscribes_to: ClassVar[Collection[Kind]] = EXEMPLAR_KINDS
     period_s: float | None = None
     starts_s: float = 0.0
+    reads_for_s: float = 0.0
     reasoning_time_s: float = 0.0
 
     @classmethod

@@ -5,9 +5,12 @@ Source: the two trees of kas-lab/suave 1.5.0; suave_extended.xml is the one that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
+
+import numpy as np
 
 from suave_des.domain import (
     BATTERY_LEVEL,
@@ -23,6 +26,20 @@ from suave_des.domain import (
 from suave_des.managing.base import Dependencies, System
 from suave_des.managing.simple import RemembersFailures
 from suave_des.scenario.models import draw
+
+ON_THE_WAY = "normal"
+"""Mode in which the vehicle goes to the recharge station."""
+
+
+def least_that_reaches(threshold: float) -> float:
+    """Find the least number that is not below a threshold for the exemplar's trees, which compare
+    in single precision: a number is rounded to it first.
+    """
+    rounded = np.float32(threshold)
+    midway = (float(rounded) + float(np.nextafter(rounded, np.float32(-np.inf)))) / 2.0
+    if np.float32(midway) >= rounded:
+        return midway
+    return math.nextafter(midway, math.inf)
 
 
 @dataclass(eq=False)
@@ -134,7 +151,8 @@ class BehaviourTree(RemembersFailures):
     @property
     def depends_on(self) -> Dependencies:
         """The thresholds between the search modes."""
-        return {WATER_VISIBILITY: tuple(sorted(self._settings.visibility_thresholds_m))}
+        thresholds_m = map(least_that_reaches, self._settings.visibility_thresholds_m)
+        return {WATER_VISIBILITY: tuple(sorted(thresholds_m))}
 
     # The branches of the tree, one for each function.
 
@@ -187,9 +205,11 @@ class BehaviourTree(RemembersFailures):
         return Behaviour("->", function, (needed, branch))
 
     def _is_clear(self, least_m: float) -> Behaviour:
+        reaches_m = least_that_reaches(least_m)
+
         def holds() -> bool:
             visibility_m = self.system.measured(WATER_VISIBILITY)
-            return visibility_m is None or visibility_m >= least_m
+            return visibility_m is None or visibility_m >= reaches_m
 
         return Behaviour("", f"visibility is at least {least_m:g} m, or unknown", act=holds)
 
@@ -202,30 +222,27 @@ class BehaviourTree(RemembersFailures):
 
 
 class ExtendedBehaviourTree(BehaviourTree):
-    """bt_extended: the same, but with a low battery the vehicle goes to recharge; the way there
-    then stays active.
-    """
+    """bt_extended: the same, but with a low battery the vehicle goes to recharge first."""
 
     decides_on = (*BehaviourTree.decides_on, GENERATE_RECHARGE_PATH)
 
     @property
     def depends_on(self) -> Dependencies:
         """The conditions of bt, and whether the battery is low."""
-        return {**super().depends_on, BATTERY_LEVEL: (self._settings.battery_limit,)}
+        limit = least_that_reaches(self._settings.battery_limit)
+        return {**super().depends_on, BATTERY_LEVEL: (limit,)}
 
     def make_tree(self) -> Behaviour:
         """Make the tree; without a battery there is no station to go to."""
         if self.system.scenario.battery is None:
             return super().make_tree()
-        # A guard on the level halts the exemplar's sequence as soon as the battery is full, before
-        # the last step, which would make the function inactive: it goes on sending the station,
-        # whatever else is done.
-        go = Behaviour(
-            "->",
-            GENERATE_RECHARGE_PATH,
-            (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")),
-        )
-        return Behaviour("=>", "mission", (*self._branches(), go))
+        # The exemplar's tree has a sequence under a fallback, which ticks its running child again
+        # without asking the guard on the level: the sequence goes on to its last step.
+        go = (self._is_low(), self._set(GENERATE_RECHARGE_PATH, ON_THE_WAY))
+        end = (self._is_on_the_way(), self._set(GENERATE_RECHARGE_PATH, "inactive"))
+        steps = Behaviour("->", "recharge", go), Behaviour("->", "recharged", end)
+        recharging = Behaviour("?", GENERATE_RECHARGE_PATH, steps)
+        return Behaviour("=>", "mission", (*self._branches(), recharging))
 
     def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
         if self.system.scenario.battery is not None and function in (
@@ -236,13 +253,17 @@ class ExtendedBehaviourTree(BehaviourTree):
             branch = Behaviour("?", "unless the battery is low", (pause, branch))
         return super()._while_needed(function, branch)
 
+    def _is_on_the_way(self) -> Behaviour:
+        def holds() -> bool:
+            return self.system.modes.current_mode(GENERATE_RECHARGE_PATH) == ON_THE_WAY
+
+        return Behaviour("", "is on the way to the station", act=holds)
+
     def _is_low(self) -> Behaviour:
+        limit = least_that_reaches(self._settings.battery_limit)
+
         def holds() -> bool:
             level = self.system.measured(BATTERY_LEVEL)
-            return (
-                level is not None
-                and level < self._settings.battery_limit
-                and SURFACE not in self.system.functions
-            )
+            return level is not None and level < limit and SURFACE not in self.system.functions
 
         return Behaviour("", f"battery is below {self._settings.battery_limit:g}", act=holds)

@@ -1,14 +1,13 @@
 """Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol).
 
 Monitor: read the measured values; component statuses arrive as diagnostics. Analyze: a reasoner
-infers what the rules say about that state. Plan: the best function design for each objective that
-needs one. Execute: request the mode of the design's name. Source of what revisions do differently:
+infers what the rules say about that state, which takes a while. Plan: the best function design for
+each objective that needs one, by the values that are measured by then. Execute: request the mode of the design's name. Source of what revisions do differently:
 kas-lab/suave with its reasoner, 4 February 2023 to 1.5.0.
 """
 
 from collections.abc import Callable, Collection, Hashable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import ClassVar, Final, Protocol
 from weakref import WeakKeyDictionary
 
@@ -23,6 +22,7 @@ from suave_des.knowledge.state import (
     ObjectiveState,
     Plan,
     Reasoning,
+    exact,
 )
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
@@ -130,7 +130,7 @@ class Metacontrol(ManagingSubsystem):
             else frozenset[str]()
         )
         self._awaited = expected.intersection(system.measurements, scenario.signals)
-        self._longest_s = support(settings.latency_s)[1]
+        self.reads_for_s = support(settings.latency_s)[1]
         self.period_s = settings.period_s
         if self.period_s is not None:
             self.starts_s = self.first_cycle_s(self.period_s)
@@ -168,7 +168,7 @@ class Metacontrol(ManagingSubsystem):
         reasoning = self._analyze_and_plan()
         if self.system.recorded and self.needs_knowledge:
             self.system.log_state(reasoning.inference.state)
-        if self._changes_nothing(reasoning):
+        if self._changes_nothing(reasoning) and not reasoning.plan.decisions:
             return None
         return self.execute(reasoning, self._latency_s(self.system.now_s))
 
@@ -209,16 +209,31 @@ class Metacontrol(ManagingSubsystem):
         return self._reasoner.plan(inference, improve_exceeded=self._revision.improve_when_exceeded)
 
     def execute(self, reasoning: Reasoning, latency_s: float) -> AdaptationProcess:
-        """Request the plan's modes after the reasoner's latency; return whether another cycle would
-        change nothing.
+        """Plan anew after the reasoner's latency, and request the plan's modes; return whether
+        another cycle would change nothing.
         """
         recovered = self._to_be_forgotten()
+        was_idle = self._changes_nothing(reasoning)
+        measured_before = self._measured_key()
         yield self.system.env.timeout(latency_s)
+        plan = self._plan_by_now(reasoning, measured_before)
+        if not was_idle or plan.designs != reasoning.plan.designs:
+            self._log_statuses(reasoning.inference)
+            self._carry_out(plan, recovered, latency_s)
+        if not self._is_event_triggered:
+            return False
+        self.monitor()
+        return not self.objectives or self._changes_nothing(self._analyze_and_plan())
+
+    def _log_statuses(self, inference: Inference) -> None:
         if self.system.recorded:
-            for line in sorted(reasoning.inference.statuses - self._recorded_statuses):
+            for line in sorted(inference.statuses - self._recorded_statuses):
                 self.system.log("inferred", line)
-            self._recorded_statuses = reasoning.inference.statuses
-        grounded = self._request_modes(reasoning.plan)
+            self._recorded_statuses = inference.statuses
+
+    def _carry_out(self, plan: Plan, recovered: Collection[str], latency_s: float) -> None:
+        """Request a plan's modes, and forget components that had recovered when it was made."""
+        grounded = self._request_modes(plan)
         if not grounded.items() <= self.groundings.items():
             self.reasoning_time_s += latency_s
         self.groundings |= grounded
@@ -227,14 +242,10 @@ class Metacontrol(ManagingSubsystem):
         # refused: its status keeps that objective updatable, so that the next cycle asks again.
         # Kept for longer, it would make every objective updatable for ever, and in the exemplar's
         # oldest files contradict the status UNGROUNDED of later objectives.
-        is_refused = self._has_met_objective_without(grounded, reasoning.plan)
+        is_refused = self._has_met_objective_without(grounded, plan)
         for component in recovered:
             if not is_refused and self.components.get(component) == RECOVERED:
                 del self.components[component]
-        if not self._is_event_triggered:
-            return False
-        self.monitor()
-        return not self.objectives or self._changes_nothing(self._analyze_and_plan())
 
     def _to_be_forgotten(self) -> list[str]:
         """Components that have recovered, if they are forgotten."""
@@ -344,13 +355,14 @@ class Metacontrol(ManagingSubsystem):
         ends_s = began_s + self._latency_s(began_s)
         if not self.objectives or passed_s < 0.0 or env.now >= ends_s:
             return
-        for decision in self._analyze_and_plan().plan.decisions:
-            if decision.function in functions and decision.design is not None:
-                call_at(
-                    env,
-                    ends_s,
-                    partial(self.system.change_mode, decision.function, decision.design),
-                )
+        reasoning, measured_before = self._analyze_and_plan(), self._measured_key()
+
+        def execute() -> None:
+            for decision in self._plan_by_now(reasoning, measured_before).decisions:
+                if decision.function in functions and decision.design is not None:
+                    self.system.change_mode(decision.function, decision.design)
+
+        call_at(env, ends_s, execute)
 
     # Queries of the loop.
 
@@ -380,30 +392,55 @@ class Metacontrol(ManagingSubsystem):
         if reasoning is None:
             inference = self.analyze()
             reasoning = Reasoning(inference, self.plan(inference))
-            if self._is_cacheable:
-                if len(self._reasonings) >= _MAX_CACHED:
-                    self._reasonings.clear()
-                self._reasonings[state] = reasoning
+            self._keep(state, reasoning)
         return reasoning
 
-    def _symbolic_state(self) -> Hashable:
-        """Make the key of the state: with regions of measured values, or with the values if the
-        mission is recorded.
+    def _plan_by_now(self, reasoning: Reasoning, measured_before: Hashable) -> Plan:
+        """Choose designs with the values that are measured now, after the reasoner has inferred
+        something of those before.
         """
-        measured = self.measurements.values()
-        values = tuple(measured) if self.system.recorded else self._reasoner.distinguished(measured)
+        self.monitor()
+        measured_now = self._measured_key()
+        if measured_now == measured_before and self._is_cacheable:
+            return reasoning.plan
+        key = reasoning.inference.state, measured_now
+        found = self._reasonings.get(key)
+        if found is None:
+            values = [(name, exact(value)) for name, value in sorted(self.measurements.items())]
+            inference = replace(reasoning.inference, measured_since=tuple(values))
+            found = Reasoning(inference, self.plan(inference))
+            self._keep(key, found)
+        return found.plan
+
+    def _keep(self, key: Hashable, reasoning: Reasoning) -> None:
+        """Keep what was inferred and planned."""
+        if self._is_cacheable:
+            if len(self._reasonings) >= _MAX_CACHED:
+                self._reasonings.clear()
+            self._reasonings[key] = reasoning
+
+    def _symbolic_state(self) -> Hashable:
+        """Make the key of the state."""
         known = (
             tuple(self.objectives.items()),
             tuple(self.groundings.items()),
             tuple(self.components.items()),
         )
-        return known, tuple(self.measurements), values
+        return known, self._measured_key()
+
+    def _measured_key(self) -> Hashable:
+        """Make the key of the measured values: their regions, or, if the mission is recorded, the
+        values.
+        """
+        measured = self.measurements.values()
+        values = tuple(measured) if self.system.recorded else self._reasoner.distinguished(measured)
+        return tuple(self.measurements), values
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""
         # A latency of a period or more must pass even so: cycles that come due meanwhile are
         # skipped.
-        is_late = self.period_s is not None and self._longest_s >= self.period_s
+        is_late = self.period_s is not None and self.reads_for_s >= self.period_s
         if is_late or self._to_be_forgotten():
             return False
         if self.system.recorded:

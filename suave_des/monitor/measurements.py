@@ -203,6 +203,8 @@ class BatteryMeasurements(Measurements):
     """The battery's level, which falls linearly from 1. Recharging makes what follows in the table
     another.
 
+    The exemplar's battery monitor counts: at each of its ticks it takes away what a period uses.
+
     Args:
         discharge_time_s: time from full to empty.
         timing, duration_s, noise, is_lost: as of `Measurements.of`.
@@ -226,7 +228,8 @@ class BatteryMeasurements(Measurements):
         self.listeners: list[Callable[[], None]] = []
         periods_s = np.full(timing.count(duration_s) - 1, timing.period_s)
         self._ticks_s: Array = np.add.accumulate(np.append(timing.phase_s, periods_s))
-        self._measure(self._ticks_s)
+        self._used = timing.period_s / discharge_time_s
+        self._measure(self._ticks_s, 1.0 - self._used)
 
     def level(self, t_s: float) -> float:
         """Compute the true level at mission time t, if it is not recharged until then."""
@@ -237,7 +240,7 @@ class BatteryMeasurements(Measurements):
         self._full_at_s = t_s
         self.recharges += 1
         later = np.searchsorted(self._ticks_s, t_s, side="right")
-        self._measure(np.append(t_s, self._ticks_s[later:]))
+        self._measure(np.append(t_s, self._ticks_s[later:]), 1.0)
         for listener in self.listeners:
             listener()
 
@@ -246,10 +249,12 @@ class BatteryMeasurements(Measurements):
         self.listeners.append(partial(self.publish_now, env, bus))
         return super().publish(env, bus)
 
-    def _measure(self, times: Array) -> None:
-        """Measure at some times, from the first of which on the table is made anew."""
+    def _measure(self, times: Array, level: float) -> None:
+        """Measure at some times, from the first of which on the table is made anew with a level."""
         known = self.count_until(times[0])
-        levels = np.maximum(0.0, 1.0 - (times - self._full_at_s) / self._discharge_time_s)
+        # One subtraction after the other, with its rounding errors: they decide at a threshold.
+        counted = np.subtract.accumulate(np.append(level, np.full(len(times) - 1, self._used)))
+        levels = np.maximum(0.0, counted)
         times, levels = _published(times, levels, *self._disturbances)
         self.times_s[known:], self.values[known:] = times.tolist(), levels.tolist()
         self.arrays = (

@@ -25,6 +25,7 @@ class Thrusters:
 
     Attributes:
         revision: says how they fail, and from when on.
+        is_lost: says of each failure whether it has no effect.
         unrecoverable: thrusters that f_maintain_motion cannot recover at present.
         working: mission times at which a thruster's state was set, also to what it was, and how many
             worked from then on.
@@ -34,13 +35,14 @@ class Thrusters:
     vehicle: Vehicle
     revision: ThrusterFailureRevision
     log: Log
+    is_lost: Callable[[], bool] = field(default=lambda: False)
     unrecoverable: set[int] = field(default_factory=set, init=False)
     working: list[tuple[float, int]] = field(default_factory=list, init=False)
 
     def apply(self, event: ThrusterEvent) -> None:
         """Let one of the scenario's events happen to the vehicle now."""
         fails = event.event == "failure"
-        if fails and self.env.now < self.revision.effective_from_s:
+        if fails and (self.is_lost() or self.env.now < self.revision.effective_from_s):
             name = THRUSTER_NAMES[event.thruster - 1]
             self.log("thruster_monitor", Said("failure_without_effect", name))
             return
@@ -62,6 +64,15 @@ class Thrusters:
     def _set(self, thruster: int, state: ThrusterState) -> None:
         self.vehicle.set_thruster(self.env.now, thruster, state)
         self.working.append((self.env.now, self.vehicle.thrusters.count("works")))
+
+
+def failure_loss(revision: ThrusterFailureRevision, draws: Draws) -> Callable[[], bool]:
+    """Make the function that says of one failure after the other whether it has no effect."""
+    probability = revision.loss_probability
+    if probability == 0.0:
+        return lambda: False
+    stream = draws.stream("thruster_failures.loss")
+    return lambda: stream.random() < probability
 
 
 def draw_schedule(scenario: Scenario, draws: Draws) -> list[tuple[ThrusterEvent, float]]:

@@ -792,6 +792,8 @@ class ThrusterFailureRevision(Strict):
     """
     effective_from_s: NotNegative = 0.0
     """Before this mission time, failures have no effect."""
+    loss_probability: Share = 0.0
+    """Probability of each failure to have no effect; it is published in any case."""
 
 
 class SetPointRevision(Strict):
@@ -1022,6 +1024,10 @@ class MetacontrolSettings(Strict):
 
     reasoning_period_s: Period = 2.0
     """Period of its MAPE-K loop."""
+    first_cycle_s: NotNegative | None = None
+    """When its first cycle begins; by default at any time of a period, or in step with the monitors
+    in a revision that has it so.
+    """
 
 
 class BehaviourTreeSettings(Strict):

@@ -41,7 +41,12 @@ from suave_des.monitor.monitors import (
     measure_signals,
     start_monitors,
 )
-from suave_des.monitor.thrusters import Thrusters, draw_schedule, thruster_monitor
+from suave_des.monitor.thrusters import (
+    Thrusters,
+    draw_schedule,
+    failure_loss,
+    thruster_monitor,
+)
 from suave_des.scenario.models import Scenario
 from suave_des.simulation.calls import RAISED
 from suave_des.simulation.host import ManagerHost
@@ -147,7 +152,8 @@ def _make_surroundings(order: Order) -> Surroundings:
     start_m, origin_m = draw_start(draws)
     reasons = order.manager_type.needs_knowledge
     vehicle = prepared.make_vehicle(draws, start_m, prepared.take_track(), reasons)
-    thrusters = Thrusters(env, vehicle, scenario.revision.thruster_failures, recorder.log)
+    failures = scenario.revision.thruster_failures
+    thrusters = Thrusters(env, vehicle, failures, recorder.log, failure_loss(failures, draws))
     battery = measure_battery(scenario, draws, prepared.duration_s)
     measured: list[Measurements] = [
         *measure_signals(prepared.loaded, draws, prepared.duration_s),

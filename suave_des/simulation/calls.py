@@ -18,6 +18,7 @@ error.
 """
 _MAX_YIELDS_AT_ONE_TIME = 10_000
 """How often `adapt` may yield while mission time stands still."""
+_ROUNDING_S = 1e-9
 
 
 class CallTimes:
@@ -26,13 +27,15 @@ class CallTimes:
 
     After a call that changed nothing, an event-triggered manager sleeps. It wakes when its state
     changes, and at the first of its times at which the measured values are in regions (between
-    which thresholds each of them is) in which it has not been called since the last change.
+    which thresholds each of them is) in which it has not been called since the last change, or in
+    which they will not stay until the call has read them.
 
     Args:
         call: the call.
         period_s, first_s: the manager's times.
         depends_on: the measurements that an event-triggered manager depends on, with its
             thresholds; None: it is called at each of its times.
+        reads_for_s: how long after its beginning a call may still read them.
     """
 
     def __init__(
@@ -42,8 +45,10 @@ class CallTimes:
         period_s: float,
         first_s: float,
         depends_on: Sequence[tuple[Measurements, Thresholds]] | None,
+        reads_for_s: float = 0.0,
     ) -> None:
         self._env, self.period_s, self._depends_on = env, period_s, depends_on
+        self._reads_for_s = reads_for_s
         self._next_s = first_s  # the first of its times after the last call
         self._sleeps = False
         self._known: set[tuple[int, ...]] = set()  # regions in which a call has changed nothing
@@ -85,9 +90,13 @@ class CallTimes:
         while regions in self._known:
             if until_s == inf:
                 return
-            call_s = summed_tick(until_s, earliest_s, self.period_s)
+            # A call at any earlier time would be over before the values leave their regions.
+            read_from_s = until_s - self._reads_for_s - _ROUNDING_S
+            call_s = summed_tick(read_from_s, earliest_s, self.period_s)
             earliest_s = call_s + self.period_s
             regions, until_s = _regions_at(depends_on, call_s)
+            if until_s <= call_s + self._reads_for_s:
+                break
         self._alarm.set(call_s, exactly=True)
 
     def close(self) -> None:

@@ -57,6 +57,7 @@ class ManagerHost:
             self.manager.recall(self.learned, self.training)
             times = times_of(self.manager)
             declared = dependencies_of(self.manager)
+            reads_for_s = float(self.manager.reads_for_s)
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
@@ -71,7 +72,7 @@ class ManagerHost:
             depends_on = [
                 (measurements[name], declared[name]) for name in measurements if name in declared
             ]
-        self._times = CallTimes(self.system.env, self._adapt, *times, depends_on)
+        self._times = CallTimes(self.system.env, self._adapt, *times, depends_on, reads_for_s)
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""

@@ -1,7 +1,11 @@
 """The behaviour tree managers bt and bt_extended."""
 
+import math
+
+import numpy as np
 import pytest
 
+from suave_des.managing.bt import least_that_reaches
 from tests.helpers.managers_at_work import FOLLOW, MOTION, SEARCH, AtWork
 
 RECHARGE = "generate_recharge_path"
@@ -120,12 +124,28 @@ def test_recharging_still_recovers_thrusters():
     assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
 
 
-def test_recharged_it_goes_on_and_the_way_to_the_station_stays_active():
+def test_recharged_it_goes_on_and_ends_the_way_to_the_station():
     at_work = with_battery(0.2)
     at_work.adapt()
     at_work.measured("battery_level", 1.0)
     asked = dict(at_work.adapt())
-    assert asked[SEARCH] == "fd_spiral_high" and RECHARGE not in asked
+    assert asked[SEARCH] == "fd_spiral_high" and asked[RECHARGE] == "inactive"
+
+
+@pytest.mark.parametrize(
+    ("level", "recharges"),
+    [(0.24999999999999933, False), (0.24999999254941940, False), (0.2499999925494193, True)],
+)
+def test_it_compares_the_battery_s_level_in_single_precision(level, recharges):
+    """As std::stof reads it: the number between is halfway to the next lower one, 0.24999999."""
+    assert (RECHARGE in dict(with_battery(level).adapt())) == recharges
+
+
+@pytest.mark.parametrize("threshold", [0.25, 0.1, 0.3, 3.25, -0.25, 1e-3])
+def test_a_threshold_in_single_precision(threshold):
+    least = least_that_reaches(threshold)
+    assert np.float32(least) >= np.float32(threshold)
+    assert np.float32(math.nextafter(least, -math.inf)) < np.float32(threshold)
 
 
 def test_following_is_interrupted_by_a_low_battery_too():

@@ -111,13 +111,43 @@ def test_a_recovery_is_reasoned_about_once():
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.7])
 def test_a_plan_comes_as_much_later_as_the_inference_takes(latency_s):
-    """The change of visibility is measured at once; reasoning begins at a tick of 2 s, and ends
-    later.
+    """A failure is reported at once; reasoning begins at a tick of 2 s, and ends later."""
+    at_once = mission({**visibility(3.5), "latencies.inference_s": 0.0})
+    later = mission({**visibility(3.5), "latencies.inference_s": latency_s})
+    assert "fd_recover_thrusters" in [mode for _, mode in modes(later, MOTION)]
+    for (then_s, mode), (later_s, same) in zip(
+        modes(at_once, MOTION), modes(later, MOTION), strict=True
+    ):
+        assert mode == same
+        assert later_s == pytest.approx(then_s + latency_s)
+
+
+FIRST_CYCLE_S = {"managers.metacontrol.first_cycle_s": 1.5, "latencies.inference_s": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("after_m", "mode", "step_s", "asked_s"),
+    [
+        (1.5, "fd_spiral_low", 19.2, 20.5),  # before the cycle from 19.5 to 20.5 s
+        (1.5, "fd_spiral_low", 20.0, 20.5),  # in the middle of it
+        (1.5, "fd_spiral_low", 20.9, 22.5),  # after it
+        (2.5, "fd_spiral_medium", 20.0, 20.5),
+    ],
+)
+def test_a_design_is_chosen_by_the_values_measured_when_the_inference_is_over(
+    after_m, mode, step_s, asked_s
+):
+    """The search is always adapted in revision 2023 while the visibility exceeds what is expected."""
+    changed = mission({**steps(3.5, after_m, step_s), **FIRST_CYCLE_S})
+    assert modes(changed, SEARCH)[1] == (pytest.approx(asked_s), mode)
+
+
+def test_whether_to_adapt_is_inferred_from_the_values_at_the_beginning_of_the_cycle():
+    """At 2.25 m nothing exceeds what fd_spiral_medium expects: that the value falls at 20 s is not
+    inferred before the next cycle, at 21.5 s.
     """
-    at_once = mission({**steps(3.5, 1.5, 20.0), "latencies.inference_s": 0.0})
-    later = mission({**steps(3.5, 1.5, 20.0), "latencies.inference_s": latency_s})
-    assert [mode for _, mode in modes(later, SEARCH)] == ["fd_spiral_high", "fd_spiral_low"]
-    assert modes(later, SEARCH)[1][0] == pytest.approx(modes(at_once, SEARCH)[1][0] + latency_s)
+    changed = mission({**steps(2.25, 1.5, 20.0), **FIRST_CYCLE_S})
+    assert modes(changed, SEARCH)[1] == (pytest.approx(22.5), "fd_spiral_low")
 
 
 @pytest.mark.parametrize("executes", [True, False])
@@ -231,14 +261,14 @@ def test_a_design_without_a_mode_is_bad_input(suave_copy):
 
 
 def test_a_rule_that_contradicts_another_ends_the_mission_with_both_named(tmp_path):
-    """They clash when the water has become too murky for the present design, not before."""
+    """They clash in the cycle that finds the water too murky for the present design, not before."""
     rules = tmp_path / "clash.swrl"
     rules.write_text(
         'everything_is_in_error: FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_FR")\n'
     )
     with pytest.raises(MissionError) as raised:
-        mission(steps(3.5, 1.5, 20.0), rules=[rules])
-    assert raised.value.manager == "metacontrol" and 20.0 <= raised.value.time_s <= 23.0
+        mission({**steps(3.5, 1.5, 21.0), **FIRST_CYCLE_S}, rules=[rules])
+    assert raised.value.manager == "metacontrol" and raised.value.time_s == pytest.approx(21.5)
     assert "everything_is_in_error" in str(raised.value) and "QAWaterVisibility" in str(
         raised.value
     )
