@@ -48,6 +48,7 @@ def simulate(case: Case, runs: int) -> dict[tuple[int, str], NDArray[np.float64]
             changed = {
                 "start.y_m": values["start.y_m"],
                 "thruster_events": events,
+                "revision.thruster_failures.effective_from_s": 0.0,
                 "revision.thruster_failures.loss_probability": 0.0,
             }
             simulator = Simulator(with_values(case.loaded, changed))

@@ -73,8 +73,13 @@ CHANGES = (
         {f"{FAILURES}.failure_mode": "dead"},
     ),
     Change(
-        "failures lost with a probability of 23% (none)",
-        "none in 2025: 11 of 30 missions go on as if one failure alone had happened, or none",
+        "failures before 26 s without effect (with one)",
+        "none in 2025: missions with failures at 25 and 26 s go on as if only the second had happened",
+        {f"{FAILURES}.effective_from_s": 0.0},
+    ),
+    Change(
+        "failures lost with a probability of 13% (none)",
+        "none in 2025: 6 of the other 25 missions go on as if one failure alone had happened, or none",
         {f"{FAILURES}.loss_probability": 0.0},
     ),
     Change(

@@ -90,6 +90,7 @@ def failures() -> pandas.DataFrame:
             ]
             for mode in ("frozen", "dead") if thrusters else ("none",):
                 how = {
+                    "effective_from_s": 0.0,
                     "loss_probability": 0.0,
                     "failure_mode": "frozen" if mode == "none" else mode,
                 }

@@ -4,7 +4,7 @@ The vehicle and the software are fitted to experiment 1 of 2025 without one of i
 without one of its managers, for each choice, from the middle of the bounds; what was left out is
 predicted. Values that reaction times alone decide are not fitted, and random is not fitted to: what
 it does differs from run to run by far more than with any parameter. That failures are lost was seen
-under `none`, and is assumed only where its missions are fitted to.
+under `none`, and that early ones are, in condition 6: it is assumed only where these are fitted to.
 split_check.py does the same for the managers of 2023.
 
 Writes deviations.csv, with a row for each manager, condition and metric that was left out.
@@ -39,9 +39,13 @@ from suave_des import with_values
 
 METRICS = ("search_time_s", "distance_inspected_m", "mean_reaction_time_s")
 NOT_FITTED = ("latencies.inference_s.mean", "latencies.mode_change_s")
-SEEN_IN = "none"
+LOST_BY = "none"
 """The manager without which nothing says that failures are lost: the others recover thrusters."""
-LOST = "revision.thruster_failures.loss_probability"
+EARLY_IN = 6
+"""The condition without which nothing says that early ones are."""
+LOST, EARLY = (
+    f"revision.thruster_failures.{key}" for key in ("loss_probability", "effective_from_s")
+)
 FOLDER = Path(__file__).with_suffix("")
 CONFIDENCE = 0.9
 WHOLE = "managers over all conditions"
@@ -53,11 +57,12 @@ def predicted(
     case: Case, seen: Case, runs: int, evaluations: int, workers: int
 ) -> pandas.DataFrame:
     """Fit to some missions of a case; missions of the whole case with the best values."""
-    if SEEN_IN not in set(seen.real["manager"]):
-        every = {LOST: 0.0}
-        case, seen = (
-            replace(each, loaded=with_values(each.loaded, every)) for each in (case, seen)
-        )
+    not_seen = {}
+    if LOST_BY not in set(seen.real["manager"]):
+        not_seen = {LOST: 0.0, EARLY: 0.0}
+    elif EARLY_IN not in seen.conditions:
+        not_seen = {EARLY: 0.0}
+    case, seen = (replace(each, loaded=with_values(each.loaded, not_seen)) for each in (case, seen))
     problem = read_problem("planta_exp1", [seen], runs * len(seen.conditions), 1)
     free = [
         replace(each, start=(each.lower + each.upper) / 2.0)
