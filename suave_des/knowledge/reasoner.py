@@ -252,8 +252,21 @@ def _decide(ontology: Ontology, inference: Inference, function: str, trigger: st
         return Decision(function, None, f"{trigger}: no function design is left, {kept}", rejected)
     best = min(eligible, key=lambda design: (-eligible[design], design))
     among = f"among {len(eligible)} eligible of {len(designs)} designs"
-    reason = f"{trigger}: highest performance ({_show(eligible[best])}) {among}"
+    since = "".join(_measured_since(ontology, inference, designs))
+    reason = f"{trigger}: highest performance ({_show(eligible[best])}) {among}{since}"
     return Decision(function, best, reason, rejected)
+
+
+def _measured_since(
+    ontology: Ontology, inference: Inference, designs: Iterable[str]
+) -> Iterator[str]:
+    """Say which of the values that designs expect have changed since the inference began."""
+    before = dict(inference.state.measurements)
+    expected = {name for design in designs for name in ontology.expected(design)}
+    for name, now in sorted(inference.measurements.items()):
+        if name in expected and now != before.get(name):
+            then = _show(before[name]) if name in before else "unknown"
+            yield f", with {name} {_show(now)} ({then} when inferred)"
 
 
 def _rejection_reasons(inference: Inference, design: str, function: str) -> Iterator[str]:

@@ -132,6 +132,18 @@ class NeverIdle(EventTriggered):
         return self.system.settings.get("settled")
 
 
+class ReadsLate(EventTriggered):
+    """Reads measured values a second after each call begins."""
+
+    depends_on: ClassVar = EventTriggered.depends_on
+    reads_for_s = 1.0
+
+    def adapt(self):
+        super().adapt()
+        yield self.system.env.timeout(1.0)
+        return True
+
+
 class TakesTime(EventTriggered):
     """Acts for some time in each region of the visibility and after each report, and is idle
     then.

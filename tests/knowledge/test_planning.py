@@ -51,6 +51,23 @@ def test_each_design_left_out_has_its_numbers(kb, pellet):
     )
 
 
+def since(reasoner: Reasoner, state: KnowledgeState, visibility: str) -> tuple[Decision, ...]:
+    """Decide with a visibility that is measured after the inference."""
+    measured = (("water_visibility", Decimal(visibility)),)
+    return reasoner.plan(replace(reasoner.analyze(state), measured_since=measured)).decisions
+
+
+def test_a_design_is_chosen_by_what_has_been_measured_since_the_inference(kb, pellet):
+    (decision,) = since(pellet, searching("fd_spiral_high", 1.8), "2.3")
+    assert decision.design == "fd_spiral_medium"
+    assert decision.reason.startswith("o_status IN_ERROR_NFR")
+    assert decision.reason.endswith(", with water_visibility 2.30 (1.80 when inferred)")
+
+
+def test_whether_to_adapt_does_not_depend_on_what_has_been_measured_since(kb, pellet):
+    assert since(pellet, searching("fd_spiral_medium", 2.5), "1.0") == ()
+
+
 def test_numbers_that_look_alike_are_shown_with_more_digits(kb, pellet):
     decision = decide(pellet, searching("fd_spiral_medium", "2.2499999"))[SEARCH]
     assert "water_visibility 2.2499999 measured < 2.25 expected" in [

@@ -97,6 +97,12 @@ def test_it_is_called_at_the_first_of_its_times_after_a_value_has_crossed_a_thre
     assert called_s({**steps(2.5, value, 31.5), **is_settled}, "NeverIdle") == called
 
 
+@pytest.mark.parametrize(("crosses_s", "called"), [(30.5, [31.0]), (31.5, [33.0])])
+def test_one_that_reads_values_later_is_called_where_it_would_read_the_new_one(crosses_s, called):
+    """The values are published 0.65 s later, at 31.15 and 32.15 s; it reads them at 32 and 34 s."""
+    assert called_s(steps(2.5, 3.5, crosses_s), "ReadsLate") == called
+
+
 def test_after_a_call_that_took_a_period_or_more_it_is_called_again():
     slow = with_settings("NeverIdle", settled=True, takes_s=3.0)
     called = called_s({**steps(2.5, 2.6, 30.0), **slow}, "NeverIdle")
